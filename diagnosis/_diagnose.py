@@ -22,8 +22,7 @@ from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
-from diagnosis.remainder.driven import closable_driven
-from diagnosis.remainder.explain import closable
+from diagnosis.remainder.ways import way_for
 from diagnosis.result import Diagnosis
 from diagnosis.search.clock import Progress
 from diagnosis.search.investigate import investigate
@@ -165,24 +164,17 @@ def _assembled(
 
 def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:
     """The answer with what could be closed of what remains, and what else may explain it."""
-    decided, caution = answer.decision.decided, tuple[Fact, ...]()
-    if (
-        chosen.campaign.driven and not study.model.restored
-    ):  # every small error of a moment adds up in the angle
-        caution = (Fact("remainder not sought"),)
-    else:
-        say("what no effect explains")
-        # of an undecided diagnosis the whole gap remains
-        significant = not decided or (answer.rest is not None and answer.rest.significant)
-        try:
-            with np.errstate(over="raise"):  # a fitted model that runs away
-                if chosen.campaign.driven:
-                    left = closable_driven(study, significant=significant and decided)
-                else:
-                    left = closable(study, significant=significant, decided=decided)
-            answer = replace(answer, closable=left)
-        except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
-            caution = (Fact("remainder not solved"),)
+    decided, way = answer.decision.decided, way_for(study)
+    caution = (Fact(way.caution),) if way.caution else ()
+    say("what no effect explains")
+    # of an undecided diagnosis the whole gap remains
+    significant = not decided or (answer.rest is not None and answer.rest.significant)
+    try:
+        with np.errstate(over="raise"):  # a fitted model that runs away
+            left = way.closable(study, significant=significant, decided=decided)
+        answer = replace(answer, closable=left)
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+        caution = (Fact("remainder not solved"),)
     # below one half a set of effects comes first, though each of them may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
     unknown = max(odds, key=odds.__getitem__, default="") in UNKNOWN

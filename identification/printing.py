@@ -309,20 +309,26 @@ def repeatability_lines(document: Document) -> list[str]:
             f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
             "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]"
         ]
-    parts = []
+    stated, seen = [], []
     for name, words in DEVIATIONS.items():
         width = found[name]
         if width is None:
             continue
-        size = f"{words} ± {percent(width['value'])}"
+        size = f"{words} by {percent(width['value'])}"
         if name in found["stated"]:
-            parts.append(f"{size} as stated")
+            stated.append(size)
         else:
             low, high = width["interval"]
-            parts.append(f"{size} ({percent(low)} to {percent(high)})")
+            seen.append(f"{size} ({percent(low)} to {percent(high)})")
+    ways = [f"as stated, {', '.join(stated)}"] if stated else []
+    told = ""
+    if seen:
+        ways.append(f"as if by chance, {', '.join(seen)}")
+        told = "; tunnel diagnose tells chance from a cause"
+    differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
     return [
-        f"Between runs: frequency ± {percent(found['frequency'])}, damping ± {percent(found['damping'])}; "
-        f"{', '.join(parts)}. The intervals include it"
+        f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
+        f"it{told}"
     ]
 
 

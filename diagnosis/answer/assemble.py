@@ -25,7 +25,7 @@ from diagnosis.facts.remainder import Remainder
 from diagnosis.likelihood.compression import in_shorter_blocks
 from diagnosis.result import Coefficients, Diagnosis, GapSummary, Where
 from diagnosis.search.study import Answer, Study
-from diagnosis.search.weigh import UNKNOWN, main_effect
+from diagnosis.search.weigh import UNKNOWN
 from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
@@ -47,10 +47,7 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
         maps = with_answer(found, study.campaign, *both)
     if not study.causes:
         return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
-    compared = list(study.read_off) if study.named else []  # what has to agree with the place
-    if study.named and study.fitted:
-        shares = {answer.effects: answer.share for answer in study.answers}
-        compared.insert(0, main_effect(study.fitted, shares))
+    compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
     where = Where(
         channel=place.channel.value,
         condition=place.condition.value,

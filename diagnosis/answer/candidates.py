@@ -219,13 +219,17 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         if kind.driven or severity not in problem.names:
             continue
         runs = range(len(data.runs))
-        shown = [i for i in runs if data.runs[i].wind_on] if kind.condition == "wind_on" else []
-        # the softest spring, where a moment of any size does most
-        index = min(shown or runs, key=lambda i: data.runs[i].spring_stiffness or 0.0)
+        windy = [i for i in runs if data.runs[i].wind_on] if kind.condition == "wind_on" else []
         release, without = fit.point.release.copy(), fit.point.common.copy()
-        release[index, :2] = amplitude, 0.0
+        release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0
         both = problem.predict([Point(fit.point.common, release), Point(without, release)])
+        # of one spring or one wind only some runs show it
+        shown = [i for i in windy or runs if not np.array_equal(both[0][i], both[1][i])]
+        if not shown:
+            continue
+        # the softest spring, where a moment of any size does most
+        index = min(shown, key=lambda i: data.runs[i].spring_stiffness or 0.0)
         run, frequency = data.runs[index], resonance(fit, index)
         count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
         curves = [readings[index][:count] for readings in both]

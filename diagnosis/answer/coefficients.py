@@ -25,6 +25,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import AnswerSettings
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
@@ -176,8 +177,9 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         change made by freeing the forms: another family of forms may change as much. By the same rule ``unknown``
         adds half the change from the nominal model. The effect that could hide and would move the coefficient most
         (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size is two standard
-        deviations. The central interval is given where it is not that of a normal distribution. No standard
-        deviation is given at a bound and where the runs do not determine the coefficient.
+        deviations. The central interval is given where it is not that of a normal distribution
+        (`interval_beside`). No standard deviation is given at a bound and where the runs do not determine the
+        coefficient.
     """
     fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
@@ -210,13 +212,27 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         shares["rivals"] = shares.get("rivals", 0.0) + between
         found[name] = _estimate(fit, name, whole.mean, whole.std, shares)
         if found[name].std is not None:
-            tail = 0.5 * (1.0 - chosen.coefficient_interval)
-            low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
-            reach = float(ndtri(1.0 - tail)) * whole.std
-            skew = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
-            if skew > chosen.skewed_from * whole.std:
-                found[name] = replace(found[name], interval=(low, high))
+            found[name] = replace(found[name], interval=interval_beside(whole, chosen))
     return found
+
+
+def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
+    """The central interval of a mixture that is stated beside its mean and standard deviation.
+
+    Rivals too improbable to reach the interval may still be most of the variance, where their means are far away.
+    The interval is then shorter than value ± one standard deviation, and depends on whether each of them has more
+    or less than half the probability outside it, which is not known as well as that.
+
+    Returns:
+        Its ends; None where value and standard deviation give the interval, as for a normal distribution.
+    """
+    tail = 0.5 * (1.0 - chosen.coefficient_interval)
+    low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
+    reach = float(ndtri(1.0 - tail)) * whole.std
+    skew = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
+    if skew <= chosen.skewed_from * whole.std or high - low < chosen.interval_from * whole.std:
+        return None
+    return low, high
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:

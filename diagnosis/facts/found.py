@@ -64,8 +64,8 @@ class PlaceFound:
         bands: share of the gap by band beyond chance, fractions.
         channel: the reason for the channel.
         condition: the reason for the condition.
-        compared: causes whose channels are compared with the place.
-        agrees: whether one of them acts there.
+        compared: all causes of the answer, whose channels are compared with the place.
+        agrees: whether any of them acts there.
     """
 
     runs: int

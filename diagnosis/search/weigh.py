@@ -7,7 +7,7 @@ odds against an unknown cause are those of a logistic regression.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -204,12 +204,3 @@ def log_misfit(left: Array, scale: Array, leaking: Array, leak: float) -> float:
     above = np.maximum(left, 0.0)
     shared = leaking * above
     return float(np.sum(np.log1p((above + leak * leaking * (shared.sum() - shared)) / scale)))
-
-
-def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:
-    """The effect of a set that leaves least by itself: a small one beside it would agree with any place of the gap.
-
-    Args:
-        shares: of the gap that sets leave, fractions, single effects among them.
-    """
-    return min(effects, key=lambda name: shares.get((name,), np.inf))

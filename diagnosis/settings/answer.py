@@ -129,6 +129,13 @@ class AnswerSettings:
         "judgement",
         unit="std",
     )
+    interval_from: float = setting(
+        2.0,
+        "Length of that interval from which it is stated; below it value ± 1.96 std is the interval.",
+        "convention",
+        "Value ± one standard deviation is as long. A shorter one leaves out rare rivals, most of the variance.",
+        unit="std",
+    )
     small_causes: int = setting(
         3,
         "Unnamed small causes considered at once.",

@@ -35,10 +35,11 @@ class SearchSettings:
         "The largest of a few causes closes about half of a gap.",
     )
     out_of_reach: float = setting(
-        0.1,
+        0.2,
         "Share of the gap left by all effects together, from which no larger sets are grown.",
-        "judgement",
-        "A set that leaves a tenth of the power, a third of the amplitude, is never named.",
+        "estimated",
+        "In 77 simulated campaigns with one to four known causes it is 0.15 at most, and above 0.05 in two. In six "
+        "of 14 with a cause outside the vocabulary it is above 0.4. They were in sight.",
     )
     likely_beside_scatter: int = setting(
         6,

@@ -11,6 +11,7 @@ Where a sentence is:
 - `causes`: what a cause does to a swing.
 - `next_steps`: what to do next, and the run to make.
 - `lines` and `tables`: what is printed around and below them.
+- `answers`: their order, and what the one is called that is set out.
 - `numbers` and `names`: how numbers, effects and channels are written in all of these.
 
 `written.sentences` composes the text fields of a document. The other rooms return facts.

@@ -19,8 +19,8 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
         sized: whether springs of which one is off are stated with their errors, which another sentence may do.
 
     Returns:
-        Text such as ``coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated
-        (59 %), or gravity stiffness (40 %)``.
+        Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
+        stated (59 %) or gravity stiffness (40 %)``.
     """
     certain, alternatives = _parted(document, sized)
     scatter = [BETWEEN_RUNS] if scattering(document["causes"]) else []
@@ -29,8 +29,12 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
     )
     if known and len(alternatives) == 1:
         return known
-    several = ", or ".join(f"{said} ({probability(value)})" for said, value in alternatives)
-    return f"{known}, and one of: {several}" if known else several
+    several = [f"{said} ({probability(value)})" for said, value in alternatives]
+    if len(several) == 2:
+        one_of = f"either {several[0]} or {several[1]}"
+    else:
+        one_of = f"one of these: {', '.join(several[:-1])} or {several[-1]}"
+    return f"{known}, and {one_of}" if known else one_of
 
 
 def from_causes(document: Document) -> str:
@@ -68,14 +72,14 @@ def _effects(answer: Mapping[str, Any]) -> set[str]:
 
 
 def _called(document: Document, answer: Mapping[str, Any], name: str, sized: bool) -> str:
-    """An effect by its name; one of the springs by which it is and how far off, which its name does not say."""
+    """An effect by its name; an error of a spring by which spring and how far off, which its name does not say."""
     kind = {kind.name: kind for kind in known_effects()}.get(name)
     if kind is None or not kind.chosen_spring():
         return plain(name)
-    if document["found"]["choices"] and not sized:
-        return one_of_springs(document)
-    said = said_size(document, answer, name)
-    return said or plain(name)
+    if document["found"]["choices"]:
+        each = f", {_choices_of_spring(document)}" if sized else ""
+        return f"an error of one of the {_count_of_springs(document)} springs{each}"
+    return said_size(document, answer, name).partition(" (")[0] or plain(name)
 
 
 def _of(document: Document, name: str) -> str:
@@ -95,11 +99,7 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
     if kind is None or not given:
         return ""
     if kind.chosen_spring() and document["found"]["choices"]:
-        each = (
-            f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
-            for one in document["found"]["choices"]
-        )
-        return f"{one_of_springs(document)}, {' or '.join(each)}"
+        return f"{one_of_springs(document)}, {_choices_of_spring(document)}"
     values = {full: one["value"] for full, one in given.items()}
     said = {info.unit: given[info.name]["unit"] for info in kind.parameters() if info.name in given}
 
@@ -143,8 +143,21 @@ def hold_step(document: Document) -> str:
 
 def one_of_springs(document: Document) -> str:
     """That one of the springs is off that the runs cannot tell apart."""
+    return f"one of the {_count_of_springs(document)} springs is off"
+
+
+def _count_of_springs(document: Document) -> str:
     count = len(document["found"]["choices"])
-    return f"one of the {'two' if count == 2 else count} springs is off"
+    return "two" if count == 2 else str(count)
+
+
+def _choices_of_spring(document: Document) -> str:
+    """The errors of which one is there: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
+    each = (
+        f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
+        for one in document["found"]["choices"]
+    )
+    return " or ".join(each)
 
 
 def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:

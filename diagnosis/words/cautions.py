@@ -6,9 +6,10 @@ A sentence is a template of the fact's figures, or a function of them where it d
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.words.numbers import Document, part, plain, share
+from diagnosis.words.numbers import Document, part, plain, reading_shown, share
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 
@@ -24,9 +25,9 @@ _LEFT_OUT = (
 
 def _not_confirmed(given: Figures) -> str:
     return (
-        f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:.1e} rad (root mean square "
-        f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:.1e} "
-        "rad). The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
+        f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:2} (root mean square "
+        f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:2}). "
+        "The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
         "and may be wrong by as much."
     )
 
@@ -77,8 +78,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     "one spring assumed": "No run states spring_stiffness, so all runs are assumed to have the same spring, and "
     "moments are per unit inertia. State it, or leave out the runs with another spring: a different spring looks "
     "like a gap.",
-    "floor": "The records contain almost no noise ({records_rad:.1g} rad). The accuracy of the fits, "
-    "{fits_rad:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to simulated "
+    "floor": "The records contain almost no noise ({records_rad:1}). The accuracy of the fits, "
+    "{fits_rad:1}, stands in for it, and a smaller gap is not detected. Add sensor noise to simulated "
     "records.",
     "less noise than stated": f"{_NOISE}. The answer is based on the noise found in the records; correct noise_std "
     "or leave it out.",
@@ -114,15 +115,15 @@ CAUTIONS: Mapping[str, Sentence] = {
 """Caveats of an answer."""
 
 NOISE: Mapping[str, Sentence] = {
-    "coloured": "it is coloured, {std_rad:.3g} rad in all",
-    "floor": "the records contain {std_rad:.1g} rad, in {fewer} of {runs} runs less than the accuracy of the fits, "
+    "coloured": "it is coloured, {std_rad:3} in all",
+    "floor": "the records contain {std_rad:1}, in {fewer} of {runs} runs less than the accuracy of the fits, "
     "which stands in for it",
     "not stated": "the campaign states no noise",
-    "agrees": "the records agree: {std_rad:.3g} ± {uncertainty_rad:.1g} rad",
-    "contradicts": "the records contradict the stated {stated_rad:.3g} rad: they contain {std_rad:.3g} ± "
-    "{uncertainty_rad:.1g} rad",
-    "differs by run": "the records contradict the stated {stated_rad:.3g} rad: their noise differs by run, "
-    "{least_rad:.3g} to {most_rad:.3g} rad",
+    "agrees": "the records agree: {std_rad:3} ± {uncertainty_rad:1}",
+    "contradicts": "the records contradict the stated {stated_rad:3}: they contain {std_rad:3} ± "
+    "{uncertainty_rad:1}",
+    "differs by run": "the records contradict the stated {stated_rad:3}: their noise differs by run, "
+    "{least_rad:3} to {most_rad:3}",
 }
 """Why the noise is taken as it is: clauses."""
 
@@ -132,7 +133,7 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
         "read the angle more finely to see smaller gaps",
     ),
     "coloured": (
-        "the sensor's noise is coloured: {std_rad:.3g} rad in all, and its power per hertz varies by a factor of "
+        "the sensor's noise is coloured: {std_rad:3} in all, and its power per hertz varies by a factor of "
         "{power_ratio:.3g} over a factor of {frequency_ratio:.3g} in frequency, in the same way throughout the "
         "runs",
         "the diagnosis allows for it, and it is not a cause",
@@ -180,19 +181,40 @@ PATCH: Mapping[str, Sentence] = {
 """Where a patched model is not the same law."""
 
 
-def said(sentences: Mapping[str, Sentence], given: Figures) -> str:
-    """The sentence of a fact of the document."""
+@dataclass(frozen=True)
+class _Reading:
+    """A reading in a sentence, written with as many digits as its format says.
+
+    Args:
+        value: in the unit.
+    """
+
+    value: float
+    unit: str
+
+    def __format__(self, digits: str) -> str:
+        return reading_shown(self.value, int(digits), self.unit)
+
+
+def said(sentences: Mapping[str, Sentence], given: Figures, unit: str = "rad") -> str:
+    """The sentence of a fact of the document.
+
+    Args:
+        given: the fact; figures whose names end in ``_rad`` are readings.
+        unit: of the readings: rad, rad/s or rad/s².
+    """
     sentence = sentences[given["kind"]]
+    shown = {name: _Reading(one, unit) if name.endswith("_rad") else one for name, one in given.items()}
     if callable(sentence):
-        return sentence(given)
-    listed = {name: ", ".join(one) if isinstance(one, list) else one for name, one in given.items()}
+        return sentence(shown)
+    listed = {name: ", ".join(one) if isinstance(one, list) else one for name, one in shown.items()}
     return sentence.format(**listed)
 
 
-def remark(given: Figures) -> Remark:
-    """The remark of a fact about the noise."""
+def remark(given: Figures, unit: str = "rad") -> Remark:
+    """The remark of a fact about the noise, as in `said`."""
     what, remedy = REMARKS[given["kind"]]
-    return Remark(Outcome.NOTED, tuple(given["runs"]), said({given["kind"]: what}, given), remedy)
+    return Remark(Outcome.NOTED, tuple(given["runs"]), said({given["kind"]: what}, given, unit), remedy)
 
 
 _AS_IDENTIFIED = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -52,10 +52,16 @@ def part(share: float) -> str:
 
 
 def share(value: float) -> str:
-    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``."""
+    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
+
+    Args:
+        value: a fraction; below 0, where more is left than was there, it is ``none``.
+    """
+    if value < 0.0:
+        return "none"
     if value > 0.9995:
         return "> 99.9 %" if value < 1.0 else "100 %"
-    if 0.0 <= value < 0.0005:
+    if value < 0.0005:
         return "< 0.1 %" if value > 0.0 else "0 %"
     return f"{100.0 * value:.1f} %"
 
@@ -69,6 +75,15 @@ def percent(share: float, std: float | None = None) -> str:
     """
     beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
     return f"{min(100.0 * share, 100.0):.1f}{beside} %"
+
+
+_UNITS = {"l/V": "the time in which the air passes the reference length"}
+
+
+def explained(units: Iterable[str]) -> str:
+    """What units are that only this field uses, in brackets after a blank; empty where all are known."""
+    said = [f"{unit}: {_UNITS[unit]}" for unit in units if unit in _UNITS]
+    return f" ({'; '.join(said)})" if said else ""
 
 
 def rounded_up(value: float) -> str:
@@ -108,9 +123,7 @@ def rms_shown(misfit: Misfit, excess: float) -> str:
     Args:
         excess: in noise variances of a sample, a ratio.
     """
-    mark, factor = unit_shown(misfit.unit)
-    value = factor * misfit.rms(excess)
-    return f"{significant(value, 3) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+    return reading_shown(misfit.rms(excess), 3, misfit.unit)
 
 
 def of_swing(misfit: Misfit, excess: float) -> str:
@@ -133,9 +146,37 @@ def times_noise(value: float, decimals: int = 2) -> str:
     return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise power"
 
 
-def noise_powers(excess: float) -> str:
-    """What is left, in noise powers, a ratio, as the verdict states it."""
-    return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
+def left_over(excess: float) -> str:
+    """What is left, such as ``9.6 times the noise power``, a ratio."""
+    least = 1e-3
+    size = f"less than {least:g}" if excess < least else significant(excess, 2)
+    return f"{size} times the noise power"
+
+
+def beside_noise(excess: float) -> str:
+    """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
+
+    Args:
+        excess: its mean square over the noise variance, minus one, a ratio.
+    """
+    return f"{significant(math.sqrt(max(1.0 + excess, 0.0)), 3)} times the noise"
+
+
+def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
+    """A reading, or an error of one, in the unit that people read, such as ``0.0226°``.
+
+    Args:
+        value: in the unit.
+        digits: significant digits (a count).
+    """
+    mark, factor = unit_shown(unit)
+    return f"{significant(factor * value, digits) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+
+
+def unit_of(document: Document) -> str:
+    """The unit of the readings of a document: rad, rad/s or rad/s²."""
+    misfit = misfit_of(document)
+    return "rad" if misfit is None else misfit.unit
 
 
 def held_out_excess(value: float) -> str:

@@ -6,9 +6,20 @@ from typing import Any
 
 from diagnosis.facts.remainder import Ceiling
 from diagnosis.settings import settings_of
-from diagnosis.words.numbers import KINDS, Document, change_up_to, noise_powers, percent, plain
+from diagnosis.words.numbers import (
+    KINDS,
+    Document,
+    change_up_to,
+    left_over,
+    misfit_of,
+    part,
+    percent,
+    plain,
+    rms_shown,
+    unit_shown,
+)
 from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, unit_mark, with_std
+from identification.printing import COEFFICIENTS, with_std
 from tunnel_sim.effects import known_effects
 
 
@@ -18,15 +29,16 @@ def rest_words(document: Document) -> str:
     if rest is None:
         return ""
     after, named = document["coefficients"]["after"], causes not in ([], ["unknown"])
-    moves, excess = rest["moves"], rest["excess"]
-    left = f"what remains ({noise_powers(excess)})" if named else "it"
+    moves, excess, misfit = rest["moves"], rest["excess"], misfit_of(document)
+    size = left_over(excess) if misfit is None else f"{rms_shown(misfit, excess)} root mean square"
+    left = f"what remains ({size})" if named else "it"
     explained = f"Explained; {left}" if named else "It"
     material = [name for name, move in moves.items() if move["material"]]
     known = [name for name, move in moves.items() if move["std"] is not None]
     if not causes:
         words = "No gap: nothing remains beyond the noise."
     elif not rest["significant"]:
-        words = f"Explained; {left} is within the noise."
+        words = "Explained; what remains is within the noise."
     elif material:
         moved = _each({name: change_up_to(moves[name]["value"], after[name]) for name in material})
         start = f"Not all is explained: {left}" if named else "It"
@@ -64,7 +76,8 @@ def closable_words(document: Document) -> str:
             f"No more than {bound} of {left} could be closed by any "
             "smooth moment or error of the reading: the rest is noise."
         )
-    return " ".join([*_largest(found, ceilings, left), *_line(found["line"])])
+    of_others = _measured_otherwise(document, found["kind"], ceilings)
+    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found["line"])])
 
 
 def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
@@ -80,7 +93,9 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
             f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found['alike'])}."
         )
     elif found["next_most"] is not None:
-        said.append(f"No other kind would close more than {percent(max(found['next_most'], 0.0))}.")
+        alike = all(one.held_out == best.held_out for one in ceilings)
+        other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
+        said.append(f"{other} would close more than {percent(max(found['next_most'], 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
@@ -91,14 +106,34 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     return said
 
 
+def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) -> list[str]:
+    """The kind that closes more than the one named, on other readings held out, and why it is not named.
+
+    None where no kind does.
+    """
+    chosen = settings_of(document).remainder
+    best = next(one for one in ceilings if one.kind == kind)
+    others = (one for one in ceilings if one.determined(chosen) and one.held_out != best.held_out)
+    most = max(others, key=lambda one: one.closed, default=best)
+    if most.closed <= best.closed:
+        return []
+    return [
+        f"{KINDS[most.kind].capitalize()} would close {percent(most.closed, most.std)}, measured on "
+        f"{most.held_out}. One law of all runs is named before it from {part(chosen.common_first)} of that share "
+        "on, since it can be a property of the rig."
+    ]
+
+
 def _line(found: dict[str, Any] | None) -> list[str]:
     """A steady line, in a sentence; none without one."""
     if found is None:
         return []
     frequency = with_std(found["frequency_hz"], found["frequency_std_hz"])
-    amplitude = with_std(1e3 * found["amplitude"], 1e3 * found["amplitude_std"])
+    mark, factor = unit_shown(found["unit"])
+    amplitude = with_std(factor * found["amplitude"], factor * found["amplitude_std"])
+    amplitude += mark if mark == "°" else f" {mark}"
     return [
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(found['unit'])}, root mean "
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude}, root mean "
         "square over the runs; chance alone shows one in less than "
         f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
     ]

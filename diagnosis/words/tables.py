@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from diagnosis.settings import settings_of
+from diagnosis.words.answers import ranked, set_out
 from diagnosis.words.numbers import (
     KINDS,
     Document,
+    explained,
     held_out_excess,
+    listed,
     misfit_of,
     misfit_text,
     of_swing,
     percent,
     plain,
     probability,
+    reading_shown,
     rms_shown,
     share,
+    unit_of,
 )
 from diagnosis.words.remainder import ceiling, closable_line
 from diagnosis.words.scatter import (
@@ -37,10 +42,12 @@ from identification.printing import (
 )
 from identification.status import Remark
 
+_IN_BRACKETS = "root mean square (in brackets: its power over that of the noise)"
+
 
 def candidates_table(document: Document) -> TextTable:
     """The answers considered and the shares that they close, most probable first; a last row counts the others."""
-    rows, given, chosen = [], document["candidates"], settings_of(document).words
+    rows, given, chosen = [], ranked(document), settings_of(document).words
     probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
     shown = probable or given[:1]
     for candidate in shown:
@@ -51,7 +58,7 @@ def candidates_table(document: Document) -> TextTable:
     if left := given[len(shown) :]:
         together = sum(candidate["probability"] for candidate in left)
         rows.append((f"{len(left)} more, together", probability(together), ""))
-    heads = ("answer", "probability", "share closed")
+    heads = ("answer", "probability", "closed in the fit")
     return TextTable(f"Answers for {document['campaign']}", heads, tuple(rows), right=heads[1:])
 
 
@@ -66,8 +73,11 @@ def parameters_table(document: Document) -> TextTable:
         size = spread_estimate(document, owner, given) or estimated(given, mark)
         rows.append((owner if owner != effect else "", name, size))
         effect = owner
-    whose = "Parameters" if document.get("decided", True) else "Parameters of the most probable answer"
-    return TextTable(f"{whose} ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
+    whose = "Parameters" if document.get("decided", True) else f"Parameters of the {set_out(document)}"
+    units = explained({given["unit"] for given in answer["parameters"].values()})
+    return TextTable(
+        f"{whose} ± one standard deviation{units}", ("effect", "parameter", "estimate"), tuple(rows)
+    )
 
 
 def gap_table(document: Document) -> TextTable:
@@ -81,7 +91,7 @@ def gap_table(document: Document) -> TextTable:
         (name, misfit_text(document, before), misfit_text(document, after) if named else "–")
         for name, before, after in (listed if gap["detected"] else ())
     ]
-    head = "Gap, root mean square (× noise power)"
+    head = f"Gap, {_IN_BRACKETS}"
     return TextTable(head, ("run", "before", "after"), tuple(rows), right=("before", "after"))
 
 
@@ -93,23 +103,27 @@ def waterfall_table(document: Document) -> TextTable:
         alone = misfit_text(document, without[step["effect"]]) if step["effect"] in without else ""
         name = answer_name(step["effect"]) if step["effect"] else "nominal model"
         rows.append((name, misfit_text(document, step["excess"]), alone))
-    title = "Gap as the causes are added, root mean square (× noise power)"
+    title = f"Gap {document.get('waterfall_on', '')} as the causes are added, {_IN_BRACKETS}"
     heads = ("added", "left", "left without it alone")
-    return TextTable(f"{title}, {document.get('waterfall_on', '')}", heads, tuple(rows), heads[1:])
+    return TextTable(title, heads, tuple(rows), heads[1:])
 
 
 def closable_table(document: Document) -> TextTable:
-    """Share that each kind could close, in per cent; a table without rows where nothing remains beyond chance."""
+    """Share that each kind could close, in per cent, the kind that is named first.
+
+    A table without rows where nothing remains beyond chance.
+    """
     found, chosen = document.get("closable") or {"ceilings": ()}, settings_of(document).remainder
+    ceilings = sorted(map(ceiling, found["ceilings"]), key=lambda one: one.kind != found.get("kind"))
     rows = [
         (
             KINDS[one.kind],
             percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
             one.held_out,
         )
-        for one in map(ceiling, found["ceilings"])
+        for one in ceilings
     ]
-    title = "Share of what is left that could be closed at most"
+    title = "Share of what is left that each kind could close, estimated without a formula"
     return TextTable(title, ("by", "share", "held out"), tuple(rows), ("share",))
 
 
@@ -129,6 +143,45 @@ def coefficients_table(document: Document) -> TextTable:
     return TextTable(title, ("", "before", "after", "change"), tuple(rows), ("change",))
 
 
+SOURCES = {
+    "noise": "noise of the readings",
+    "misfit": "what the model leaves unexplained",
+    "small causes": "small causes that are not named",
+    "hidden effects": "effects that could hide",
+    "air density": "rounding of the stated air density",
+    "unseen form": "form of the cause that no free decay shows",
+    "freed form": "freedom of the causes' forms",
+    "rivals": "other answers, by their probability",
+}
+"""What each share of a coefficient's variance comes from."""
+_MOST = 0.5  # of a variance: more than all its other sources together
+_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
+
+
+def coefficients_line(document: Document) -> str:
+    """What the standard deviations of the coefficients include, and those of ``identify`` do not.
+
+    Empty where none is known.
+    """
+    after = {name: one for name, one in document["coefficients"]["after"].items() if one["std"]}
+    if not after:
+        return ""
+    parts = []
+    for source, words in SOURCES.items():
+        shares = {name: given.get("shares", {}).get(source, 0.0) for name, given in after.items()}
+        if max(shares.values()) >= _COUNTS:
+            mostly = listed(
+                [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
+            )
+            parts.append(f"{words} (most of that of {mostly})" if mostly else words)
+    if not parts:
+        return ""
+    return (
+        f"± includes {listed(parts)}. tunnel identify includes the noise and the scatter between runs alone, so "
+        "that its ± may be far smaller."
+    )
+
+
 def hidden_table(document: Document) -> TextTable:
     """The effects that could hide: the largest size that the runs do not exclude, and the moves it makes."""
     hidden, rows = document.get("hidden", ()), []
@@ -138,7 +191,8 @@ def hidden_table(document: Document) -> TextTable:
         moves = [significant(one["moves"][name]["value"], 2) for name in names]
         rows.append((plain(one["effect"]), size, *moves))
     heads = [f"moves {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
-    return TextTable("What could hide", ("effect", "up to", *heads), tuple(rows), ("up to", *heads))
+    title = f"What could hide{explained({one['size']['unit'] for one in hidden})}"
+    return TextTable(title, ("effect", "up to", *heads), tuple(rows), ("up to", *heads))
 
 
 def patch_table(document: Document) -> TextTable:
@@ -172,6 +226,7 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         closable_line(document),
         closable_table(document),
         coefficients_table(document),
+        coefficients_line(document),
         patch_table(document),
         *patch_lines(document),
         *closing_lines(document),
@@ -183,9 +238,10 @@ def diagnosis_brief(document: Document) -> str:
     gap, first = document["gap"], document["candidates"][0]
     causes = document["causes"]
     named = named_answer(causes).lower() if causes else "no gap"
-    undecided = "" if document.get("decided", True) else "undecided, most probably "
+    decided = document.get("decided", True)
+    undecided = "" if decided else f"undecided, the {set_out(document)} is "
     misfit, excess = misfit_of(document), gap["excess_before"]
-    size = f"{held_out_excess(excess)} noise powers"
+    size = f"{held_out_excess(excess)} times the noise power"
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
     closed = (
@@ -214,7 +270,7 @@ def listed_answers(document: Document) -> int:
 
 def other_answers(document: Document) -> str:
     """The answers that are not listed, in words; empty where all are."""
-    probabilities = [c["probability"] for c in document["candidates"][listed_answers(document) :]]
+    probabilities = [c["probability"] for c in ranked(document)[listed_answers(document) :]]
     if not probabilities:
         return ""
     together = probability(sum(probabilities)).replace("<", "less than")
@@ -252,18 +308,21 @@ def patch_lines(document: Document) -> list[str]:
             f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap "
             f"{model['closed_on']}; the fit itself {by_fit}."
         )
-    reading = f"The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad."
+    zero = f"{'−' if model['zero_rad'] < 0.0 else '+'} {reading_shown(abs(model['zero_rad']), 3)}"
+    reading = f"The reading is the position of {model['joint']} {zero}."
     return [f"{said} {reading}", *(f"- {note}" for note in model["notes"])]
 
 
 def closing_lines(document: Document) -> list[str]:
     """Notes below the tables: noise, check by MuJoCo, meaning of the coefficients, caveats and blind spots."""
     noise, note = document["noise"], document["coefficients"]["note"]
-    lines = [f"Noise: {noise['std']:.3g} rad, {noise['source']} ({noise['reason']})"]
+    unit = unit_of(document)
+    size = f"{reading_shown(noise['std'], 3, unit)} (noise_std = {noise['std']:.3g} {unit_mark(unit)})"
+    lines = [f"Noise: {size}, {noise['source']} ({noise['reason']})"]
     checked = document["confirmation"]
     if checked["agrees"]:
-        apart = f"{checked['largest_difference_rad']:.1e} rad"
-        lines.append(f"Excesses are computed by the MuJoCo model, which agrees with the fits within {apart}")
+        apart = reading_shown(checked["largest_difference_rad"], 2, unit)
+        lines.append(f"The gaps are computed by the MuJoCo model, which agrees with the fits within {apart}")
     if hidden := hidden_line(document):
         lines.append(hidden)
     if note:
@@ -292,8 +351,8 @@ def hidden_line(document: Document) -> str:
     if not moved:
         return ""
     mark = "" if first["size"]["unit"] == "1" else unit_mark(first["size"]["unit"])
-    size = f"{significant(abs(first['size']['value']), 2)} {mark}"
+    size = f"{significant(abs(first['size']['value']), 2)} {mark}".strip()
     return (
-        f"What could hide: {plain(first['effect'])} of up to {size.strip()}, which these runs do not exclude, "
-        f"would move {' and '.join(moved)}. The intervals allow for it."
+        f"What could hide: {plain(first['effect'])} of up to {size}{explained({first['size']['unit']})}, which "
+        f"these runs do not exclude, would move {' and '.join(moved)}. The intervals allow for it."
     )

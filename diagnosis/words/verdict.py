@@ -19,16 +19,19 @@ from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
     Document,
+    beside_noise,
     for_people,
     listed,
     misfit_of,
     of_swing,
     plain,
     probability,
+    reading_shown,
     rms_shown,
     rounded_up,
     share,
     times_noise,
+    unit_of,
     unit_shown,
     windy,
 )
@@ -67,7 +70,7 @@ def _answer_in_words(document: Document) -> tuple[str, str]:
         return "No gap", "none"
     if not document.get("decided", True):
         effects, channels = without_scatter(document["common"]["effects"]), document["common"]["channels"]
-        known = plain(*effects) if effects else " and ".join(f"the {name}" for name in channels)
+        known = plain(*effects) if effects else " and ".join(CHANNELS[name] for name in channels)
         return f"Undecided: {known}, and more" if known else "Undecided", "open"
     if causes == _UNKNOWN:
         return "Unexplained gap", "unknown"
@@ -91,7 +94,7 @@ def verdict(document: Document, rest: str) -> str:
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
         *map(_disturbed, document.get("disturbed", ())),
-        *map(_second_mode, found["second_modes"]),
+        *(_second_mode(one, unit_of(document)) for one in found["second_modes"]),
         _answer(document, rest),
         _choices(document),
         hold_words(document),
@@ -106,8 +109,8 @@ def _answer(document: Document, rest: str) -> str:
     excess, repeats = gap["excess_before"], repeats_words(document)
     if not causes:
         said = (
-            f"No gap: the nominal model explains the runs down to their noise "
-            f"(mean squared residual over noise variance, minus one: {excess:+.3f})."
+            "No gap: the nominal model explains the runs down to their noise "
+            f"(the residual is {beside_noise(excess)}, root mean square)."
         )
         return " ".join(filter(None, (said, repeats)))
     size, misfit = times_noise(excess), misfit_of(document)
@@ -122,7 +125,11 @@ def _answer(document: Document, rest: str) -> str:
         return " ".join(filter(None, (said, undecided_words(document), repeats, with_first)))
     if causes == _UNKNOWN:
         nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
-        said = "no effect is named as its cause" if nearly else "no effect of the vocabulary explains it"
+        said = (
+            "no effect is named as its cause"
+            if nearly
+            else "none of the effects that are tried explains it (tunnel effects lists them)"
+        )
         return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
     proper = without_scatter(causes)
     last = (closes, rest, _immaterial(found["immaterial"]) or consequence(document))
@@ -155,7 +162,7 @@ def undecided_words(document: Document) -> str:
     parts = [f"contain {plain(name)} ({probability(value)})" for name, value in effects.items()]
     for name, value in common["channels"].items():
         if name not in named:
-            parts.append(f"act on the {name} ({probability(value)})")
+            parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts)}. " if parts else ""
     answers = []
     for one in credible[:most_named]:
@@ -175,7 +182,7 @@ def _among_answers(effect: str) -> str:
     names = effect.split(" + ")
     proper = without_scatter(names)
     if effect == "unknown":
-        return "no effect of the vocabulary"
+        return "an unknown cause"
     return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
 
 
@@ -198,10 +205,13 @@ def _immaterial(changes: Mapping[str, float]) -> str:
     if not changes:
         return ""
     said = (
-        f"{COEFFICIENTS.get(name, name)} by less than {rounded_up(100.0 * change)} %"
+        f"{COEFFICIENTS.get(name, name)} by less than {rounded_up(max(100.0 * change, _NO_CHANGE))} %"
         for name, change in changes.items()
     )
     return f"The gap is immaterial: its causes change {' and '.join(said)}."
+
+
+_NO_CHANGE = 0.01  # %: a smaller change is no more than none to people
 
 
 def _disturbed(found: Mapping[str, Any]) -> str:
@@ -214,10 +224,10 @@ def _disturbed(found: Mapping[str, Any]) -> str:
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 
 
-def _second_mode(found: Mapping[str, Any]) -> str:
-    """A second mode in a run."""
+def _second_mode(found: Mapping[str, Any], unit: str) -> str:
+    """A second mode in a run, its amplitudes in a unit of readings."""
     main, second = (
-        f"{mode['amplitude_rad']:.2g} rad at {mode['frequency_hz']:.3g} Hz, which decays at "
+        f"{reading_shown(mode['amplitude_rad'], 2, unit)} at {mode['frequency_hz']:.3g} Hz, which decays at "
         f"{mode['decay_per_s']:.2g} 1/s"
         for mode in (found["main"], found["second"])
     )
@@ -273,7 +283,7 @@ RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "two springs off": _two_springs_off,
     "stated": lambda found: str(found["words"]),
 }
-"""What is said of a rival from outside the vocabulary, by kind."""
+"""What is said of a rival that is not among the effects, by kind."""
 
 
 _VISIBLE = 0.005  # of a damping ratio: a change that is said
@@ -294,6 +304,8 @@ def size_words(document: Document, size: Document) -> str:
     reading = factor * size["reading_change"]
     if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
         said.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
+    if not said and not reading:  # the run that is simulated does not show it
+        return ""
     said.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
     held = angle * size["stands_rad"]
     stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
@@ -357,8 +369,9 @@ def run_words(run: Mapping[str, float]) -> str:
             standard deviations of the noise.
     """
     wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
+    angle = reading_shown(run["release_angle"], 2)
     return (
-        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, released at {run['release_angle']:.2g} rad, "
+        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, released at {angle}, "
         f"{run['duration']:g} s long (the two then differ by {run['separation']:.0f} standard deviations)"
     )
 

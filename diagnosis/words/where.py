@@ -143,9 +143,18 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     """Whether causes act where the residuals say that the gap is; empty where there is nothing to compare."""
     if not place["compared"] or where["channel"] is None:
         return ""
-    names = plain(*place["compared"])
-    if place["agrees"]:
-        return f"That agrees with {names}."
     kinds = [effect_class(name) for name in place["compared"]]
-    acts = " and ".join(dict.fromkeys(PLACES[kind.channel] for kind in kinds))
-    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."
+    there = [kind for kind in kinds if where["channel"] in (kind.channel, *kind.resembles)]
+    elsewhere: dict[str, list[str]] = {}
+    for kind in (kind for kind in kinds if kind not in there):
+        elsewhere.setdefault(PLACES[kind.channel], []).append(kind.name)
+    acting = [
+        f"{plain(*names) if len(kinds) > 1 else 'it'} act{'s' * (len(names) == 1)} on {acts}"
+        for acts, names in elsewhere.items()
+    ]
+    if not elsewhere:
+        return f"That agrees with {plain(*place['compared'])}."
+    if not there:
+        return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."
+    acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
+    return f"Of the causes {acts_there}, and {' and '.join(acting)}."

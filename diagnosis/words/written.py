@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
-from diagnosis.words.numbers import Document
+from diagnosis.words.numbers import Document, unit_of
 from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words
@@ -46,14 +46,15 @@ def sentences(document: Document) -> Sentences:
         document: the diagnosis in JSON's types, whose text fields do not matter.
     """
     found, rest, model = document["found"], rest_words(document), document["model"]
+    unit = unit_of(document)
     return Sentences(
         verdict=verdict(document, rest),
         where=where_words(document),
         rest=rest,
         closable=closable_words(document),
         note=coefficient_note(document),
-        noise="" if found["noise"] is None else said(NOISE, found["noise"]),
-        cautions=tuple(said(CAUTIONS, one) for one in found["cautions"]),
-        remarks=tuple(map(remark, found["noted"])),
+        noise="" if found["noise"] is None else said(NOISE, found["noise"], unit),
+        cautions=tuple(said(CAUTIONS, one, unit) for one in found["cautions"]),
+        remarks=tuple(remark(one, unit) for one in found["noted"]),
         patch=() if model is None else tuple(said(PATCH, one) for one in model["differences"]),
     )

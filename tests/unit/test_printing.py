@@ -148,7 +148,7 @@ def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> 
     text = str(diagnosis)
     assert text.startswith("The gap comes from coulomb friction.\n")
     lines = text.splitlines()
-    assert "coulomb_friction         97 %        99.0 %" in lines
+    assert "coulomb_friction         97 %             99.0 %" in lines
     assert "coulomb_friction  friction_moment  0.003990 ± 0.000060 N m" in lines
     assert any(line.strip() == "ratio            2.000 (at its upper bound)" for line in lines)
     assert "Cnr [1/rad]  -0.313 ± 0.022  -0.257 ± 0.012   +18 %" in lines

@@ -19,7 +19,11 @@ from diagnosis.words.numbers import probability, share
 from diagnosis.words.tables import (
     candidates_table,
     closing_lines,
+    coefficients_line,
+    diagnosis_parts,
     gap_table,
+    hidden_line,
+    hidden_table,
     inclusion_line,
     parameters_table,
     waterfall_table,
@@ -175,9 +179,10 @@ def test_coefficients(given: Document) -> None:
 def test_the_run_to_make(given: Document) -> None:
     run = given["next_run"]
     keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
-    assert_shows(run_words(run).replace(" rad", ""), [run[key] for key in keys])
+    own = run | {"release_angle": np.degrees(run["release_angle"])}
+    assert_shows(run_words(run), [own[key] for key in keys])
     calm = run_words(run | {"wind_speed": 0.0})
-    assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
+    assert_shows(calm, [own[key] for key in keys if key != "wind_speed"])
     assert len(rival_lines(given)) == 2
     assert len(rival_lines(given | {"next_run": None})) == 2
     close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
@@ -188,10 +193,36 @@ def test_the_run_to_make(given: Document) -> None:
 
 def test_noise_and_confirmation(given: Document) -> None:
     first, second = closing_lines(given)
-    assert_shows(first, [given["noise"]["std"]])
-    assert_shows(second, [given["confirmation"]["largest_difference_rad"]])
+    assert_shows(first, [np.degrees(given["noise"]["std"]), given["noise"]["std"]])
+    assert_shows(second, [np.degrees(given["confirmation"]["largest_difference_rad"])])
+    given["gap"]["misfit"]["unit"] = "rad/s"
+    assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
     given["confirmation"]["agrees"] = False
     assert len(closing_lines(given)) == 1
+
+
+def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_table(given: Document) -> None:
+    after = given["coefficients"]["after"]
+    after["cn_beta"]["shares"] = {"noise": 0.2, "hidden effects": 0.8}
+    after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
+    line = coefficients_line(given)
+    assert line == (
+        "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
+        "other answers, by their probability. tunnel identify includes the noise and the scatter between runs "
+        "alone, so that its ± may be far smaller."
+    )
+    assert line in [part for part in diagnosis_parts(given) if isinstance(part, str)]
+    assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
+
+
+def test_a_unit_of_this_field_is_explained_where_it_is_used(given: Document) -> None:
+    move = {"cn_beta": {"value": 0.1, "std": None, "unit": "1/rad"}}
+    lag = {"effect": "unsteady_aero_lag", "size": {"value": 0.014, "std": None, "unit": "l/V"}, "moves": move}
+    meant = "l/V: the time in which the air passes the reference length"
+    assert f"of up to 0.014 l/V ({meant}), which these runs do not exclude" in hidden_line(
+        given | {"hidden": [lag]}
+    )
+    assert hidden_table(given | {"hidden": [lag]}).title == f"What could hide ({meant})"
 
 
 @pytest.mark.parametrize(
@@ -210,7 +241,7 @@ def test_probabilities(value: float, text: str) -> None:
         (0.982, "98.2 %"),
         (0.0004, "< 0.1 %"),
         (0.0, "0 %"),
-        (-0.02, "-2.0 %"),
+        (-0.02, "none"),
     ],
 )
 def test_shares(value: float, text: str) -> None:

@@ -51,7 +51,7 @@ _WRITTEN = {
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A run in the chart of its record, times from the record's first sample.
+    """A run in the chart of its record, times by the file's clock.
 
     Args:
         start: of the run: the release, s.
@@ -132,7 +132,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """State where a run begins, ends or rests.
 
     Args:
-        places: ``start`` and ``end`` in s from the record's first sample, ``rest`` in the reading's unit;
+        places: ``start`` and ``end`` in s by the file's clock, ``rest`` in the reading's unit;
             None: as found.
 
     Raises:
@@ -291,6 +291,7 @@ def _column(
         guessed_angle_unit,
         guessed_time_unit,
         is_time,
+        named_kind,
         stated_input,
     )
     from tunnel_sim.files.importing.condition_names import condition_of
@@ -312,6 +313,8 @@ def _column(
         return Column(channel.name, channel.unit, "stated in the file", role, used)
     if not np.isfinite(channel.values).any():
         return Column(channel.name, "", "it has no numbers", role, used)
+    if role == "angle" and (kind := named_kind(channel.name)):
+        return Column(channel.name, "", f"{kind} by its name; nothing states its unit", role, used)
     guess = guessed_time_unit if role == "time" else guessed_angle_unit
     unit, size = guess(channel.values)
     what = f"steps of {size:.4g}" if role == "time" else f"a swing of ±{size:.4g}"
@@ -324,7 +327,7 @@ def drawn(imported: Imported) -> list[Drawn]:
     unit = imported.campaign.sensor.unit
     records = []
     for raw in list(raws.values())[:MOST_RECORDS]:
-        time, marks = raw.cleaned.time_s, []
+        time, marks = raw.cleaned.file_time_s, []
         for part in (part for part in imported.parts if part.raw is raw):
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
             fault = part.said[-1] if part.run is None else ""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
 
 
-_TIME = "time [s], from the record's first sample"
+_TIME = "time of the file [s]"
 _KINDS = {"start": "release", "end": "end", "rest": "rest"}
 _HELP = (
     "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or ends (square), and the "

@@ -124,14 +124,14 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     document["provenance"]["sha256"] = file_hashes(files.campaign)
     write_json(files.diagnosis, document)
     write_report(document, campaign, folder / REPORT)
-    show_faults(plan, campaign, estimate, document)
+    show_faults(plan, campaign, document)
     say_written(folder / REPORT)
     say(f"Records, plan and both answers (JSON) are in {folder}")
     show_next(folder)
     return missed_faults(plan, document)
 
 
-def show_faults(plan: CampaignPlan, campaign: Campaign, estimate: Estimate, document: Document) -> None:
+def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> None:
     """Print what was planted, what was found, and how far the gap closes."""
     from diagnosis.words.tables import waterfall_table
     from tunnel_sim.effects.registry import effect_class
@@ -150,10 +150,10 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, estimate: Estimate, docu
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{document['verdict']}\n")
-    show_tables(found_table(plan, estimate, document), rich_table(waterfall_table(document)))
+    show_tables(found_table(plan, document), rich_table(waterfall_table(document)))
 
 
-def found_table(plan: CampaignPlan, estimate: Estimate, document: Document) -> Table:
+def found_table(plan: CampaignPlan, document: Document) -> Table:
     """What was planted, beside what the nominal model alone and the model with the causes give."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
@@ -161,16 +161,16 @@ def found_table(plan: CampaignPlan, estimate: Estimate, document: Document) -> T
 
     result = table(
         "Planted and found, ± one standard deviation σ",
-        *("", "planted", "model alone", "with the causes", "error"),
+        *("", "planted", "nominal model", "with the causes", "error"),
         right=("planted", "error"),
     )
-    after = document["coefficients"]["after"]
+    before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in after:
-        truth, alone = getattr(plan.truth, name), getattr(estimate, name)
+        truth = getattr(plan.truth, name)
         result.add_row(
             Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"),
             significant(truth),
-            "–" if alone is None else with_std(alone.value, alone.std),
+            with_std(before[name]["value"], before[name]["std"]),
             with_std(after[name]["value"], after[name]["std"]),
             in_stds(after[name]["value"] - truth, after[name]["std"]),
         )

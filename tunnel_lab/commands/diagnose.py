@@ -139,9 +139,9 @@ def diagnose(
     """Find out why the nominal model does not fit the runs of a campaign.
 
     The nominal model is fitted to all runs, and its residuals are tested against
-    the noise. Then the effects of the vocabulary, and sets of them, are fitted
+    the noise. Then the effects that tunnel effects lists, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
-    "unknown" (no effect of the vocabulary explains it), each with a probability.
+    "unknown" (none of these effects explains it), each with a probability.
     Gap and coefficients are given before and after the effects are added. The gap
     is predicted for runs, or stretches of time, held out of the fit. Where
     something remains, the answer says whether it could move the coefficients, how
@@ -272,6 +272,8 @@ def show(document: dict[str, Any]) -> None:
         tables.patch_table,
     )  # fmt: skip
     show_tables(*(rich_table(table(document)) for table in behind))
+    if line := tables.coefficients_line(document):
+        say(line)
     for line in (*tables.patch_lines(document), *tables.closing_lines(document)):
         say(line)
     say("What to do next:")
@@ -286,7 +288,7 @@ def compare(
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.
 
-    For each diagnosis: the gap (noise powers) before and with the causes, the causes
+    For each diagnosis: the gap (its power over that of the noise) before and with the causes, the causes
     with their parameters, and the coefficients with standard deviations. Then the
     difference of each coefficient from the first diagnosis, for campaigns that are
     independent of each other.
@@ -330,8 +332,8 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     explained = [document["causes"] not in ([], ["unknown"]) for document in documents]
     pairs = list(zip(documents, explained, strict=True))
     answers = (
-        ("gap [noise powers]", *(excess(d, "excess_before") for d in documents)),
-        ("left [noise powers]", *(excess(d, "excess_after") if known else _NONE for d, known in pairs)),
+        ("gap [× noise power]", *(excess(d, "excess_before") for d in documents)),
+        ("left [× noise power]", *(excess(d, "excess_after") if known else _NONE for d, known in pairs)),
         ("share closed", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
         ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
         ("decided", *("yes" if d["decided"] else "no" for d in documents)),

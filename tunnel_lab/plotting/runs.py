@@ -275,7 +275,7 @@ def import_picture(imported: Imported) -> bytes:
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for key, axes in zip(shown, panels, strict=False):
         raw, parts = raws[key], [part for part in imported.parts if id(part.raw) == key]
-        time, reading = raw.cleaned.time_s, raw.cleaned.reading
+        time, reading = raw.cleaned.file_time_s, raw.cleaned.reading
         axes.plot(*thinned(time, reading), color=_GREY, linewidth=0.7)
         kept = 0
         for number, part in enumerate(parts):
@@ -295,7 +295,7 @@ def import_picture(imported: Imported) -> bytes:
         axes.set_title(
             figure_text(raw.id if kept == 1 else f"{raw.id}: {counted(kept, 'run')}"), fontsize=9, loc="left"
         )
-        axes.set_xlabel("time [s]", fontsize=8)
+        axes.set_xlabel("time of the file [s]", fontsize=8)
         axes.set_ylabel(f"reading [{imported.campaign.sensor.unit}]", fontsize=8)
         axes.tick_params(labelsize=7)
     for axes in panels[len(shown) :]:

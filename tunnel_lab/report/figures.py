@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.settings import settings_of
+from diagnosis.words.answers import ranked
 from diagnosis.words.numbers import excess_std, plain, probability
 from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label, significant
@@ -187,14 +188,15 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 def candidates_figure(document: Document) -> Figure | None:
     """The answers that are not improbable; None where there are fewer than two, which words say better."""
     least = settings_of(document).words.answer_drawn
-    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= least]
+    shown = [c for c in ranked(document)[:SHOWN] if c["probability"] >= least]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(answer_name(candidate["effect"])), _LABEL) for candidate in shown]
     fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]
-    axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
+    colours = [ACCENT if candidate is document["candidates"][0] else QUIET for candidate in shown]
+    axes.barh(range(len(shown)), values, color=colours, height=0.6)
     for index, value in enumerate(values):
         axes.text(value + 0.01, index, probability(value), va="center")
     axes.set_yticks(range(len(shown)), names)
@@ -274,7 +276,7 @@ def backbone_figure(document: Document) -> Figure:
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}
     for index, curve in enumerate(chosen):
         order = np.argsort(array(curve["amplitude_rad"]))
-        x, nominal = array(curve["amplitude_rad"])[order], curve["nominal_frequency_hz"]
+        x, nominal = np.degrees(array(curve["amplitude_rad"])[order]), curve["nominal_frequency_hz"]
         colour, marker = COLOURS[index], MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]
         shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
         change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
@@ -290,7 +292,7 @@ def backbone_figure(document: Document) -> Figure:
     damping.set_ylabel("damping ratio minus\nthe nominal one [10⁻³]")
     for axes, pairs in drawn.items():
         axes.axhline(0.0, color=INK, linewidth=1.0)
-        axes.set_xlabel("amplitude [rad]")
+        axes.set_xlabel("amplitude [°]")
         grid(axes)
         if pairs:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))

@@ -15,11 +15,14 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.words.numbers import Document, plain
+from diagnosis.words.answers import set_out
+from diagnosis.words.numbers import Document, plain, reading_shown, unit_of
 from diagnosis.words.remainder import closable_line
 from diagnosis.words.scatter import repeatability_line, repeatability_table, repeats
 from diagnosis.words.tables import (
+    SOURCES,
     closable_table,
+    coefficients_line,
     hidden_table,
     inclusion_line,
     other_answers,
@@ -70,17 +73,6 @@ TESTS = {
     "noise level": "whether the noise is above the level that the campaign states",
 }
 """What each test of a gap looks at."""
-SOURCES = {
-    "noise": "noise of the readings",
-    "misfit": "what the model leaves unexplained",
-    "small causes": "small causes that are not named",
-    "hidden effects": "the effect that could hide and moves it most",
-    "air density": "rounding of the stated air density",
-    "unseen form": "form of the cause that no free decay shows",
-    "freed form": "freedom of the causes' forms",
-    "rivals": "other answers, by their probability",
-}
-"""What each share of a coefficient's variance comes from."""
 FAMILY = "DejaVu Sans"
 """matplotlib places the text of a figure by the widths of this font, which it ships."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -124,7 +116,7 @@ def render_report(
 
     With ``summary`` it is only what fits one printed page.
     """
-    answer, kind = headline(document)
+    (answer, kind), hidden = headline(document), hidden_table(document)
     provenance = document.get("provenance") or {}
     alarms = significant(document["gap"]["false_alarm_rate"], 2)
     schema = ("schema of the document", document["schema_version"])
@@ -139,7 +131,9 @@ def render_report(
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
         "found": view.causes_found(document),
+        "set_out": set_out(document),
         "coefficients": view.coefficient_rows(document),
+        "coefficients_line": coefficients_line(document),
         "next_steps": next_steps(document),
         "place": view.place_rows(document),
         "lines": view.line_rows(document),
@@ -160,7 +154,10 @@ def render_report(
         "runs": view.run_rows(document, campaign),
         "windy": any(run.wind_on for run in campaign.runs),
         "budget": budget(document),
-        "hidden": hidden_table(document),
+        "hidden": hidden,
+        "hidden_heads": [
+            head[:1].upper() + head[1:] + "#" * (head in hidden.right) for head in hidden.columns
+        ],
         "tests": test_rows(document),
         "false_alarms": f"{alarms} of the campaigns without a gap",
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
@@ -270,18 +267,21 @@ def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
 def noise_rows(document: Document) -> list[tuple[str, str]]:
     """The noise that the gap is measured against, and the model behind the excesses."""
     noise, confirmation = document["noise"], document["confirmation"]
-    stated = noise["stated_std"]
+    stated, unit = noise["stated_std"], unit_of(document)
     rows = [
-        ("Noise of one sample", f"{1e3 * noise['std']:.4g} × 10⁻³ rad ({noise['source']})"),
-        ("Stated", "–" if stated is None else f"{1e3 * stated:.4g} × 10⁻³ rad"),
+        ("Noise of one sample", f"{reading_shown(noise['std'], 4, unit)} ({noise['source']})"),
+        ("Stated", "–" if stated is None else reading_shown(stated, 4, unit)),
         ("Why this one", str(noise["reason"])),
     ]
     if confirmation["failure"]:
         model = f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}"
         return [*rows, ("Excesses computed by", model)]
-    apart = f"{confirmation['largest_difference_rad']:.1e} rad at most"
-    rms = f"{confirmation['rms_difference_rad']:.1e} rad root mean square in {confirmation['run']}"
-    beside = f"{'within' if confirmation['agrees'] else 'beyond'} {confirmation['tolerance_rad']:.1e} rad"
+    apart, rms, allowed = (
+        view.typeset(reading_shown(confirmation[name], 2, unit))
+        for name in ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
+    )
+    apart, rms = f"{apart} at most", f"{rms} root mean square in {confirmation['run']}"
+    beside = f"{'within' if confirmation['agrees'] else 'beyond'} {allowed}"
     return [
         *rows,
         ("Excesses computed by", "the MuJoCo model"),

@@ -7,21 +7,26 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from diagnosis.words.answers import ranked, set_out
 from diagnosis.words.causes import said_size
 from diagnosis.words.numbers import (
     ACTS_WHEN,
+    PLACES,
     Document,
     acts_on,
+    beside_noise,
+    left_over,
     misfit_of,
     misfit_shown,
     misfit_text,
-    noise_powers,
     of_swing,
     plain,
     probability,
+    reading_shown,
     rms_shown,
     share,
     times_noise,
+    unit_of,
     unit_shown,
     windy,
 )
@@ -73,17 +78,17 @@ def facts(document: Document) -> list[Fact]:
     if causes:
         listed = [_misfit_fact(document, label, before, typeset(times_noise(before)))]
     else:
-        listed = [Fact(label, WITHIN_THE_NOISE, typeset(times_noise(before, decimals=3)))]
+        listed = [Fact(label, WITHIN_THE_NOISE, f"residual {beside_noise(before)}, root mean square")]
     if causes and causes != ["unknown"]:
-        label = f"With {'the causes' if decided else 'the most probable answer'} added"
+        label = f"With {'the causes' if decided else f'the {set_out(document)}'} added"
         if _calm(document):
-            listed.append(Fact(label, WITHIN_THE_NOISE, noise_powers(after)))
+            listed.append(Fact(label, WITHIN_THE_NOISE, left_over(after)))
         else:
-            listed.append(_misfit_fact(document, label, after, typeset(noise_powers(after))))
+            listed.append(_misfit_fact(document, label, after, typeset(left_over(after))))
         listed.append(Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"]))
     if document["candidates"]:
         rivals = decided and document["ambiguous_with"]
-        whose = "likeliest of these sets" if rivals else "answer" if decided else "most probable answer"
+        whose = "likeliest of these sets" if rivals else set_out(document)
         first = document["candidates"][0]["probability"]
         listed.append(Fact(f"Probability of the {whose}", probability(first)))
     return listed
@@ -95,7 +100,7 @@ def _calm(document: Document) -> bool:
 
 
 def _misfit_fact(document: Document, label: str, value: float, powers: str) -> Fact:
-    """A gap in the units that people use, and in noise powers beside them."""
+    """A gap in the units that people use, and its power beside them."""
     misfit = misfit_of(document)
     if misfit is None:
         return Fact(label, powers)
@@ -191,7 +196,7 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
                 for n, v in c["parameters"].items()
             ],
         }
-        for c in document["candidates"][: listed_answers(document)]
+        for c in ranked(document)[: listed_answers(document)]
     ]
 
 
@@ -264,10 +269,10 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
     ):
         ends = [significant(factor * value, 3) for value in where[key] or ()]
         rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
-    rows.append(("Channel", where["channel"] or _UNDETERMINED_PLACE))
+    rows.append(("Acts on", PLACES.get(where["channel"] or "", _UNDETERMINED_PLACE)))
     if windy(document):
         condition = where["condition"]
-        rows.append(("Condition", _UNDETERMINED_PLACE if condition is None else ACTS_WHEN[condition]))
+        rows.append(("Acts", _UNDETERMINED_PLACE if condition is None else ACTS_WHEN[condition]))
     return rows
 
 
@@ -313,7 +318,7 @@ def line_rows(document: Document) -> list[dict[str, str]]:
         {
             "run": line["run"],
             "frequency": significant(line["frequency_hz"], 4),
-            "amplitude": significant(1e3 * line["amplitude_rad"], 2),
+            "amplitude": reading_shown(line["amplitude_rad"], 2, unit_of(document)),
             "share": percent(min(line["share"], 1.0)),
         }
         for line in (document.get("maps") or {}).get("lines", [])
@@ -326,12 +331,17 @@ def next_run_rows(document: Document) -> list[tuple[str, str]]:
     units = {
         "spring_stiffness": "N m/rad",
         "wind_speed": "m/s",
-        "release_angle": "rad",
         "duration": "s",
         "separation": "standard deviations of the noise, expected",
     }
+
+    def text(name: str, value: float) -> str:
+        if name == "release_angle":
+            return reading_shown(value, 3)
+        return f"{significant(value, 3)} {units.get(name, '')}".strip()
+
     return [
-        (plain(name).capitalize(), f"{significant(value, 3)} {units.get(name, '')}".strip())
+        (plain(name).capitalize(), text(name, value))
         for name, value in run.items()
         if isinstance(value, int | float)
     ]

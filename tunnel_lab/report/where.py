@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 TIME = "time since the start of the record [s]"
-_ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
+_ANGLE, _RATE = "angle β [°]", "rate β̇/ω [°]"
 Chart = dict[str, Any]
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
 PLACE_HEIGHT = 2.7
@@ -119,11 +119,12 @@ def profiles_figure(document: Document) -> Figure:
     The shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
+    swings = None if where["amplitude_rad"] is None else np.degrees(where["amplitude_rad"]).tolist()
     fig = figure(NARROW, 6.0)
     by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
     for axes, values, bounds, interval in (
         (by_time, maps["time"], array(maps["time"]["edges_s"]), where["time_s"]),
-        (by_amplitude, maps["amplitude"], array(maps["amplitude"]["edges_rad"]), where["amplitude_rad"]),
+        (by_amplitude, maps["amplitude"], np.degrees(array(maps["amplitude"]["edges_rad"])), swings),
     ):
         mean, std = array(values["excess"]), array(values["std"])
         if interval is not None:
@@ -140,7 +141,7 @@ def profiles_figure(document: Document) -> Figure:
     moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
     moment.set(xlabel=TIME, ylabel="missing moment\n[% of its energy]")
     grid(moment)
-    by_amplitude.set_xlabel("amplitude of the motion [rad]")
+    by_amplitude.set_xlabel("amplitude of the motion [°]")
     return fig
 
 
@@ -187,7 +188,7 @@ def phase_plane_figure(document: Document) -> Figure | None:
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
-    low, *_, high = plane["edges_rad"]
+    low, *_, high = np.degrees(plane["edges_rad"]).tolist()
     clear, reach, unit, _ = _plane_cells(plane)
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
@@ -206,7 +207,7 @@ def moment_figure(document: Document) -> Figure | None:
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
-    edges = array(plane["edges_rad"])
+    edges = np.degrees(array(plane["edges_rad"]))
     _, _, unit, factor = _plane_cells(plane)
     fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
@@ -282,11 +283,12 @@ def charts(document: Document) -> dict[str, list[Chart]]:
     plane = maps["phase_plane"]
     if plane is not None:
         cells, reach, unit, _ = _plane_cells(plane)
+        edges = np.degrees(plane["edges_rad"]).tolist()
         missing = {
             "kind": "cells",
             "title": "Missing moment",
-            "x": {"label": _ANGLE, "edges": plane["edges_rad"]},
-            "y": {"label": _RATE, "edges": plane["edges_rad"]},
+            "x": {"label": _ANGLE, "edges": edges},
+            "y": {"label": _RATE, "edges": edges},
             "values": [_rounded(row) for row in cells],
             "unit": unit,
             "range": [-reach, reach],

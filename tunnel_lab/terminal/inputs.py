@@ -137,7 +137,7 @@ EffectsFileOption = Annotated[
         "--effects-file",
         metavar="FILE.toml",
         rich_help_panel="Effects",
-        help="Add the effects that this file states as expressions to the vocabulary.",
+        help="Add the effects that this file states as expressions to those that are tried.",
         callback=_know_effects,
     ),
 ]

@@ -37,7 +37,10 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
+BRACKETS = (
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
+    "tunnel diagnose adds what the model may miss."
+)
 """Printed once below tables in the short notation."""
 PROSE = 30
 """Columns: a longer cell is a sentence, which may go over several lines."""
@@ -301,7 +304,7 @@ def parts_table(imported: Imported) -> TextTable:
     several = len(imported.sources) > 1
     rows = []
     for part in imported.parts:
-        time, run = part.raw.cleaned.time_s[part.piece.first : part.piece.last], part.run
+        time, run = part.raw.cleaned.file_time_s[part.piece.first : part.piece.last], part.run
         cells = [f"{time.size}", "left out", *[""] * (len(headings) - 2)]
         if run is not None:
             cells[1:] = [

@@ -245,7 +245,8 @@ class SpringMiscalibration(Effect):
         error, stated, std = values["error"], values["spring_stiffness"], stds["error"]
         size = text(100.0 * abs(error), None if std is None else 100.0 * std, "%")
         side = "stiffer" if error > 0.0 else "softer"
-        return f"spring {stated:.4g} N m/rad is {size} {side} than stated ({stated * (1.0 + error):#.4g} N m/rad)"
+        true = f"({stated * (1.0 + error):#.4g} N m/rad)"
+        return f"a spring of {stated:.4g} N m/rad that is {size} {side} than stated {true}"
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:

@@ -12,11 +12,13 @@ from typing import Any
 
 import pytest
 
+from diagnosis.words.causes import consequence
 from identification.estimate import Estimate, Quantity, Status
 from tunnel_lab.bench.workspace import open_session
 from tunnel_lab.commands.demo import (
     PLAN,
     SHOWN,
+    found_table,
     missed_faults,
     misses,
     show_next,
@@ -87,6 +89,19 @@ def test_other_causes_are_said(faulty: CampaignPlan) -> None:
 
 def test_no_two_springs_could_tell_which_is_off(faulty: CampaignPlan) -> None:
     assert len({condition.spring_stiffness for condition in faulty.conditions}) >= 3
+
+
+def test_the_values_before_are_those_of_the_verdict(faulty: CampaignPlan) -> None:
+    found = found_document()
+    before = {"cn_beta": {"value": 0.4897, "std": 0.018, "unit": "1/rad"}}
+    found["coefficients"]["before"] = before
+    heads = [str(column.header) for column in found_table(faulty, found).columns]
+    cells = [next(iter(column.cells)) for column in found_table(faulty, found).columns]
+    assert dict(zip(heads, map(str, cells), strict=True)) == {
+        "": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
+        "with the causes": "0.4719 ± 0.0010", "error": "+0.0 σ",
+    }  # fmt: skip
+    assert "(0.490 → 0.472)" in consequence(found)
 
 
 @pytest.mark.parametrize(

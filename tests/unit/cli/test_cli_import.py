@@ -5,13 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from tests.unit.importing.import_files import csv as record
-from tests.unit.importing.import_files import written
+from tests.unit.importing.import_files import decay, written
 
 Tunnel = Callable[..., tuple[int, str, str]]
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -110,3 +113,54 @@ def test_an_export_is_written(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Pat
     assert (tmp_path / "all.csv").read_text().startswith("run,wind_speed,spring_stiffness,")
     status, _, err = tunnel("export", tiny_campaign, "--file-format", "doc")
     assert (status, err.count("\n")) == (2, 1)
+
+
+def held_and_released(folder: Path, *, first: float) -> Path:
+    """A record at 200 Hz, whose body is held aside for 4 s and then let go; its clock starts at ``first``, s."""
+    _, free = decay()
+    angle = np.concatenate([np.linspace(0.0, 0.35, 200), np.full(600, 0.35), free])
+    clock = first + np.arange(angle.size) / 200.0
+    rows = "".join(f"{t:.3f},{value:.5f}\n" for t, value in zip(clock, angle, strict=True))
+    return written(folder, "log.csv", f"time_s,yaw_rad\n{rows}")
+
+
+def test_times_of_notes_table_and_picture_are_those_that_start_takes(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[float] = []
+    monkeypatch.setattr(Axes, "axvline", lambda _axes, x, **_style: drawn.append(x))  # where a run begins
+    path = held_and_released(tmp_path, first=100.0)
+    status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
+    assert status == 0
+    assert "times here are the file's, whose first sample is at 100 s" in said
+    (begins,) = re.findall(r"begins at (\S+) s", said)
+    assert float(begins) == pytest.approx(104.0, abs=0.02)  # where the body was let go
+    assert drawn == pytest.approx([float(begins)])
+    (row,) = (line.split() for line in said.splitlines() if line.split()[:1] == ["log"])
+    assert float(row[3]) == pytest.approx(float(begins), abs=0.006)
+    status, again, _ = tunnel("import", path, "--preview", tmp_path / "look.png", "--start", begins)
+    assert status == 0
+    (again_row,) = (line.split() for line in again.splitlines() if line.split()[:1] == ["log"])
+    assert again_row[1] == row[1]  # samples
+    assert [float(cell) for cell in again_row[3:5]] == pytest.approx(
+        [float(cell) for cell in row[3:5]], abs=0.011
+    )
+
+
+@pytest.mark.parametrize("name", ["xGyro", "gyro_z", "YawRate", "Winkelgeschwindigkeit", "theta_dot"])
+def test_a_column_named_as_a_rate_without_a_unit_is_asked_for_its_unit(
+    tunnel: Tunnel, tmp_path: Path, name: str
+) -> None:
+    time, angle = decay(amplitude=30.0)
+    rows = "".join(f"{1e3 * t:.0f},{value:.4f}\n" for t, value in zip(time, angle, strict=True))
+    path = written(tmp_path, "imu.csv", f"Time,{name}\n{rows}")
+    for chosen in ((), ("--angle", name), ("--angle", 2)):
+        status, _, err = tunnel("import", path, *chosen, "--preview", tmp_path / "look.png")
+        assert (status, err.count("\n")) == (2, 1)
+        assert f"'{name}' is a rate by its name, and nothing states its unit" in err
+        assert f'--angle "{name}" and --unit, one of rad/s, deg/s, rpm' in err
+    status, said, _ = tunnel(
+        "import", path, "--angle", name, "--unit", "deg/s", "--preview", tmp_path / "look.png"
+    )
+    assert status == 0
+    assert "[rad/s]" in said

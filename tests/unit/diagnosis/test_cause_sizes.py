@@ -60,6 +60,20 @@ def test_a_hardening_spring_raises_the_frequency() -> None:
     assert size.reading_change > 0.0
 
 
+def test_a_spring_that_is_off_is_sized_on_a_run_that_has_it() -> None:
+    data = campaign(effect_from("spring_miscalibration", {"error": 0.03, "spring_stiffness": 44.84}))
+    base = nominal(data)
+    leads = starting_points(base, effect_class("spring_miscalibration"))
+    fits = [fit(lead.problem, lead.point, base=base) for lead in leads]
+    best = next(
+        one for one in fits if dict(one.problem.fixed)["spring_miscalibration.spring_stiffness"] == 44.84
+    )
+    (size,) = cause_sizes(studied(data, base, ("spring_miscalibration",), best))
+    assert next(run for run in data.runs if run.id == size.run).spring_stiffness == 44.84
+    assert size.frequency_change == pytest.approx(np.sqrt(1.03) - 1.0, rel=0.02)
+    assert size.reading_change > 0.0
+
+
 def test_every_effect_says_what_to_do_about_it() -> None:
     for kind in known_effects():
         assert kind.advice, kind.name

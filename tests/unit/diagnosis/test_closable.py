@@ -11,13 +11,14 @@ import pytest
 import tomli_w
 from scipy.signal import lfilter
 
-from diagnosis import _diagnose, diagnose
+from diagnosis import diagnose
 from diagnosis.facts.remainder import Ceiling
 from diagnosis.likelihood.ceiling import Evidence, Unexplained, best_ridge, held_out, normal, ratio, total
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.paths import paths, ranges
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.remainder import ways
 from diagnosis.remainder.explain import chosen_kind, closable, steady_line
 from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
 from diagnosis.search.hypothesis import Hypothesis
@@ -252,7 +253,7 @@ def _running_away(*_, **__):
 
 @pytest.mark.parametrize("unsolvable", [_singular, slow(_running_away)])
 def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
-    monkeypatch.setattr(_diagnose, "closable", unsolvable)
+    monkeypatch.setattr(ways, "closable", unsolvable)
     found = diagnose(campaign(), kinds=[effect_class("coulomb_friction")])
     assert found.closable is None
     assert any("was not found" in caution for caution in found.cautions)
@@ -264,7 +265,8 @@ def test_the_table_names_every_kind(detent):
     assert {row[0] for row in closable_table(document).rows} == {
         text for kind, text in KINDS.items() if kind not in ("noise", "line")
     }
-    assert closable_words(document | {"causes": ["unknown"], "decided": True}).endswith("%.")
+    words = closable_words(document | {"causes": ["unknown"], "decided": True})
+    assert f"of the gap could be closed by {closable_table(document).rows[0][0]}, measured on" in words
 
 
 def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):

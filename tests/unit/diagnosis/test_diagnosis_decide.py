@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
-from diagnosis.search.weigh import UNKNOWN, FittedSet, log_weight, main_effect, misfit_scale, weigh
+from diagnosis.search.weigh import UNKNOWN, FittedSet, log_weight, misfit_scale, weigh
 from diagnosis.settings import Settings
 
 NAMES = ("a", "b", "c", "d", "e")
@@ -165,7 +165,3 @@ def test_of_two_fits_of_the_same_effects_the_better_one_counts():
     worse, better = FittedSet(("a", "b"), 0.5, channels(damping=5e3)), FittedSet(("b", "a"), 0.0, channels())
     found = weigh([worse, better], nominal(gap), Settings().weighing)
     assert {w.effects: w.share for w in found if w.effects != UNKNOWN} == {("a", "b"): 0.0}
-
-
-def test_the_main_effect_leaves_least_by_itself():
-    assert main_effect(("a", "b"), {("a",): 0.9, ("b",): 0.1}) == "b"

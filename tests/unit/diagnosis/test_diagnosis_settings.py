@@ -42,6 +42,7 @@ KNOWN_IN_SEVERAL = {
     "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
     "leak": "wherever channels are compared",
+    "common_first": "the sentence states the share",
     "own_number_gain": "wherever an instant or a phase counts",
     "trend_rate": "one test, for the answer and for its sentence",
     "which_scatters_rate": "shown beside other numbers, or beside a drift",

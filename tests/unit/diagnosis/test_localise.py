@@ -28,7 +28,7 @@ from diagnosis.where.place import (
 )
 from tests.marks import slow
 from tests.unit import gap_campaigns
-from tests.unit.gap_campaigns import INTERVAL, answer, nominal, studied, with_blow
+from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 
 DURATION = 7.0
@@ -67,15 +67,12 @@ def test_the_place_does_not_depend_on_the_names(cause):
     assert nothing.compared == ()
 
 
-def test_a_small_cause_beside_the_main_one_is_not_said_to_agree():
+def test_the_whole_set_is_judged_by_the_place():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
-    study = studied(data, nominal(data), ("cubic_stiffness", "structural_damping"))
-    alone = (answer(("cubic_stiffness",), 0.1, 0.1), answer(("structural_damping",), 0.9, 0.0))
-    _, _, said = localise(dataclasses.replace(study, answers=(*study.answers, *alone)))
-    assert (said.compared, said.agrees) == (("cubic_stiffness",), False)
-    turned = (answer(("cubic_stiffness",), 0.9, 0.0), answer(("structural_damping",), 0.1, 0.1))
-    _, _, said = localise(dataclasses.replace(study, answers=(*study.answers, *turned)))
-    assert (said.compared, said.agrees) == (("structural_damping",), True)
+    names = ("cubic_stiffness", "structural_damping")
+    _, _, said = localise(studied(data, nominal(data), names))
+    assert (said.compared, said.agrees) == (names, True)
+    assert not localise(studied(data, nominal(data), ("cubic_stiffness", "rod_flexibility")))[2].agrees
 
 
 def test_runs_whose_frequencies_disagree_leave_the_channel_open():

@@ -11,7 +11,9 @@ from diagnosis.facts.found import Fact, Found, Noted, Nowhere
 from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, Where
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
+from diagnosis.words.numbers import KINDS
 from diagnosis.words.remainder import closable_words, rest_line, rest_words
+from diagnosis.words.tables import closable_table
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
 from tests.unit.diagnosis_document import CAUSE, IDS, RIVAL, document
@@ -61,6 +63,20 @@ def test_only_what_locates_the_gap_is_said(given: Document) -> None:
     assert "By frequency" not in text
 
 
+def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document) -> None:
+    text = placed(given, compared=["coulomb_friction", "gravity_stiffness", "quadratic_damping"], agrees=True)
+    assert text.endswith(
+        "Of the causes coulomb friction and quadratic damping act there, and gravity stiffness acts on the "
+        "restoring moment (stiffness)."
+    )
+    assert "does not agree" not in text
+    text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)
+    assert text.endswith(
+        "That does not agree with cubic stiffness and sensor drift: cubic stiffness acts on the restoring moment "
+        "(stiffness) and sensor drift acts on the reading of the sensor."
+    )
+
+
 def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
     text = placed(given, compared=["cubic_stiffness"], agrees=False)
     assert text.endswith(
@@ -97,7 +113,7 @@ FIGURES = {
     "quantity": "rate", "reason": "it is too heavy", "records_rad": 1e-9, "fits_rad": 1e-5, "failure": "it grows",
     "rms_rad": 2e-5, "tolerance_rad": 1e-5, "tolerance": 0.1, "driven": False, "windy": True, "effects": [RIVAL],
     "std_rad": 1e-3, "fewer": 1, "uncertainty_rad": 1e-5, "stated_rad": 2e-3, "least_rad": 1e-3, "most_rad": 3e-3,
-    "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93,
+    "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93, "left": 0.4,
 }  # fmt: skip
 
 
@@ -134,10 +150,9 @@ def test_caveats_state_their_figures() -> None:
     left_out = said(CAUTIONS, {"kind": "another mode", "ratio": 1.5, "runs": ["r1", "r3"]})
     assert "1.5 times as fast as the same spring with the wind off or faster: r1, r3." in left_out
     differs = said(CAUTIONS, {"kind": "not confirmed", **FIGURES})
-    assert (
-        "by 2.0e-05 rad (root mean square over beta), more than a tenth of the noise (1.0e-05 rad)."
-        in differs
-    )
+    assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in differs
+    rates = said(CAUTIONS, {"kind": "not confirmed", **FIGURES}, "rad/s")
+    assert "by 0.0011 °/s (root mean square over beta)" in rates
 
 
 def test_remarks_on_the_noise_have_their_remedies() -> None:
@@ -183,19 +198,20 @@ def test_the_note_on_the_coefficients(given: Document) -> None:
 
 def test_what_remains(given: Document) -> None:
     assert rest_words(given) == (
-        "Explained; what remains (0.13 noise powers) moves Cnβ by less than 0.28 % and Cnr by less than 4.6 %."
+        "Explained; what remains (0.00946° root mean square) moves Cnβ by less than 0.28 % and Cnr by less than "
+        "4.6 %."
     )
     rest = given["rest"]
     assert rest_words(given | {"causes": ["unknown"]}).startswith("It hardly matters: it moves Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
     assert rest_words(calm) == (
-        "Explained; what remains (0.13 noise powers) is within the noise. Sensor drift is significant beside it "
-        "and too small to be named."
+        "Explained; what remains is within the noise. Sensor drift is significant beside it and too small to be "
+        "named."
     )
     rest["moves"]["cn_r"]["material"] = True
     assert rest_words(given).startswith(
-        "Not all is explained: what remains (0.13 noise powers) could move Cnr by 0."
+        "Not all is explained: what remains (0.00946° root mean square) could move Cnr by 0."
     )
     assert rest_words(given | {"rest": None}) == ""
     assert rest_line(given | {"rest": None}) == ""
@@ -220,7 +236,17 @@ def test_what_could_be_closed(given: Document) -> None:
         "85.0 ± 2.0 % of what the causes leave could be closed by a moment of the angle alone, measured on"
     )
     assert text().startswith(first)
-    assert text().endswith("No other kind would close more than 31.0 %.")
+    assert text().endswith("No other kind measured on runs would close more than 31.0 %.")
+    larger = [*CEILINGS[:2], CEILINGS[2] | {"closed": 0.97, "std": 0.01}]
+    said_both = text(ceilings=larger)
+    assert said_both.startswith(first)
+    assert said_both.endswith(
+        "A moment in time of each run's own would close 97.0 ± 1.0 %, measured on short gaps. One law of all runs "
+        "is named before it from four fifths of that share on, since it can be a property of the rig."
+    )
+    table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})
+    assert "at most" not in table.title
+    assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
     law = {"effect": {"moment": "k*b"}, "closed": 0.8, "std": 0.01}
     assert text(law=law).endswith("The formula k*b closes 80.0 ± 1.0 %.")
@@ -232,7 +258,7 @@ def test_what_could_be_closed(given: Document) -> None:
         "frequency_hz": 7.2, "frequency_std_hz": 0.0011, "amplitude": 2.4e-4, "amplitude_std": 1e-5, "unit": "rad",
         "false_alarm_rate": 0.01,
     }  # fmt: skip
-    assert "The line is at 7.2000 ± 0.0011 Hz, with an amplitude of 0.240 ± 0.010 mrad" in text(line=line)
+    assert "The line is at 7.2000 ± 0.0011 Hz, with an amplitude of 0.01375 ± 0.00057°" in text(line=line)
     assert text(kind="noise").startswith(
         "No more than 89.0 % of what the causes leave could be closed by any smooth"
     )

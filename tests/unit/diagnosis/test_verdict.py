@@ -17,7 +17,7 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import GapSummary, ParameterEstimate, RunGap
 from diagnosis.settings import Settings
 from diagnosis.words.causes import said_size
-from diagnosis.words.tables import gap_table, parameters_table
+from diagnosis.words.tables import candidates_table, diagnosis_brief, gap_table, parameters_table
 from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.gap_campaigns import answer, nominal, studied
@@ -243,6 +243,27 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     assert parameters_table(given).title.startswith("Parameters of the most probable answer")
 
 
+def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is_more_probable():
+    given = document()
+    for one, value in zip(given["candidates"], (0.33, 0.12, 0.48, 0.07), strict=False):
+        one["probability"] = value
+    first, most = given["candidates"][0], given["candidates"][2]
+    given |= decision(
+        [(one["effect"], one["probability"]) for one in given["candidates"]], Settings().answer
+    ).to_json_dict()
+    listed = [row[:2] for row in candidates_table(given).rows[:2]]
+    assert listed == [(most["effect"], "48 %"), (first["effect"], "33 %")]
+    assert [row["probability"] for row in view.candidate_rows(given)[:2]] == ["48 %", "33 %"]
+    called = "most probable set of effects"
+    assert parameters_table(given).title.startswith(f"Parameters of the {called}")
+    assert {f"With the {called} added", f"Probability of the {called}"} <= {
+        fact.label for fact in view.facts(given)
+    }
+    page = render_report(given, campaign())
+    assert f"of the {called}</h2>" in page
+    assert "most probable answer" not in page + diagnosis_brief(given)
+
+
 def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
     found = {"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003}
     assert said("coulomb_friction", immaterial=found).endswith(
@@ -250,6 +271,8 @@ def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
         "than 0.3 %."
     )
     assert "immaterial" not in said("coulomb_friction")
+    tiny = said("coulomb_friction", immaterial={"cn_beta": 3.6e-9})
+    assert "its causes change Cnβ by less than 0.01 %." in tiny
 
 
 NEARLY = {
@@ -274,7 +297,7 @@ def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(chang
     text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
     assert "no effect is named as its cause. Quadratic damping would explain 99.6 % of it" in text
     assert words in text
-    assert "no effect of the vocabulary explains it" in said("unknown")
+    assert "none of the effects that are tried explains it (tunnel effects lists them)" in said("unknown")
 
 
 OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
@@ -305,7 +328,7 @@ def test_a_second_mode_is_said_before_the_gap():
     mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
     text = said("unknown", second_modes=[mode])
     assert text.startswith(
-        "swing contains a second mode: 0.02 rad at 2.9 Hz, which decays at 0.2 1/s, beside 0.3"
+        "swing contains a second mode: 1.1° at 2.9 Hz, which decays at 0.2 1/s, beside 17° at 2.2 Hz"
     )
     assert "falls by 98 %" in text
 
@@ -369,23 +392,30 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         {"effect": "coulomb_friction", "probability": 0.02, "parameters": {}},
     ]
     words = (
-        "coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated (15.80 N m/rad) "
-        "(58 %), or gravity stiffness (40 %)"
+        "coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than stated (58 %) "
+        "or gravity stiffness (40 %)"
     )
     assert headline(one) == (words, "open")
     assert f" of the swing) comes from {words}: the damping" in verdict(one, "")
     assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
     springs = (
-        "one of the two springs is off, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by 2.000 ± 0.010 %"
+        "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by "
+        "2.000 ± 0.010 %"
     )
     assert (
         headline(one)[0]
-        == f"coulomb friction (98 %), and one of: {springs} (58 %), or gravity stiffness (40 %)"
+        == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
     )
-    assert "and one of: one of the two springs is off (58 %), or gravity stiffness (40 %): the" in verdict(
-        one, ""
-    )
+    said_once = "and either an error of one of the two springs (58 %) or gravity stiffness (40 %): the"
+    assert said_once in verdict(one, "")
+    one["candidates"][2:] = [
+        {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},
+        {"effect": "coulomb_friction", "probability": 0.1, "parameters": {}},
+    ]
+    one["ambiguous_with"] = ["cubic_stiffness", "gravity_stiffness"]
+    others = "gravity stiffness (40 %), cubic stiffness (20 %) or nothing else (10 %)"
+    assert headline(one)[0].endswith(f"and one of these: {springs} (58 %), {others}")
 
 
 def test_what_the_causes_change_is_said_in_per_cent():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.columns import find_pairs
+from tunnel_sim.files.importing.columns import find_pairs, named_kind
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.text import find_layout
@@ -111,3 +111,16 @@ def test_many_columns_are_counted_where_they_are_listed() -> None:
     columns = [Channel(f"yaw {name}", SWING, "rad") for name in "abcdefghij"]
     with pytest.raises(TunnelError, match=r"10 columns may be the angle: 'yaw a', .*'yaw h' and 2 more"):
         pairs(Channel("time", TIME, "s"), *columns)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("ZGyro", "rate"), ("gyrox", "rate"), ("AngularVelocity", "rate"), ("Drehrate", "rate"), ("θ̇", "rate"),
+        ("ω", "rate"), ("accX", "acceleration"), ("Winkelbeschleunigung", "acceleration"), ("θ̈", "acceleration"),
+        ("theta_ddot", "acceleration"),
+        ("theta", ""), ("rotation", ""), ("anecdote", ""), ("generated", ""), ("accuracy", ""), ("accumulated", ""),
+    ],
+)  # fmt: skip
+def test_what_a_name_calls_a_rate_or_an_acceleration(name: str, kind: str) -> None:
+    assert named_kind(name) == kind

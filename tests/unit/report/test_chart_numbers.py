@@ -78,7 +78,8 @@ def test_the_cells_of_the_missing_moment(given: Document) -> None:
     assert chart["unit"] == "10⁻³ N m"
     reach = 1e3 * float(np.quantile([0.012, 0.025, 0.001], 0.98))
     assert chart["range"] == pytest.approx([-reach, reach])
-    assert chart["x"]["edges"] == chart["y"]["edges"] == given["maps"]["phase_plane"]["edges_rad"]
+    edges = np.degrees(given["maps"]["phase_plane"]["edges_rad"]).tolist()
+    assert chart["x"]["edges"] == chart["y"]["edges"] == edges
     given["maps"]["phase_plane"] = None
     assert "where-phase-plane" not in charts(given)
 

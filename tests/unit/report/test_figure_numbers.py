@@ -173,15 +173,16 @@ def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
     axes = where.profiles_figure(given).axes[place]
     values, interval = given["maps"][key], given["where"][key + ("_s" if key == "time" else "_rad")]
     shade, noise, mean = axes.patches
+    shown = np.degrees if key == "amplitude" else np.asarray
     box = shade.get_extents().transformed(axes.transData.inverted())
-    assert (box.x0, box.x1) == pytest.approx(interval)
+    assert (box.x0, box.x1) == pytest.approx(shown(interval).tolist())
     drawn = mean.get_data()
     assert drawn.values.tolist() == values["excess"]
-    assert drawn.edges.tolist() == values[edges]
+    assert drawn.edges.tolist() == pytest.approx(shown(values[edges]).tolist())
     spread = noise.get_data()
     assert spread.values.tolist() == pytest.approx([3.0 * s for s in values["std"]])
     assert np.asarray(spread.baseline).tolist() == pytest.approx([-3.0 * s for s in values["std"]])
-    assert axes.get_xlim() == (0.0, values[edges][-1])
+    assert axes.get_xlim() == pytest.approx((0.0, float(shown(values[edges][-1]))))
     low, high = axes.get_ylim()
     assert low <= min(-3.0 * min(values["std"]), *values["excess"])
     assert high >= max(values["excess"])
@@ -232,17 +233,16 @@ def test_backbones(given: Document) -> None:
     given["maps"]["backbones"][1]["time_s"] = [1.0]  # one window makes no curve
     fig = backbone_figure(given)
     frequency, damping = fig.axes
+    swings = np.degrees([0.1, 0.2, 0.3]).tolist()
     for axes, values, stds in (
         (frequency, [4.0, 2.0, 1.0], lambda nominal: [0.3 / nominal, 0.2 / nominal, 0.1 / nominal]),
         (damping, [4.0, 2.0, 1.0], lambda _: [0.3, 0.2, 0.1]),
     ):
         assert len(axes.lines) == 3  # two curves and the level line
         for line, area, nominal in zip(axes.lines, axes.collections, (1.95, 2.55), strict=False):
-            assert np.array(curve(line)) == pytest.approx(
-                np.array(list(zip([0.1, 0.2, 0.3], values, strict=True)))
-            )
+            assert np.array(curve(line)) == pytest.approx(np.array(list(zip(swings, values, strict=True))))
             corners = band(area)
-            for x, y, std in zip([0.1, 0.2, 0.3], values, stds(nominal), strict=True):
+            for x, y, std in zip(swings, values, stds(nominal), strict=True):
                 column = corners[np.isclose(corners[:, 0], x), 1]
                 assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
         assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
@@ -289,17 +289,17 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
     low, high = field.images[0].get_clim()
     assert low == -high
     assert high == pytest.approx(factor * size * np.quantile([0.012, 0.025, 0.001], 0.98))
-    assert field.images[0].get_extent() == [-0.4, 0.4, -0.4, 0.4]
+    assert field.images[0].get_extent() == pytest.approx(np.degrees([-0.4, 0.4, -0.4, 0.4]).tolist())
     assert any(f"[{unit}]" in axes.get_xlabel() for axes in fig.axes)
     means = where.moment_figure(given)
     assert means is not None
     for axes, name in zip(means.axes, ("by_angle", "by_rate"), strict=True):
         assert f"[{unit}]" in axes.get_ylabel()
         assert np.array(curve(axes.lines[1])) == pytest.approx(
-            np.array(list(zip([-0.2, 0.2], [factor * v for v in plane[name]], strict=True)))
+            np.array(list(zip(np.degrees([-0.2, 0.2]), [factor * v for v in plane[name]], strict=True)))
         )
         corners = band(axes.collections[0])
-        for x, y, std in zip([-0.2, 0.2], plane[name], plane[name + "_std"], strict=True):
+        for x, y, std in zip(np.degrees([-0.2, 0.2]), plane[name], plane[name + "_std"], strict=True):
             column = corners[np.isclose(corners[:, 0], x), 1] / factor
             assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
 

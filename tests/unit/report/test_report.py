@@ -205,7 +205,7 @@ def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
     given = document | {"model": MODEL, "maps": None}
     text = Page(written(given, Byline(patch="out.xml"))).text
     assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
-    assert "yaw +0.0123 rad. Written to out.xml ." in text
+    assert "yaw + 0.705°. Written to out.xml ." in text
     assert "Changes to rig.xml" in text
     assert "joint frictionloss 0 0.004560 N m" in text
     assert "frictionloss is a soft constraint." in text
@@ -218,11 +218,11 @@ def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, written):
     assert "There is one run only." in page
     assert "the MuJoCo model" in page
-    assert "1.2e-05 rad at most" in page
-    assert "within 4.0e-05 rad" in page
+    assert "0.00069° at most" in page
+    assert "within 0.0023°" in page
     changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
     other = written(document | changed)
-    assert "beyond 4.0e-05 rad" in other
+    assert "beyond 0.0023°" in other
     assert 'id="cautions"' not in other
 
 

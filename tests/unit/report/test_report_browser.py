@@ -323,6 +323,13 @@ def pages(printed: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b", printed))
 
 
+def size_of(printed: bytes) -> tuple[int, int]:
+    """Width and height of the pages of a PDF by Chromium, pt."""
+    (found,) = set(re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", printed))
+    return round(float(found[0])), round(float(found[1]))
+
+
+A4 = (595, 842)  # pt
 PT = 96.0 / 72.0  # px
 LETTER = 279.4 - 24.0  # mm: what is printed of the less high paper
 SUMMARY = """() => {
@@ -388,6 +395,7 @@ def test_the_summary_is_written_as_a_file_of_one_page(
     path = write_summary(document(), campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
+    assert size_of(path.read_bytes()) == A4
 
 
 BREAKS = """(what) => {
@@ -404,4 +412,21 @@ def test_no_printed_page_ends_with_a_heading_or_holds_the_footer_alone(opened: O
     assert opened.page.evaluate(BREAKS, "summary + *")[0] == "avoid"
     assert opened.page.evaluate(BREAKS, "footer")[0] == "avoid"
     opened.page.emulate_media(media="screen")
-    assert pages(opened.page.pdf(format="Letter")) <= 10  # the less high of the two papers
+    assert pages(opened.page.pdf(format="Letter")) <= 7  # the less high of the two papers
+    assert size_of(opened.page.pdf(prefer_css_page_size=True)) == A4
+
+
+SIDE_BY_SIDE = """() => {
+  const figures = [...document.querySelectorAll("#where figure")];
+  const tops = figures.map((one) => Math.round(one.getBoundingClientRect().top));
+  return [tops.length, new Set(tops).size];
+}"""
+
+
+def test_figures_of_where_the_gap_is_are_printed_two_to_a_row(opened: Opened) -> None:
+    opened.page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+    opened.page.emulate_media(media="print")
+    opened.page.set_viewport_size({"width": 703, "height": 1032})  # A4 within its margins
+    figures, rows = opened.page.evaluate(SIDE_BY_SIDE)
+    assert figures >= 4
+    assert rows == -(-figures // 2)

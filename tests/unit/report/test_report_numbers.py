@@ -16,7 +16,7 @@ import pytest
 
 from diagnosis.facts.decision import decision
 from diagnosis.settings import Settings
-from diagnosis.words.numbers import noise_powers, probability
+from diagnosis.words.numbers import left_over, probability
 from diagnosis.words.tables import candidates_table, other_answers
 from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
 from tests.unit.diagnosis_document import (
@@ -105,7 +105,10 @@ def test_the_head_of_the_page(given: Document) -> None:
     assert_shows(calm.note, [gap["excess_after"]])
     none = view.facts(given | {"causes": []})[0]
     assert none.value == "within the noise"
-    assert_shows(none.note, [gap["excess_before"]])
+    assert_shows(none.note, [(1.0 + gap["excess_before"]) ** 0.5])
+    assert view.facts(given | {"causes": [], "gap": gap | {"excess_before": -0.694}})[0].note == (
+        "residual 0.553 times the noise, root mean square"
+    )
     del (old := copy.deepcopy(given))["gap"]["misfit"]
     assert_shows(view.facts(old)[0].value, [gap["excess_before"]])
 
@@ -114,9 +117,9 @@ def test_the_head_of_the_page(given: Document) -> None:
 def test_what_is_left_has_one_form_in_a_tile(given: Document, value: float) -> None:
     given = copy.deepcopy(given)
     given["gap"]["excess_after"] = value
-    assert view.facts(given)[1].note.endswith(f"; {noise_powers(value)}")
+    assert view.facts(given)[1].note.endswith(f"; {left_over(value)}")
     calm = given | {"rest": given["rest"] | {"significant": False}}
-    assert view.facts(calm)[1].note == noise_powers(value)
+    assert view.facts(calm)[1].note == left_over(value)
 
 
 @pytest.mark.parametrize(("value", "text"), [(0.9634, "96 %"), (0.9951, "> 99 %"), (0.5712, "57 %")])
@@ -190,6 +193,7 @@ def test_the_causes_have_their_sizes(given: Document, page: Sections) -> None:
     small = size | {"damping_ratio": size["damping_ratio_without"], "frequency_change": 1e-6}
     assert "damping" not in size_words(given, small)
     assert "frequency" not in size_words(given, small)
+    assert size_words(given, small | {"reading_change": 0.0, "zero_change": 0.0}) == ""
     for causes in ([], ["unknown"]):
         assert view.causes_found(given | {"causes": causes}) == []
 
@@ -203,7 +207,7 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         texts = [view.causes_found(one)[0]["acts"], *next_steps(one | undecided)]
         texts += [label for label, _ in view.place_rows(one)]
         assert ("wind" in " ".join(texts).replace(run_words(given["next_run"]), "")) == said
-        assert ("Condition" in texts) == said
+        assert ("Acts" in texts) == said
 
 
 def test_a_campaign_without_wind_has_no_column_for_it(
@@ -235,7 +239,7 @@ def test_where_the_gap_is(given: Document) -> None:
 
 def test_narrow_lines(given: Document, page: Sections) -> None:
     for line in given["maps"]["lines"]:
-        wanted = [line["frequency_hz"], 1e3 * line["amplitude_rad"], 100 * line["share"]]
+        wanted = [line["frequency_hz"], np.degrees(line["amplitude_rad"]), 100 * line["share"]]
         assert_shows(page.row("where", line["run"]), wanted)
 
 
@@ -339,18 +343,18 @@ def test_the_interval_is_that_of_the_nominal_model_where_it_stands_alone(given: 
 def test_the_next_run(given: Document, page: Sections) -> None:
     for key, value in given["next_run"].items():
         text = page.row("which", key.replace("_", " ").capitalize())
-        assert_shows(text, [value])
+        assert_shows(text, [np.degrees(value) if key == "release_angle" else value])
     assert view.next_run_rows(given | {"next_run": None}) == []
 
 
 def test_noise_and_confirmation(given: Document, page: Sections) -> None:
     noise, checked = given["noise"], given["confirmation"]
     rows = [" ; ".join(row[1:]) for row in page.rows["provenance"] if len(row) == 2]
-    assert_shows(rows[0], [1e3 * noise["std"]])
-    assert_shows(rows[1], [1e3 * noise["stated_std"]])
+    assert_shows(rows[0], [np.degrees(noise["std"])])
+    assert_shows(rows[1], [np.degrees(noise["stated_std"])])
     departs = next(row for row in rows if checked["run"] in row)
     keys = ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
-    assert_shows(departs, [checked[key] for key in keys])
+    assert_shows(departs, [np.degrees(checked[key]) for key in keys])
 
 
 def test_tests_and_times(given: Document, page: Sections) -> None:
@@ -406,7 +410,7 @@ def test_no_number_of_the_page_comes_from_elsewhere(given: Document, page: Secti
     ends = {e["value"] + s * e["std"] for e in given["coefficients"]["after"].values() for s in (-1.96, 1.96)}
     counts = {1.0, 2.0, 3.0, 4.0, 0.5, 1.5, 2.5, 3.5, 0.0}  # lines, runs, answers; edges of the bands
     shown = {both(v)[0] for v in values} | {100.0 * both(v)[0] / np.degrees(0.0815) for v in values}
-    known = values | shown | {1e2 * v for v in values} | {1e3 * v for v in values} | ends | counts
+    known = values | shown | {1e2 * v for v in values} | set(np.degrees([*values])) | ends | counts
     for section in ("verdict", "how-far-section", "provenance"):
         text = re.sub(r"95 %|10⁻³|SHA-256", "", page.texts[section]).replace("1/s", "")
         assert_known(text, known)
@@ -440,7 +444,7 @@ def test_excesses(value: float, text: str) -> None:
 
 def test_a_line_cannot_hold_more_than_all() -> None:
     line = {"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}
-    assert view.line_rows({"maps": {"lines": [line]}})[0]["share"] == "100 %"
+    assert view.line_rows({"gap": {}, "maps": {"lines": [line]}})[0]["share"] == "100 %"
     assert view.line_rows({"maps": None}) == []
 
 

@@ -34,11 +34,18 @@ class Cleaned:
     Args:
         time_s: shape (n,), s, increasing, from zero on.
         reading: shape (n,).
+        first_s: time of the first sample by the file's clock, s.
     """
 
     time_s: Array
     reading: Array
     said: tuple[str, ...]
+    first_s: float = 0.0
+
+    @property
+    def file_time_s(self) -> Array:
+        """Times by the file's clock, shape (n,), s: that of ``--start``, of pictures, tables and notes."""
+        return self.time_s + self.first_s
 
 
 def without_overflow(values: Array, said: list[str]) -> Array:
@@ -119,8 +126,12 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         )
         said.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
         time, reading = time[keep], reading[keep]
-    if time.size and time[0] != 0.0:
-        said.append(f"times count from the first sample, which the file has at {time[0]:.6g} s")
+    first = float(time[0]) if time.size else 0.0
+    if first != 0.0:
+        said.append(
+            f"times here are the file's, whose first sample is at {clock_text(first)} s; those of the campaign "
+            "count from the first sample of each run"
+        )
     time = from_zero(time)
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size > 1 else 0.0
@@ -134,7 +145,12 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         if spread > _UNEVEN * usual:
             share = f"{100.0 * spread / usual:.0f} % of a step"
             said.append(f"time stamps differ from an even clock by up to {share}; kept")
-    return Cleaned(time, reading, tuple(said))
+    return Cleaned(time, reading, tuple(said), first)
+
+
+def clock_text(time: float) -> str:
+    """A time by the file's clock, s, to a millisecond: ``34200``, or ``14.275``."""
+    return f"{time:.3f}".rstrip("0").rstrip(".")
 
 
 def from_zero(time: Array) -> Array:

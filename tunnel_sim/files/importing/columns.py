@@ -32,7 +32,16 @@ _ANGLE = re.compile(
     r"(?![a-z])|[θβψφα]",
     re.IGNORECASE,
 )
-_RATE = re.compile(r"(?<![a-z])(rate|velocity|omega|gyro|speed|vel)(?![a-z])|[ωβθ]̇|dot|ω", re.IGNORECASE)
+_RATE = re.compile(
+    r"velocity|geschwindigkeit|ω|[βθψφ]̇|(?<![a-z])(omega|[xyz]?gyr[oa]?|gyro[a-z]+|speed)(?![a-z])"
+    r"|(rate|vel|dot)(?![a-z])",
+    re.IGNORECASE,
+)
+_ACCELERATION = re.compile(
+    r"acceleration|beschleunigung|ddot|[βθψφ]̈|(?<![a-z])(angacc|acc|acce?l)(?![a-z])", re.IGNORECASE
+)
+_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+"""Between the words of a name that are joined, such as ``xGyro`` or ``ZGyro``."""
 _OTHER = re.compile(
     r"(?<![a-z])(index|idx|sample|samples|nr|no|row|#|frame|temperature|current|force)(?![a-z])", re.I
 )
@@ -50,6 +59,14 @@ class ColumnPair:
     time: Channel | None
     reading: Channel
     said: tuple[str, ...] = ()
+
+
+def named_kind(name: str) -> str:
+    """The kind of quantity, ``rate`` or ``acceleration``, that a column's name states; empty: neither."""
+    words = _JOINED.sub("_", name)
+    if _ACCELERATION.search(words):
+        return "acceleration"
+    return "rate" if _RATE.search(words) else ""
 
 
 def stem(name: str) -> str:
@@ -99,6 +116,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
             pairs.append(ColumnPair(run, time, reading, tuple(said)))
     if not pairs:
         what = f"no column of angles (columns found: {_listed(table.channels)})"
+        _refuse_without_unit(table.channels, where)
         raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
     return pairs
 
@@ -149,7 +167,7 @@ def _readings(
     others = [c for c in free if not is_input(c) and c is not driving]
     levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
     for c in others:
-        kind, named = kind_of(c.unit), _ANGLE.search(c.name) and not _RATE.search(c.name)
+        kind, named = kind_of(c.unit), _ANGLE.search(c.name) and not named_kind(c.name)
         if not _span(c) > 0.0:
             continue
         if kind == "angle" or (named and kind in ("counts", "voltage")):
@@ -160,7 +178,7 @@ def _readings(
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
-        elif c.unit == "" and not _OTHER.search(c.name) and not _RATE.search(c.name):
+        elif c.unit == "" and not _OTHER.search(c.name) and not named_kind(c.name):
             levels[4].append(c)
         elif kind == "voltage":
             levels[5].append(c)
@@ -302,6 +320,28 @@ def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: st
         raise TunnelError(what, where=where, remedy=f"give {option}, one of {allowed}")
 
 
+def _refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
+    """Refuse columns that their names call rates or accelerations, of which nothing states the unit.
+
+    Their size does not tell rad/s from deg/s as that of an angle tells rad from deg: a rate has no largest value.
+    """
+    kinds = {channel: named_kind(channel.name) for channel in channels if not channel.unit}
+    first = next(filter(None, kinds.values()), "")
+    found = [channel for channel, kind in kinds.items() if kind and kind == first]
+    if not found:
+        return
+    noun = f"is {'an' if first == 'acceleration' else 'a'} {first} by its name, and nothing states its unit"
+    chosen = f'--angle "{one_line(found[0].name, 40)}"'
+    if len(found) > 1:
+        noun = f"are {first}s by their names, and nothing states their unit"
+        chosen += ", or another of them,"
+    raise TunnelError(
+        f"{_listed(found)} {noun}",
+        where=where,
+        remedy=f"give {chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle",
+    )
+
+
 def in_radians(
     reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
 ) -> tuple[Array, Quantity, str]:
@@ -339,6 +379,7 @@ def in_radians(
     if not unit:
         if calibration is None:
             _ask_for_unit(reading, kinds, "--unit", where)
+            _refuse_without_unit([reading], where)
         unit, swing = guessed_angle_unit(values)
         said.append(
             f"no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit says otherwise"

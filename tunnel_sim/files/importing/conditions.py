@@ -22,7 +22,6 @@ from tunnel_sim.files.importing.tables import names_runs
 from tunnel_sim.files.importing.text import read_cells
 from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.toml_input import (
-    NotNegative,
     OneLine,
     Positive,
     SampleRate,
@@ -53,8 +52,8 @@ class Stretch(StrictModel):
 
     file: OneLine = Field(description="the name of the file")
     run: OneLine = Field(description="the name of the run")
-    start: NotNegative | None = optional("the time of the release in s from the record's first sample")
-    end: Positive | None = optional("the time in s from the record's first sample at which the run ends")
+    start: float | None = optional("the time of the release by the file's clock, in s")
+    end: float | None = optional("the time at which the run ends by the file's clock, in s")
     rest: float | None = optional("the reading at rest in rad, to be subtracted")
 
 

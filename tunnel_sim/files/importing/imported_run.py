@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.cleaning import from_rest, from_zero
+from tunnel_sim.files.importing.cleaning import clock_text, from_rest, from_zero
 from tunnel_sim.files.importing.condition_names import OF_CAMPAIGN, RUN_KEYS, Conditions
 from tunnel_sim.files.importing.conditions import ConditionTable, ImportChoices, Unstated
 from tunnel_sim.files.importing.raw_records import RawRecord
@@ -76,21 +76,21 @@ def imported_run(
     """
     where = f"{shown(raw.source)}, run '{name}'"
     stretch = choices.stretch_of(raw.source.name, name)
-    piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
+    piece = stated_piece(raw.cleaned.file_time_s, piece, stretch, where)
     if name in choices.leave_out:
         return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
     kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
-    said = []
+    said, clock = [], raw.cleaned.file_time_s[kept]
     if piece.first:
         at = (
             "at the largest rate after the release"
             if raw.quantity == "rate"
             else "where the body is released"
         )
-        said.append(f"begins at {time[0]:.4g} s, {at}")
+        said.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
     if piece.last < raw.cleaned.time_s.size:
-        said.append(f"ends at {time[-1]:.4g} s, with the motion or before the next run")
+        said.append(f"ends at {clock_text(float(clock[-1]))} s, with the motion or before the next run")
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
         reading = from_rest(reading, rest, sensor.unit, said, where)

@@ -17,6 +17,7 @@ from diagnosis.answer.coefficients import (
     Possible,
     before_the_causes,
     coefficients,
+    interval_beside,
     possible_answers,
 )
 from diagnosis.answer.linear_theory import beside, starts_beside
@@ -25,7 +26,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.similarity import Similarity
 from diagnosis.result import ParameterEstimate
-from diagnosis.settings import Settings
+from diagnosis.settings import AnswerSettings, Settings
 from identification.printing import estimated
 from tests.marks import slow
 from tests.unit.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
@@ -97,6 +98,27 @@ def test_the_value_and_the_variance_are_those_of_the_law_of_total_variance(data,
     assert low < min(one.value, two.value)
     assert max(one.value, two.value) < high
     assert found.to_json_dict()["interval"] == [low, high]
+
+
+def test_no_stated_interval_is_shorter_than_a_standard_deviation_on_both_sides(data, base, best):
+    answers = Answers((Possible(0.985, best), Possible(0.015, base)), 0.0, base)
+    found = coefficients(answers, precise(data))["cn_r"]
+    alone = only(best, precise(data))["cn_r"]
+    assert found.std > 3.0 * alone.std  # the rare rival is most of the variance
+    assert found.interval is None  # and the central interval of 0.95 would be that of the likely answer alone
+
+
+@given(PARTS)
+@settings(max_examples=50)
+def test_the_interval_stated_or_meant_holds_95_per_cent_and_the_standard_deviation(parts):
+    weights, means, variances = np.array(parts).T
+    whole = Mixture(weights / weights.sum(), means, variances)
+    stated = interval_beside(whole, AnswerSettings())
+    low, high = stated or (whole.mean - 1.96 * whole.std, whole.mean + 1.96 * whole.std)
+    assert high - low >= 2.0 * whole.std
+    stds = np.sqrt(variances)
+    held = whole.weights @ (norm.cdf(high, means, stds) - norm.cdf(low, means, stds))
+    assert held > 0.9  # an end may be a tenth of a standard deviation inside the central interval
 
 
 def test_an_unlikely_rival_makes_the_interval_one_sided(data, base, best):

@@ -82,6 +82,7 @@ def judged(study, moved, std, excess=0.4):
     found = remainder(study, stated, {"cn_beta": moved}, excess)
     document = {
         "causes": list(study.causes),
+        "gap": {"misfit": {"noise": 4e-4, "swing": 0.1, "unit": "rad"}},
         "rest": as_json(found),
         "coefficients": {"after": as_json(stated)},
     }
@@ -119,7 +120,7 @@ def test_what_chance_explains_is_never_material(data, base):
     found = judged(studied(data, base, (CAUSE,), best), 0.1, 0.001, excess=0.0004)
     assert not found.significant
     assert not found.material
-    assert "(less than 0.001 noise powers) is within the noise" in found.words
+    assert found.words == "Explained; what remains is within the noise."
     assert found.moves["cn_beta"].relative == pytest.approx(0.2)
 
 
@@ -130,9 +131,9 @@ def with_effect(base):
 def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
     study = studied(data, base, (CAUSE,), base)
     found = judged(with_p_value(study, 0.0), 0.0, 0.0001)
-    assert found.words == "Explained; what remains (0.40 noise powers) moves Cnβ by less than 0.02 %."
+    assert found.words == "Explained; what remains (0.0145° root mean square) moves Cnβ by less than 0.02 %."
     assert judged(study, 0.0, None).words.startswith(
-        "Explained; what remains (0.40 noise powers) concerns no"
+        "Explained; what remains (0.0145° root mean square) concerns no"
     )
 
 
