@@ -90,7 +90,9 @@ def compared(name: str, folder: Path, trees: list[Path], turns: int) -> list[str
 def main() -> None:
     """Measure all jobs and print a table."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m benchmarks.speed",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("old", type=Path, metavar="OLD", help="a tree of the code before")
     parser.add_argument("new", type=Path, metavar="NEW", help="a tree of the code after")
