@@ -46,7 +46,7 @@ class Asked:
         physics: with the effects.
         effects: that act in each run.
         drawn: the random part of each of these effects.
-        zero: of the sensor, in the unit of the reading.
+        zero: of the sensor, in the unit of the reading, shape (n,).
         rod_followed: as in `Problem`.
     """
 
