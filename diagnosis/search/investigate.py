@@ -58,7 +58,7 @@ def investigate(
     def study(model: NominalModel) -> Study:
         clock = Clock(progress)
         prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
-        with clock.step("nominal fit"):
+        with clock.step("where" if test.detected else "nominal fit"):
             prepared = prepared.in_wider_blocks()
         if not test.detected:
             return Study(prepared, Gap(test), disturbed=disturbed, seconds=clock.seconds)

@@ -39,6 +39,6 @@ def test_a_view_of_ones_own_finds_the_cause_and_fits_it_to_whole_runs():
     assert found.chosen.problem.data is found.nominal.problem.data
     assert abs(found.chosen.excess) < 0.1
     other = found.of(["coulomb_friction"]).hypothesis.fit
-    assert max(run.reading.size for run in other.problem.data.runs) == 1000  # as it was weighed
+    assert max(run.fine.reading.size for run in other.problem.data.runs) == 1000  # as it was weighed
     assert len(steps) - len(set(steps)) == 0
     assert {"effects", "pruning", "polishing", "choices"} <= set(found.seconds)
