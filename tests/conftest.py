@@ -39,7 +39,7 @@ def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
     It changes neither causes nor coefficients, and has tests of its own (``test_closable.py``).
     """
-    from diagnosis import _diagnose
+    from diagnosis.remainder import ways
 
     for search in ("closable", "closable_driven"):
-        monkeypatch.setattr(_diagnose, search, lambda *_, **__: None)
+        monkeypatch.setattr(ways, search, lambda *_, **__: None)

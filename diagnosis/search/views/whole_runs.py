@@ -175,13 +175,18 @@ class WholeRuns(View):
 
         Args:
             likely: sets in runs that repeat, the likeliest first.
-            explained: the set that explains every run by itself, from which larger ones are grown; None: none does.
+            explained: the set that explains every run by itself, from which larger ones are grown; None: none, and
+                they are grown from scatter alone, as long as one explains the runs.
         """
         assert self.scattering is not None
-        view = replace(self, base=self.scattering, unscattered=self.base, first=explained)
         none = Hypothesis((), self.scattering, repeating=self.base)
+        view = replace(self, base=self.scattering, unscattered=self.base, first=explained or none)
+
+        def unexplained(level: Sequence[Hypothesis]) -> bool:
+            return any(one.effects for one in level) and not any(map(self._explains, level))
+
         with clock.step("effects"):
-            grown = [] if explained is None else grow(view, clock.progress)
+            grown = grow(view, clock.progress, unexplained)
             others = (self._beside(one) for one in likely)
             found = {one.names: one for one in (none, *others, *grown) if one is not None}
         return view.with_moments(Sets(view, tuple(found.values())), clock)

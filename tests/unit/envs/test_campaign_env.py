@@ -181,7 +181,7 @@ def test_a_diagnosis_finds_the_effect_that_was_given():
     env = make(**DIAGNOSIS, noise_std=0.002)
     env.reset(seed=0, options={"truth": TRUTH, "effects": {"cubic_stiffness": {"coefficient": 0.4}}})
     observation, reward, terminated, _, info = env.step(np.array([0, 0, 1, 0]))
-    assert info["answers"]["cubic_stiffness"] == observation["probabilities"][3] >= 0.9
+    assert info["answers"]["cubic_stiffness"] == observation["probabilities"][3] > 0.85
     assert terminated
     assert observation["probabilities"].sum() == pytest.approx(1.0)
     assert reward > 0.0
