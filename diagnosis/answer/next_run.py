@@ -69,10 +69,12 @@ def planned_run(
         duration: s.
     """
     template = fit.problem.data.runs[0].undriven()
+    blocks = round(duration / template.interval)
     return dataclasses.replace(
         template,
         id="next",
-        reading=np.zeros(round(duration / template.interval)),
+        reading=np.zeros(blocks),
+        shorter=None if template.shorter is None else np.zeros(blocks * template.merges),
         spring_stiffness=spring_stiffness,
         wind_speed=wind_speed,
         air_density=air_density if wind_speed > 0.0 else 0.0,

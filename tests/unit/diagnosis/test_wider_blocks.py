@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.next_run import planned_run, separation
 from diagnosis.likelihood.compression import compressed, in_shorter_blocks, slow
-from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.least_squares import Fit, fit, fit_at
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import nominal_start
@@ -129,3 +130,16 @@ def test_runs_that_wider_blocks_do_not_serve_stay_as_they_are(nominal: Fit) -> N
         ),
     ):
         assert compressed(other) is other
+
+
+def test_a_run_not_yet_made_is_predicted_in_the_shorter_blocks_too(nominal: Fit) -> None:
+    """Of effects on the reading, whose predictions are in shorter blocks."""
+    wider = compressed(nominal)
+    (kind,) = (effect_class("sensor_nonlinearity"),)
+    point = Point(np.append(wider.point.common, 0.2), wider.point.release)
+    seen = fit_at(Problem(wider.problem.data, (kind,)), point)
+    run = planned_run(wider, spring_stiffness=30.0, wind_speed=0.0, air_density=1.2, duration=4.0)
+    assert run.fine.reading.size == run.merges * run.reading.size
+    apart = separation(seen, wider, run, 0.3)
+    assert apart is not None
+    assert apart > 1.0
