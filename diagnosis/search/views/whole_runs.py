@@ -163,10 +163,15 @@ class WholeRuns(View):
         return replace(found, fit=settled(found.fit))
 
     def _explains(self, beside: Hypothesis) -> bool:
-        """Whether a set beside chance differences leaves no more within runs than chance and errors of form."""
+        """Whether a set beside chance differences leaves no more within runs than chance and an error of its form.
+
+        Such an error shows in the channels in which the cause does.
+        """
         weighing, gap = self.base.settings.weighing, self._scattering_gap
         by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * gap.count)
-        return bool(np.all(beside.excess < misfit_scale(gap, weighing, chance=by_chance)))
+        by_form = weighing.form_error**2 * np.maximum(gap.excess, 0.0)
+        error = np.minimum(by_form, weighing.model_error**2 * gap.motion)
+        return bool(np.all(beside.excess < by_chance + error))
 
     def _beside_scatter(
         self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock
