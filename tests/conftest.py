@@ -14,11 +14,6 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 
-def pytest_xdist_auto_num_workers() -> int:
-    """One process more than there are processors: tests of pages and of commands wait for other processes."""
-    return (os.cpu_count() or 1) + 1
-
-
 # A loaded machine may take a second over one example.
 settings.register_profile("without deadline", deadline=None)
 settings.load_profile("without deadline")
