@@ -77,7 +77,8 @@ CONTRASTS = """() => {
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
   for (let node = walker.nextNode(); node; node = walker.nextNode()) {
     const parent = node.parentElement;
-    if (!node.textContent.trim() || !parent.checkVisibility() || parent.closest("script, option")) continue;
+    const shown = parent.checkVisibility({ visibilityProperty: true, opacityProperty: true });
+    if (!node.textContent.trim() || !shown || parent.closest("script, option")) continue;
     const style = getComputedStyle(parent);
     const levels = [light(parent.closest("svg") ? style.fill : style.color), light(behind(parent))].sort();
     found.push([node.textContent, (Math.max(...levels) + 0.05) / (Math.min(...levels) + 0.05)]);
