@@ -158,7 +158,8 @@ class _Runs:
         stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
         inertia, damping, stiffness = linear_coefficients(self.fitted, index)
         table = SettingsTable.of([stated])
-        changes = np.concatenate([one.change(table, problem.data) for one in self.scatter])
+        # of its stiffness and its damping
+        changes = np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
         # a change of the run's own spring and damper is one of its frequency and its damping
         per = np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
         deviation = self.columns.deviations[index][:, pair]

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.model.parameters import Parameter, Prior
 from diagnosis.model.run_data import Data
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -64,10 +64,14 @@ class Chance:
         return replace(self, width=float(width))
 
     def change(self, stated: SettingsTable, data: Data) -> Array:
-        """What a relative deviation of 1 changes of stiffness (N m/rad) and damping (N m s/rad), shape (runs, 2).
+        """What a relative deviation of 1 changes.
 
         Args:
             stated: the nominal physics of the runs.
+
+        Returns:
+            Changes of stiffness, N m/rad, and damping, N m s/rad, and that of the wind speed as a share, shape
+            (runs, 3).
         """
         pressure, speed = data.air_moments(stated), stated.wind_speed
         rate = pressure * data.reference_length / np.where(speed > 0.0, speed, np.inf)
@@ -77,7 +81,7 @@ class Chance:
         return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
-_FOLLOWS_SPEED = "strouhal_number"
+_KEEPING_TIME = tuple(kind.keeps_time for kind in ALL_EFFECTS if kind.keeps_time)
 
 
 class RunDeparture(Effect):
@@ -89,9 +93,8 @@ class RunDeparture(Effect):
         """Add stiffness and damping, and change the wind's speed by a share; ``drawn`` in this order."""
         del stated
         stiffness, damping, faster = self.drawn_numbers(drawn)
-        followed = run.parameters.get(_FOLLOWS_SPEED, 0.0)
-        if followed and faster:
-            run = run.with_parameters({_FOLLOWS_SPEED: (1.0 + float(faster)) * followed})
+        given = ((name, run.parameters.get(name, 0.0)) for name in _KEEPING_TIME)
+        run = run.with_parameters({name: (1.0 + float(faster)) * value for name, value in given if value})
         return replace(
             run,
             spring_stiffness=max(run.spring_stiffness + float(stiffness), 0.0),
@@ -107,7 +110,8 @@ class RunDeparture(Effect):
         added = np.stack([effect.drawn_numbers(d) for effect, d in zip(effects, drawn, strict=True)])
         runs.spring_stiffness[:] = np.maximum(runs.spring_stiffness + added[:, 0], 0.0)
         runs["mechanical_damping"][:] += added[:, 1]
-        runs[_FOLLOWS_SPEED][:] *= 1.0 + added[:, 2]
+        for name in _KEEPING_TIME:
+            runs[name][:] *= 1.0 + added[:, 2]
 
 
 #: The chance differences of a fit.
@@ -126,6 +130,4 @@ def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTabl
         shape (runs, 3).
     """
     changes = np.stack([one.change(stated, data) for one in scatter])
-    linear = np.einsum("drk,rd->rk", changes, deviations)
-    of_speed = [one.kind.scatters == "wind_speed" for one in scatter]
-    return np.column_stack([linear, deviations[:, of_speed].sum(axis=1)])
+    return np.asarray(np.einsum("drk,rd->rk", changes, deviations), np.float64)

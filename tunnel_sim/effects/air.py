@@ -338,6 +338,7 @@ class VortexShedding(Effect):
     example = (0.1, 0.02)
     autonomous = False
     line = "shedding"
+    keeps_time = "strouhal_number"
     random = "narrow_band"
 
     amplitude: float = parameter(

@@ -74,6 +74,8 @@ class Effect:
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
+    - ``keeps_time``: the parameter of the moment law that gives a frequency in proportion to the wind speed; empty:
+      none.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
@@ -105,6 +107,7 @@ class Effect:
     driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
+    keeps_time: ClassVar[str] = ""
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""
@@ -218,7 +221,7 @@ class Effect:
     @classmethod
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float]:
+    ) -> tuple[Array | float, Array | float, float]:
         """What a relative deviation of 1 of the number that scatters changes of the runs' linear motions.
 
         Args:
@@ -228,10 +231,11 @@ class Effect:
             air_damping: Ca of the run, N m s/rad, shape (runs,).
 
         Returns:
-            Changes of the stiffness Kr − Ka, N m/rad, and of the damping Cr − Ca, N m s/rad.
+            Changes of the stiffness Kr − Ka, N m/rad, of the damping Cr − Ca, N m s/rad, and of the wind speed, a
+            share of it.
         """
         del spring, damping, air_stiffness, air_damping
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
 
     def plausible(self, omega: float) -> bool:
         """Whether a fitted effect is still what its name means.

@@ -70,10 +70,10 @@ class WindSpeedScatter(BetweenRuns):
     @classmethod
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float]:
+    ) -> tuple[Array | float, Array | float, float]:
         """Ka grows with V², and Ca with V."""
         del spring, damping
-        return -2.0 * air_stiffness, -air_damping
+        return -2.0 * air_stiffness, -air_damping, 1.0
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ class StiffnessScatter(BetweenRuns):
     @classmethod
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float]:
+    ) -> tuple[Array | float, Array | float, float]:
         """The spring's own."""
         del damping, air_stiffness, air_damping
-        return spring, 0.0
+        return spring, 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class DampingScatter(BetweenRuns):
     @classmethod
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float]:
+    ) -> tuple[Array | float, Array | float, float]:
         """The mechanical one's own."""
         del spring, air_stiffness, air_damping
-        return 0.0, damping
+        return 0.0, damping, 0.0

@@ -103,7 +103,7 @@ def test_vortices_keep_time_with_the_true_speed(monkeypatch: pytest.MonkeyPatch)
     followed = try_fit(start.problem, start.point)
     assert followed is not None
     assert followed.value("vortex_shedding.strouhal_number") == pytest.approx(STROUHAL, rel=3.0 * SCATTER)
-    monkeypatch.setattr(chance, "_FOLLOWS_SPEED", "gravity_angle")  # which is 0
+    monkeypatch.setattr(chance, "_KEEPING_TIME", ())
     stated = try_fit(start.problem, start.point)
     assert stated is not None
     assert followed.excess < 0.1 * stated.excess
