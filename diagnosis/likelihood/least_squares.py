@@ -218,11 +218,6 @@ class Fit:
         return self.problem.linear(self.point)
 
     @cached_property
-    def kept(self) -> dict[str, Any]:
-        """What other rooms derive from the fit once."""
-        return {}
-
-    @cached_property
     def columns(self) -> RunColumns:
         """The columns of a fit with chance differences between the runs."""
         return RunColumns.of(self.problem, self.point, self.residuals, self.jacobian)

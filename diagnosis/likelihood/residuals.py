@@ -12,6 +12,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -219,12 +220,20 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     )
 
 
+def gap_left(fit: Fit) -> ChannelMisfit:
+    """What sets are weighed against: what a fit leaves, with the cost of chance differences between its runs."""
+    return dataclasses.replace(misfit(fit), scatter_cost=fit.scatter_cost)
+
+
+#: Of every fit that is still in use. They depend on it alone, and its residuals are split many times.
+_KNOWN_CYCLES: WeakKeyDictionary[Fit, list[_Cycles]] = WeakKeyDictionary()
+
+
 def _cycles(fit: Fit) -> list[_Cycles]:
-    """What the channels of every run's residuals are counted in; it depends on the fit alone."""
-    known: list[_Cycles] = fit.kept.setdefault("cycles", [])
-    if not known:
-        known += [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
-    return known
+    """What the channels of every run's residuals are counted in."""
+    if fit not in _KNOWN_CYCLES:
+        _KNOWN_CYCLES[fit] = [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
+    return _KNOWN_CYCLES[fit]
 
 
 @dataclass(frozen=True, eq=False)

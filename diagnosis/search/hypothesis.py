@@ -87,11 +87,17 @@ class Hypothesis:
     @cached_property
     def explains_runs(self) -> bool:
         """Whether runs that differ by chance are explained, each by itself, down to what chance leaves."""
-        if not self.fit.problem.scatter:
-            return False
+        return bool(self.fit.problem.scatter) and self.leaves_within(np.zeros(len(CHANNELS)))
+
+    def leaves_within(self, error: Array) -> bool:
+        """Whether the set leaves no more in any channel than chance and an error do.
+
+        Args:
+            error: χ² by channel, shape (6,), dimensionless.
+        """
         found, weighing = misfit(self.fit), self.fit.settings.weighing
         by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * found.count)
-        return bool(np.all(found.excess < by_chance))
+        return bool(np.all(found.excess < by_chance + error))
 
     def fitted_set(self, nominal: Fit, *, outside: bool = False) -> FittedSet:
         """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves.

@@ -54,7 +54,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
         matrix = np.stack(scaled, axis=1)
         left = left - matrix @ np.linalg.lstsq(matrix, left, rcond=_RANK)[0]
     of_runs = sum(_closed_by_own_numbers(base, kind) for kind in kinds)
-    return max(float(left @ left) - base.count - of_runs, 0.0) / (base.excess * base.count)
+    return max(float(left @ left) - base.count - of_runs, 0.0) / (base.gap * base.count)
 
 
 def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.likelihood.residuals import ChannelMisfit, gap_left
 from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import grow, same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
@@ -53,7 +53,7 @@ class View:
     @cached_property
     def gap(self) -> ChannelMisfit:
         """What the nominal model leaves in the view, by channel."""
-        return replace(misfit(self.base), scatter_cost=self.base.scatter_cost)
+        return gap_left(self.base)
 
     @cached_property
     def left_by_read_off(self) -> Array:

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.likelihood.residuals import ChannelMisfit, gap_left, misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.model.chance import Scatter
 from diagnosis.search.clock import Clock
@@ -79,7 +79,7 @@ class WholeRuns(View):
     def _scattering_gap(self) -> ChannelMisfit:
         """What the nominal model leaves of runs that differ by chance, by channel."""
         assert self.scattering is not None
-        return replace(misfit(self.scattering), scatter_cost=self.scattering.scatter_cost)
+        return gap_left(self.scattering)
 
     def on(self, base: Fit) -> Self:
         """The same view of runs with other noise, in which all sets are grown."""
@@ -103,9 +103,8 @@ class WholeRuns(View):
         beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
-            beyond.extend(
-                self._beyond_reach(level)
-            )  # with deviations of every run, so nothing beside them is tried
+            # this allows deviations of every run, so nothing beside them is tried
+            beyond.extend(self._beyond_reach(level))
             tried = () if beyond else (self._beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
             return bool(explained or beyond)
@@ -168,10 +167,8 @@ class WholeRuns(View):
         Such an error shows in the channels in which the cause does.
         """
         weighing, gap = self.base.settings.weighing, self._scattering_gap
-        by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * gap.count)
         by_form = weighing.form_error**2 * np.maximum(gap.excess, 0.0)
-        error = np.minimum(by_form, weighing.model_error**2 * gap.motion)
-        return bool(np.all(beside.excess < by_chance + error))
+        return beside.leaves_within(np.minimum(by_form, weighing.model_error**2 * gap.motion))
 
     def _beside_scatter(
         self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock
