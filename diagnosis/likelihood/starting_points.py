@@ -111,7 +111,7 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class _TrialChange:
     """A trial of an effect at a moderate size.
 
     Args:
@@ -130,7 +130,7 @@ class _Tried:
     change: list[Array]
 
 
-def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _Tried | None:
+def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | None:
     """A trial at a moderate size; None where it changes the prediction without bound."""
     problem = _tried(base, kind, trial)
     own = _own_parameters(problem, kind)
@@ -139,7 +139,7 @@ def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _Tried | None:
     names = base.problem.names
     replaced = names.index(trial.replaces) if trial.replaces in names else None
     change = _moderate_change(base, problem, sizes, scaled, replaced, second_order=trial.second_order)
-    return None if change is None else _Tried(problem, own, sizes, scaled, replaced, change)
+    return None if change is None else _TrialChange(problem, own, sizes, scaled, replaced, change)
 
 
 def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:

@@ -384,24 +384,20 @@ class Data:
         """Whether any run of the campaign has the wind on."""
         return self.model.windy
 
+    @property
+    def _sizes(self) -> dict[str, float]:
+        return {"frontal_area": self.frontal_area, "reference_length": self.reference_length}
+
     def air_moment(self, run: RunData | RunSettings) -> float:
         """The air's yaw moment on the model for a moment coefficient of 1, ½ρV²·A·l, N m."""
         return aerodynamic_stiffness(
-            1.0,
-            air_density=run.air_density,
-            wind_speed=run.wind_speed,
-            frontal_area=self.frontal_area,
-            reference_length=self.reference_length,
+            1.0, air_density=run.air_density, wind_speed=run.wind_speed, **self._sizes
         )
 
     def air_moments(self, runs: SettingsTable) -> Array:
         """The same of several runs, N m, shape (runs,)."""
         return aerodynamic_stiffness(
-            1.0,
-            air_density=runs.air_density,
-            wind_speed=runs.wind_speed,
-            frontal_area=self.frontal_area,
-            reference_length=self.reference_length,
+            1.0, air_density=runs.air_density, wind_speed=runs.wind_speed, **self._sizes
         )
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:

@@ -105,7 +105,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     ),
     "beyond reach": lambda given: (
         f"By linear theory all known effects together would leave {share(given['left'])} of the gap or more, so "
-        "only single ones and pairs were tried."
+        "no larger sets of effects were tried."
     ),
     "remainder not sought": "What could be closed of what remains, and by which formula, is not sought where "
     "nothing holds a driven body: every small error of a moment adds up in its angle.",
