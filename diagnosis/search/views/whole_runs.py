@@ -27,7 +27,7 @@ from diagnosis.search.scatter import (
     with_deviations,
     without_deviations,
 )
-from diagnosis.search.sets import Sets
+from diagnosis.search.sets import Sets, prune
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import OF_MOTION, UNKNOWN, log_misfit, misfit_scale
 
@@ -105,7 +105,7 @@ class WholeRuns(View):
         def enough(level: Sequence[Hypothesis]) -> bool:
             # this allows deviations of every run, so nothing beside them is tried
             beyond.extend(self._beyond_reach(level))
-            tried = () if beyond else (self._beside(one) for one in level)
+            tried = () if beyond else (self.beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
             return bool(explained or beyond)
 
@@ -116,8 +116,7 @@ class WholeRuns(View):
                 : self.base.settings.search.beside_scatter
             ]
         if explained:
-            scale = Scale.of(explained, self._scattering_gap, self.base.settings.weighing)
-            return self._beside_scatter(likely, max(explained, key=scale.weight), clock)
+            return self._beside_scatter(likely, self.likeliest_part(explained), clock)
         found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
         plain = self.with_moments(found, clock)
         if plain.weighed[0].effects != UNKNOWN or beyond or self.scattering is None:
@@ -136,7 +135,7 @@ class WholeRuns(View):
         left = left_by_all(self.base, self.able, self.prepared.kinds)
         return [left] if left > chosen.out_of_reach else []
 
-    def _beside(self, one: Hypothesis) -> Hypothesis | None:
+    def beside(self, one: Hypothesis) -> Hypothesis | None:
         """A set beside chance differences between the runs, its forms free where the runs need that.
 
         None where the runs do not differ, or the fit fails.
@@ -160,6 +159,25 @@ class WholeRuns(View):
         if not found.explains_runs:
             (found,) = with_forms([found], self._scattering_gap, 0.0)
         return replace(found, fit=settled(found.fit))
+
+    def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
+        """The likeliest of the sets that explain every run by itself and of their parts that do.
+
+        In runs that repeat, a set often holds an effect that does what differences between the runs do.
+        """
+        found, weighing = {one.names: one for one in explained}, self.base.settings.weighing
+        while True:
+            scale = Scale.of(tuple(found.values()), self._scattering_gap, weighing)
+            best = max(found.values(), key=scale.weight)
+            with_less = prune(best, tuple(found.values())) if len(best.effects) > 1 else []
+            parts = [part for one in with_less if self._explains(part := self._settled_beside(one))]
+            if not parts:
+                return best
+            found |= {part.names: part for part in parts}
+
+    def _settled_beside(self, part: Hypothesis) -> Hypothesis:
+        """A part of a set beside chance differences between the runs, with the widths that it needs itself."""
+        return replace(part, fit=settled(part.fit), repeating=try_fit(*without_deviations(part.fit)))
 
     def _explains(self, beside: Hypothesis) -> bool:
         """Whether a set beside chance differences leaves no more within runs than chance and an error of its form.
@@ -189,7 +207,7 @@ class WholeRuns(View):
 
         with clock.step("effects"):
             grown = grow(view, clock.progress, unexplained)
-            others = (self._beside(one) for one in likely)
+            others = (self.beside(one) for one in likely)
             found = {one.names: one for one in (none, *others, *grown) if one is not None}
         return view.with_moments(Sets(view, tuple(found.values())), clock)
 

@@ -11,7 +11,11 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.answer.next_run import separation
-from diagnosis.search.investigate import investigate
+from diagnosis.search.clock import Clock
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.search.views.whole_runs import WholeRuns
+from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
     Repeatability,
@@ -83,6 +87,19 @@ def test_scatter_hides_no_cause() -> None:
     size = found.candidates[0].parameters["cubic_stiffness.coefficient"]
     assert size.std is not None
     assert abs(size.value - 0.1) < 4.0 * size.std
+
+
+def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
+    """In runs that repeat a wrong spring explains some of the differences; beside them it explains nothing."""
+    cubic, spring = effect_class("cubic_stiffness"), effect_class("spring_miscalibration")
+    view = WholeRuns.after(nominal_study(campaign(cubic=0.1), FEW).prepared, None, Clock())
+    assert view is not None
+    (alone,) = sets_with_one_more([view.smallest], [cubic])
+    (both,) = sets_with_one_more([alone], [spring])
+    beside = view.beside(both)
+    assert beside is not None
+    assert beside.effects == ("cubic_stiffness", "spring_miscalibration")
+    assert view.likeliest_part([beside]).effects == ("cubic_stiffness",)
 
 
 def test_runs_that_repeat_show_none() -> None:
