@@ -60,6 +60,11 @@ def coefficient_label(name: str, unit: str) -> str:
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
+def in_degrees(angle: float, digits: int = 2) -> str:
+    """An angle in rad as people read it, such as ``5.2°``."""
+    return f"{significant(math.degrees(angle), digits)}°"
+
+
 def significant(value: float, digits: int = 4) -> str:
     """A number whose uncertainty is not known, in fixed notation where that is short.
 

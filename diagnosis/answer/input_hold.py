@@ -44,11 +44,8 @@ def other_hold(study: Study) -> OtherHold | None:
     chance = chdtri(1.0, study.settings.words.hold_rate) * (1.0 + max(fit.excess, 0.0))
     if fitted.unlikelihood - fit.unlikelihood > chance:
         return None
-    delay, half = (
-        f"{DELAY.name}.{DELAY.parameters()[0].name}",
-        0.5 * study.campaign.runs[0].record.sample_interval,
-    )
-    own = study.similarity.own
+    delay, own = f"{DELAY.name}.{DELAY.parameters()[0].name}", study.similarity.own
+    half = 0.5 * float(np.median([run.record.sample_interval for run in study.campaign.runs]))
     return OtherHold(
         delay_s=own(fit.value(delay), "s"),
         half_sample_s=own(half, "s"),

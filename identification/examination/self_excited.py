@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from identification import policy
-from identification.printing import significant
+from identification.printing import in_degrees, significant
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.free_decay import envelope_amplitude
 from identification.signal.frequency import PencilDecay, pencil_decay, starting_frequency, thinned_reading
@@ -177,7 +177,7 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
         length = float(np.ptp(windows.time))
         amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
         what = (
-            f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
+            f"steady oscillation with the wind on, self-excited or forced: {in_degrees(amplitude)} at "
             f"{significant(frequency, 3)} Hz for {length * frequency:.0f} cycles (its amplitude changes by "
             f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
             "which has no damping ratio"
@@ -275,11 +275,9 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     at = float(amplitude[int(np.argmax(windows.growth_rate[:settled]))])
     last = _last(amplitude)
     said = f"at up to {grown:.2g} 1/s" if rate is None else f"at {rate:.2g} ± {std:.1g} 1/s"
-    end = (
-        f"reaches {significant(last, 2)} rad" if settled is None else f"settles at {significant(last, 2)} rad"
-    )
+    end = f"reaches {in_degrees(last)}" if settled is None else f"settles at {in_degrees(last)}"
     if rate is not None and grown > rate + policy.MISFIT_DEVIATIONS * (std or 0.0):
-        said += f" (at most {grown:.2g} 1/s, at {significant(at, 2)} rad)"
+        said += f" (at most {grown:.2g} 1/s, at {in_degrees(at)})"
     if settled is None:
         outcome, remedy = Outcome.NOTED, "its damping is negative as long as the growth is linear"
     elif part is None:
@@ -291,7 +289,7 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     return Remark(
         outcome,
         (run.id,),
-        f"self-excited: grows {said} from {significant(float(amplitude[shown.start]), 2)} rad, {end}; "
+        f"self-excited: grows {said} from {in_degrees(float(amplitude[shown.start]))}, {end}; "
         f"frequency {significant(float(np.median(frequency[shown][:3])), 3)} → "
         f"{significant(float(np.median(frequency[-3:])), 3)} Hz",
         remedy,

@@ -156,7 +156,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
             (
                 "number",
                 "named where not stated",
-                "named falsely",
+                "of those named, falsely",
                 "within a factor of 1.5",
                 "in the 90 % interval",
             ),

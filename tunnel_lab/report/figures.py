@@ -5,13 +5,14 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from itertools import pairwise
+from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis.settings import settings_of
 from diagnosis.words.answers import ranked
-from diagnosis.words.numbers import excess_std, plain, probability
+from diagnosis.words.numbers import excess_std, plain, probability, unit_shown
 from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
@@ -63,7 +64,12 @@ _BEFORE_ZERO = 0.03  # of the axis: a mark at zero is clear of the labels
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
-_AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the start [s]"}
+#: By what a law is over: the label of its axis, and the factor on places in radians or seconds.
+_AXES = {
+    "angle": ("angle [°]", degrees(1.0)),
+    "rate": ("rate [°/s]", degrees(1.0)),
+    "time": ("time since the start [s]", 1.0),
+}
 
 
 def diagnosis_figures(document: Document) -> dict[str, Figure]:
@@ -311,14 +317,17 @@ def law_figure(document: Document) -> Figure | None:
     if curve is None:
         return None
     shape = [len(axis) for axis in curve["places"]]
-    values, std = (np.reshape(curve[name], shape) for name in ("values", "std"))
-    unit = curve["unit"] if curve["unit"] in ("rad", "N m") else "rad/s²"
-    name = f"{'error of the reading' if unit == 'rad' else 'missing moment'} [{unit}]"
+    moment = curve["unit"] == "N m"
+    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve["unit"] == "rad" else "rad/s2")
+    values, std = (factor * np.reshape(curve[name], shape) for name in ("values", "std"))
+    name = f"{'error of the reading' if curve['unit'] == 'rad' else 'missing moment'} [{unit}]"
+    (label, *others), scales = zip(*(_AXES[axis] for axis in curve["over"]), strict=True)
+    places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve["places"], strict=True)]
     fig = figure(NARROW, 3.2)
     axes = fig.add_subplot()
-    axes.set_xlabel(_AXES[curve["over"][0]])
+    axes.set_xlabel(label)
     if len(shape) == 1:
-        (place,), band = curve["places"], INTERVAL * std
+        (place,), band = places, INTERVAL * std
         axes.fill_between(place, values - band, values + band, color=AFTER, alpha=0.25, lw=0)
         axes.plot(place, values, color=AFTER)
         axes.set_ylabel(name)
@@ -327,9 +336,7 @@ def law_figure(document: Document) -> Figure | None:
     reach = float(np.max(np.abs(values))) or 1.0
     shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
     colours = faded(AFTER, BEFORE)
-    mesh = axes.pcolormesh(
-        *curve["places"], shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest"
-    )
-    axes.set_ylabel(_AXES[curve["over"][1]])
+    mesh = axes.pcolormesh(*places, shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest")
+    axes.set_ylabel(*others)
     fig.colorbar(mesh, ax=axes, label=name)
     return fig
