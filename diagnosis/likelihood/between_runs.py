@@ -13,6 +13,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from diagnosis.likelihood.problem import Problem
@@ -32,7 +33,10 @@ from tunnel_sim.vocabulary.record import Array
 _APART = 1e-4
 _NARROWER = 0.3  # factor on widths from which their maxima are sought
 _USUAL = UsualWidths()
+_COMPARED = 2.0  # standard deviation from within runs alone, over that with their comparison
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
+
+Kept = NDArray[np.bool_]
 
 
 def width_prior(problem: Problem) -> WidthPrior:
@@ -156,7 +160,8 @@ class Between:
         widths: relative, shape (kinds,).
         found: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
-        most: the same where the runs may differ most, so that all is known from what happens within runs.
+        most: the deviations integrated out where the runs may differ most, so that all is known from what happens
+            within runs.
     """
 
     widths: Array
@@ -175,21 +180,32 @@ class Between:
         return self.found.restricted + self.prior_cost
 
     @property
-    def cost(self) -> float:
+    def compared(self) -> Kept:
+        """Which common parameters are known by the comparison of runs, shape (common,).
+
+        Of these the runs that may differ most say at most half as much: the standard deviation is twice as large.
+        """
+        alone, found = np.diag(self.most.covariance), np.diag(self.found.covariance)
+        return np.asarray(alone > _COMPARED**2 * found, np.bool_)
+
+    def cost(self, known: Array) -> float:
         """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much.
 
-        Deviations, and parameters that only the comparison of runs determines, are integrated out over what
-        greatest widths allow. Otherwise an effect that makes a few runs agree by chance would shrink their width
-        to nothing, and vortices, whose phase shows the speed of a run, would pay for that knowledge.
-        """
-        away = float(np.sum((self.found.deviations / self.widths) ** 2))
-        own = self.found.log_determinant - self.most.log_determinant
-        return own + away + self.prior_cost + self.found.log_information - self.most.log_information
+        It is that of the deviations found, were they known as well as the runs show them under one model for all
+        sets, up to a constant; runs that repeat exactly have 0. Otherwise vortices, whose phase shows the speed of
+        a run, would pay or be paid for that knowledge. Common parameters that only the comparison of runs
+        determines are integrated out over what greatest widths allow: else an effect that makes a few runs agree
+        by chance would shrink their width to nothing.
 
-    @property
-    def repeating_cost(self) -> float:
-        """The same of runs that repeat exactly, without what their common parameters take."""
-        return -self.most.log_determinant
+        Args:
+            known: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
+        """
+        one = np.eye(self.widths.size)
+        scaled = one + self.widths[None, :, None] * known * self.widths
+        away = self.found.deviations / self.widths
+        seen = np.einsum("rk,rkl,rl->", away, one - np.linalg.inv(scaled), away)
+        width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
+        return width + self.prior_cost + self.found.log_information - self.most.log_information
 
 
 def _orthonormal(columns: Array) -> Array:

@@ -234,15 +234,24 @@ class Fit:
             return None
         return self.columns.likeliest(width_prior(self.problem), self.widths)
 
-    @property
-    def scatter_cost(self) -> float:
-        """−2 ln of the evidence of the chance differences between the runs, beside χ²; 0 without any."""
-        return 0.0 if self.between is None else self.between.cost
+    def scatter_cost(self, known: Array) -> float:
+        """−2 ln of the evidence of the chance differences between the runs, beside χ²; 0 without any.
+
+        Args:
+            known: how well the runs show them, as `Between.cost` has it.
+        """
+        return 0.0 if self.between is None else self.between.cost(known)
 
     @property
-    def repeating_cost(self) -> float:
-        """The same of runs that repeat exactly: the least that it may be."""
-        return 0.0 if self.between is None else self.between.repeating_cost
+    def compared(self) -> int:
+        """How many effects chance differences between the runs could do: they are known by comparison of runs."""
+        if self.between is None:
+            return 0
+        rows = list(zip(self.problem.names, self.between.compared.tolist(), strict=True))
+        of_effects = (
+            [seen for name, seen in rows if name.split(".")[0] == kind.name] for kind in self.problem.effects
+        )
+        return sum(bool(own) and all(own) for own in of_effects)
 
     @property
     def unlikelihood(self) -> float:

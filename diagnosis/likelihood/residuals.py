@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -188,6 +188,7 @@ class ChannelMisfit:
         motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
         scatter_cost: −2 ln of the evidence of chance differences between runs that it takes, dimensionless; 0 where
             they repeat.
+        known: how well the runs show these differences, as `Between.cost` has it, shape (runs, kinds, kinds).
         repeats: whether the runs of the fit repeat exactly.
     """
 
@@ -195,6 +196,7 @@ class ChannelMisfit:
     count: Array
     motion: float
     scatter_cost: float = 0.0
+    known: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     repeats: bool = True
 
     @property
@@ -222,7 +224,10 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
 
 def gap_left(fit: Fit) -> ChannelMisfit:
     """What sets are weighed against: what a fit leaves, with the cost of chance differences between its runs."""
-    return dataclasses.replace(misfit(fit), scatter_cost=fit.scatter_cost)
+    if not fit.problem.scatter:
+        return misfit(fit)
+    known = fit.columns.products.own
+    return dataclasses.replace(misfit(fit), scatter_cost=fit.scatter_cost(known), known=known)
 
 
 #: Of every fit that is still in use. They depend on it alone, and its residuals are split many times.

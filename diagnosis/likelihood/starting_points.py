@@ -12,7 +12,7 @@ from diagnosis.likelihood.between_runs import Between, width_prior
 from diagnosis.likelihood.least_squares import Fit, Products, clip, damped_step, normal_equations
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, misfit
+from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit
 from diagnosis.model.chance import Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
@@ -106,7 +106,7 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     point = Point(np.concatenate([base.point.common, values]), release)
     predicted = misfit(base).excess
     predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
-    cost = base.scatter_cost
+    cost = gap_left(base).scatter_cost
     return StartingPoint(problem, point, one.drop, predicted, base.point.common.size, scatter_cost=cost)
 
 
@@ -235,7 +235,7 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
         between.likelihood - beside.likelihood,
         columns.left(beside.found),
         tuple(one.as_wide_as(width) for one, width in zip(base.problem.scatter, beside.widths, strict=True)),
-        beside.cost,
+        beside.cost(base.columns.products.own),
     )
 
 

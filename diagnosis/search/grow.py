@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.likelihood.residuals import ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, of_more_weight, own_gain, turned_back
@@ -127,7 +127,7 @@ def sets_with_one_more(
             if best is not None:
                 best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
                 child = Hypothesis((*parent.effects, kind.name), best)
-                found[child.names] = of_more_weight(found.get(child.names), child, misfit(base))
+                found[child.names] = of_more_weight(found.get(child.names), child, gap_left(base))
     return list(found.values())
 
 

@@ -99,15 +99,21 @@ class Hypothesis:
         by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * found.count)
         return bool(np.all(found.excess < by_chance + error))
 
-    def fitted_set(self, nominal: Fit, *, outside: bool = False) -> FittedSet:
-        """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves.
+    def fitted_set(self, nominal: Fit, gap: ChannelMisfit, *, outside: bool = False) -> FittedSet:
+        """What the weighing needs to know of it.
 
         What instants and phases of the runs gain by chance counts as left.
+
+        Args:
+            nominal: of whose gap the share is.
+            gap: what the set is weighed against.
+            outside: as `FittedSet` has it.
         """
         by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
-        cost = self.fit.scatter_cost
-        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost)
+        cost = self.fit.scatter_cost(gap.known)
+        compared = self.fit.compared
+        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost, compared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,22 +125,24 @@ class Scale:
         least: χ² by channel, shape (6,), 0 or less.
         chosen: how sets are weighed.
         scatter_cost: of the nominal model, as `ChannelMisfit` has it, dimensionless.
+        known: as `ChannelMisfit` has it, shape (runs, kinds, kinds).
     """
 
     misfit: Array
     least: Array
     chosen: WeighingSettings
-    scatter_cost: float = 0.0
+    scatter_cost: float
+    known: Array
 
     @classmethod
     def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit, chosen: WeighingSettings) -> Scale:
         """The scale of some sets, from what the nominal model leaves."""
         least = least_excess([h.excess for h in sets])
-        return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost)
+        return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost, gap.known)
 
     def weight(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of a set."""
-        cost = hypothesis.fit.scatter_cost
+        cost = hypothesis.fit.scatter_cost(self.known)
         return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
@@ -143,13 +151,14 @@ class Scale:
         Args:
             repeating: whether the runs then repeat, too; else they differ by chance as much as before.
         """
-        fitted = hypothesis.fit
-        cost = fitted.repeating_cost if repeating else fitted.scatter_cost
+        cost = 0.0 if repeating else hypothesis.fit.scatter_cost(self.known)
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def form_may_gain(self, hypothesis: Hypothesis) -> bool:
         """Whether the weight of a set would rise with one more form that leaves nothing."""
-        return self._log_weight(np.zeros(6), hypothesis, numbers=1) > self.weight(hypothesis)
+        cost = hypothesis.fit.scatter_cost(self.known)
+        best = self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
+        return best > self.weight(hypothesis)
 
     def _log_weight(
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
@@ -157,7 +166,7 @@ class Scale:
         """Logarithm of the weight of a set with so many more effects and numbers that leaves ``left``."""
         count, further = len(of.effects) + effects, of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
-        return log_weight(left, self.misfit, count, further, self.chosen, costs)
+        return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.compared)
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:

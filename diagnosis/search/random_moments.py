@@ -19,7 +19,7 @@ from scipy.special import fdtrc
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
 from diagnosis.likelihood.paths import COMMON
-from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
+from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
@@ -107,8 +107,9 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
             excess = abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)
             names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
             share, by_channel = excess / view.repeating.gap, excess / nominal.gap * view.gap.excess
-            cost = seen.fit.scatter_cost
-            left = FittedSet(names, share, by_channel, seen.further_numbers, scatter_cost=cost)
+            cost = seen.fit.scatter_cost(scale.known)
+            numbers, compared = seen.further_numbers, seen.fit.compared
+            left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
             return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
     return []
 
@@ -157,8 +158,9 @@ def _may_act(best: Hypothesis, scale: Scale) -> bool:
         return False
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
     count, chosen = len(best.effects) + 1, best.fit.settings.moment
-    costs = best.fit.scatter_cost, scale.scatter_cost
-    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen, costs) > scale.weight(best):
+    costs = best.fit.scatter_cost(scale.known), scale.scatter_cost
+    numbers, compared = best.further_numbers, best.fit.compared
+    if log_weight(still, scale.misfit, count, numbers, scale.chosen, costs, compared) > scale.weight(best):
         return True
     process = likeliest(random_moments(best.fit), chosen)
     return process is not None and is_steady_noise(process, chosen)
@@ -273,7 +275,7 @@ def _settled(best: Hypothesis, view: View) -> Hypothesis:
                 break
             base = fit(replace(nominal.problem, data=noisy), nominal.point)
             sets = [Hypothesis((), base), *grow(view.on(base))]
-            found = max(sets, key=Scale.of(sets, misfit(base), base.settings.weighing).weight)
+            found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap in the wind for effects to be compared there: more are added
             # while one of the wind is evident, the most evident of all, so that none mops up what another leaves
             top = _sought_again(found)

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
+from diagnosis.likelihood.between_runs import Between, Kept, RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
@@ -31,8 +30,6 @@ _FEWEST = 3  # runs that may differ: one difference gives a width to within a fa
 _IN_ORDER = 5  # runs that show an order
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
-
-Kept = NDArray[np.bool_]
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:

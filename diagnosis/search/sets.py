@@ -57,12 +57,11 @@ class Sets:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
         sets = [self._fitted_set(one) for one in self.hypotheses]
-        sets += [
-            h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses
-        ]
+        outside = (one for rival in self.rivals for one in rival.hypotheses)
+        sets += [one.fitted_set(self.view.repeating, nominal, outside=True) for one in outside]
         sets += [answer.left for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
-            sets.append(FittedSet((), 1.0, nominal.excess))
+            sets.append(FittedSet((), 1.0, nominal.excess, scatter_cost=nominal.scatter_cost))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
         own = self.view.left_by_read_off
         whole = None if self.view.repeating is base else misfit(self.view.repeating)
@@ -75,10 +74,11 @@ class Sets:
         What follows the order of the runs is no scatter and no effect of the vocabulary; it costs as much as one.
         """
         drift = None if one.effects else drifting(one.fit)
-        found = one.fitted_set(self.view.repeating, outside=drift is not None)
+        found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
         if drift is None:
             return found
-        return replace(found, scatter_cost=drift.cost + 2.0 * one.fit.settings.weighing.set_price)
+        cost = drift.cost(self.view.gap.known) + 2.0 * one.fit.settings.weighing.set_price
+        return replace(found, scatter_cost=cost)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
         """The set of these effects; None where they were not fitted together."""

@@ -50,6 +50,7 @@ class FittedSet:
         numbers: how many it has beside its own: freed forms and instants, less two where gravity replaces a spring.
         outside: whether it is from outside the vocabulary: what is probable of it is probable of ``unknown``.
         scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, dimensionless.
+        compared: how many of the effects are known by the comparison of runs.
     """
 
     effects: tuple[str, ...]
@@ -58,6 +59,7 @@ class FittedSet:
     numbers: int = 0
     outside: bool = False
     scatter_cost: float = 0.0
+    compared: int = 0
 
 
 def weigh(
@@ -88,7 +90,13 @@ def weigh(
     logs = np.array(
         [
             log_weight(
-                s.excess - least, scale, len(key), s.numbers, chosen, (s.scatter_cost, nominal.scatter_cost)
+                s.excess - least,
+                scale,
+                len(key),
+                s.numbers,
+                chosen,
+                (s.scatter_cost, nominal.scatter_cost),
+                s.compared,
             )
             for key, s in best.items()
         ]
@@ -174,6 +182,7 @@ def log_weight(
     numbers: int,
     chosen: WeighingSettings,
     scatter_cost: tuple[float, float] = (0.0, 0.0),
+    compared: int = 0,
 ) -> float:
     """Logarithm of the weight of a set among all sets.
 
@@ -184,9 +193,10 @@ def log_weight(
         numbers: how many it has beside their own.
         scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, and that the
             nominal model takes. What needless effects may lower it by does not count.
+        compared: how many effects could lower it: those known by the comparison of runs.
     """
     own, nominal = scatter_cost
-    cost = min(own + chosen.needless_scatter * effects, max(own, nominal))
+    cost = min(own + chosen.needless_scatter * compared, max(own, nominal))
     price = chosen.set_price * effects + chosen.form_price * numbers + 0.5 * chosen.scatter_exponent * cost
     return -chosen.steepness * log_misfit(left, scale, OF_MOTION, chosen.leak) - price
 

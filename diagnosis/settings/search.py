@@ -312,7 +312,7 @@ class WeighingSettings:
     )
     needless_scatter: float = setting(
         4.0,
-        "−2 ln of that evidence by which a needless effect may lower it.",
+        "−2 ln of that evidence by which a needless effect that is known by the comparison of runs may lower it.",
         "estimated",
         "With the price of an effect it is 10. In 36 campaigns whose runs differ by chance alone, the best of all "
         "effects lowered it by 7.3 at most, and by more than 5 in five of them. The tail falls by e for every 2: "

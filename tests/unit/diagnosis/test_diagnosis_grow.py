@@ -102,7 +102,9 @@ def test_a_set_of_three_is_found(of_three):
     assert max(len(h.effects) for h in ranked) == 3 < Settings().search.most_causes
     assert any(line.count(" + ") == 2 for line in steps)
     assert (
-        weigh([h.fitted_set(base) for h in ranked], misfit(base), Settings().weighing)[0].effects
+        weigh([h.fitted_set(base, misfit(base)) for h in ranked], misfit(base), Settings().weighing)[
+            0
+        ].effects
         == three.names
     )
 
@@ -124,7 +126,7 @@ def left(*effects, damping):
         excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]),
         further_numbers=0,
         explains_runs=False,
-        fit=SimpleNamespace(settings=Settings(), scatter_cost=0.0, repeating_cost=0.0),
+        fit=SimpleNamespace(settings=Settings(), scatter_cost=lambda _: 0.0, compared=0),
     )
 
 
