@@ -71,6 +71,7 @@ class Effect:
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
+    - ``delays``: whether it shifts the input of driven runs in time.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
@@ -105,6 +106,7 @@ class Effect:
     on_spring: ClassVar[bool] = False
     parts: ClassVar[bool] = False
     driven: ClassVar[bool] = False
+    delays: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""

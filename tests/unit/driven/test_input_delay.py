@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
-DELAY = the_effect(driven=True)
+DELAY = the_effect(delays=True)
 FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness", "rod_flexibility", "sensor_drift"])
 
 
