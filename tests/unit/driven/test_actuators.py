@@ -1,0 +1,190 @@
+"""What an actuator makes of an input. The truth is its equation, integrated by SciPy or in very short steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tunnel_reference.conditions import Actuator as Reference
+from tunnel_reference.inputs import exerted, finer
+from tunnel_sim.effects import EffectChain, effect_from
+from tunnel_sim.engine.effect_laws import DRIVE, WIND_ON
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.actuator import Actuator, Samples
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import DriveMoment
+
+STEP = 0.01
+TIME = STEP * np.arange(40)
+UNEVEN = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 40)) * STEP
+VALUES = np.random.default_rng(4).standard_normal(40)
+SQUARE = np.sign(np.sin(np.arange(40.0)))
+NULL = {"actuator_lag": "lag", "actuator_saturation": "limit", "actuator_rate_limit": "rate"}
+
+
+def at(given: Samples, time: np.ndarray) -> np.ndarray:
+    """The value of samples at times."""
+    if given.held:
+        return given.values[np.maximum(np.searchsorted(given.time_s, time, side="right") - 1, 0)]
+    return np.interp(time, given.time_s, given.values)
+
+
+each_input = pytest.mark.parametrize(
+    "values", [VALUES, np.cumsum(VALUES), SQUARE], ids=["noise", "walk", "square"]
+)
+each_hold = pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
+each_clock = pytest.mark.parametrize("time", [TIME, UNEVEN], ids=["even", "uneven"])
+
+
+@each_input
+@each_hold
+@each_clock
+@pytest.mark.parametrize("rate", [10.0, 60.0, 300.0, 3e4])
+def test_a_rate_limit_follows_its_equation(
+    values: np.ndarray, held: bool, time: np.ndarray, rate: float
+) -> None:
+    asked, short = Samples(time, values, held), 2e-5
+    fine = np.arange(time[0], time[-1], short)
+    wanted = at(asked, fine + 0.5 * short)
+    exact = np.empty_like(fine)
+    exact[0] = values[0]
+    for k in range(1, fine.size):
+        exact[k] = exact[k - 1] + np.clip(wanted[k - 1] - exact[k - 1], -rate * short, rate * short)
+    found = asked.at_rate(rate)
+    assert np.all(np.diff(found.time_s) > 0.0)
+    away = np.abs(at(found, fine) - exact)
+    steepest = 0.0 if held else float(np.max(np.abs(np.diff(values)) / np.diff(time)))
+    if rate > 1e3:  # a jump then lasts for a few of the short steps, which miss its instant by one
+        away = away[np.min(np.abs(fine[:, None] - time), axis=1) > 2.0 * short + np.ptp(values) / rate]
+    # every corner is missed by a short step, and what is missed adds up until the input is reached
+    assert np.max(away) < 10.0 * short * (min(rate, 1e3) + steepest)
+
+
+@each_input
+@each_hold
+@each_clock
+@pytest.mark.parametrize("limit", [0.3, 0.9, 2.0])
+def test_a_greatest_moment_clips_at_every_time(
+    values: np.ndarray, held: bool, time: np.ndarray, limit: float
+) -> None:
+    asked, fine = Samples(time, values, held), np.linspace(time[0], time[-1], 5001)
+    assert at(asked.clipped(limit), fine) == pytest.approx(np.clip(at(asked, fine), -limit, limit), abs=1e-9)
+
+
+@pytest.mark.parametrize("limited", [{"limit": 4.0}, {"rate": 1e6}, {}])
+def test_a_limit_that_is_not_reached_changes_no_bit(limited: dict[str, float]) -> None:
+    asked = Samples(TIME, VALUES, held=False)
+    assert Actuator(**limited).exerted(asked, 1.0) is asked
+
+
+@each_hold
+@pytest.mark.parametrize("lag", [2e-3, 0.02, 0.5])
+def test_a_lagged_rig_moves_as_scipy_says(held: bool, lag: float) -> None:
+    """An input that is white from sample to sample, 40 samples in a period of 0.4 s."""
+    run = replace(WIND_ON, duration=0.35, drive=DriveMoment(TIME, 3.0 * VALUES, held=held))
+    chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
+    found = forward_motion(load_rig(), chain.physics(), 1000.0)
+    asked, law = Samples(TIME, 3.0 * VALUES, held), run.law(load_rig())
+    flow = load_rig().body.flow(run.air_density, run.wind_speed)
+    pressure = (
+        0.5 * flow["air_density"] * flow["wind_speed"] * flow["frontal_area"] * flow["reference_length"]
+    )
+    stiffness = law["spring_stiffness"] - pressure * flow["wind_speed"] * law["cn_beta"]
+    damping = law["mechanical_damping"] - pressure * flow["reference_length"] * law["cn_r"]
+    state, exact = np.array([run.release_angle, 0.0, 3.0 * VALUES[0]]), []
+    for k in range(35):
+        seen = found.time_s[(found.time_s >= TIME[k] - 1e-9) & (found.time_s < TIME[k + 1] - 1e-9)]
+
+        def slope(t: float, y: np.ndarray, k: int = k) -> list[float]:
+            part = 0.0 if held else (t - TIME[k]) / STEP
+            wanted = asked.values[k] + part * (asked.values[k + 1] - asked.values[k])
+            return [
+                y[1],
+                (y[2] - stiffness * y[0] - damping * y[1]) / law["yaw_inertia"],
+                (wanted - y[2]) / lag,
+            ]
+
+        part = solve_ivp(
+            slope,
+            (TIME[k], TIME[k + 1]),
+            state,
+            "DOP853",
+            np.append(seen, TIME[k + 1]),
+            rtol=1e-9,
+            atol=1e-11,
+        )
+        exact.append(part.y[0, :-1])
+        state = part.y[:, -1]
+    moved = np.concatenate(exact)
+    # a line for an exponential leaves a third moment in every interval: most where the lag is a fifth of one
+    assert np.max(np.abs(found.angle[: moved.size] - moved)) < 1.5e-4
+
+
+@each_hold
+@pytest.mark.parametrize("lag", [2e-3, 4e-3, 0.02])
+def test_the_line_that_takes_the_place_of_an_exponential_is_of_third_order(held: bool, lag: float) -> None:
+    """The same input in more and more intervals: half of one leaves an eighth of the error."""
+    angles = []
+    for parts in (1, 2, 8):
+        times = np.linspace(0.0, TIME[-1], parts * (TIME.size - 1) + 1)
+        values = at(Samples(TIME, 3.0 * VALUES, held), times + (1e-9 if held else 0.0))
+        run = replace(WIND_ON, duration=0.35, drive=DriveMoment(times, values, held=held))
+        chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
+        angles.append(forward_motion(load_rig(), chain.physics(), 1000.0).angle)
+    coarse, finer_one = (float(np.max(np.abs(angle - angles[-1]))) for angle in angles[:-1])
+    assert coarse > 5.0 * finer_one > 0.0
+
+
+@each_hold
+def test_a_motion_is_continuous_where_the_lag_vanishes(held: bool) -> None:
+    run = replace(WIND_ON, duration=0.35, drive=DriveMoment(TIME, 3.0 * VALUES, held=held))
+    angles = [
+        forward_motion(
+            load_rig(),
+            EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,)).physics(),
+            1000.0,
+        ).angle
+        for lag in (0.0, 1e-7)
+    ]
+    assert np.max(np.abs(angles[1] - angles[0])) < 1e-6
+
+
+@each_hold
+@pytest.mark.parametrize(
+    "actuator", [Actuator(limit=0.8), Actuator(rate=60.0), Actuator(lag=0.02), Actuator(0.8, 60.0, 0.02)],
+    ids=["saturation", "rate limit", "lag", "all"],
+)  # fmt: skip
+def test_the_reference_simulator_agrees(actuator: Actuator, held: bool) -> None:
+    holds = np.array([held])
+    other = Reference(
+        actuator.limit or np.inf, rate=actuator.rate or np.inf, lags=(actuator.lag,) if actuator.lag else ()
+    )
+    short = STEP / 64
+    expected, _ = exerted(finer(finer(VALUES[:, None], holds), holds), other, short, holds)
+    found = actuator.exerted(Samples(TIME, VALUES, held), 1.0)
+    time = short * np.arange(len(expected))
+    until = time < TIME[-1] - STEP
+    means = np.abs(np.cumsum(at(found, time + 0.5 * short) - expected[:, 0])[until]) * short
+    assert np.max(means) < 5e-4  # N m s, where one interval asks for 1e-2
+
+
+@pytest.mark.parametrize("name", NULL)
+def test_a_constant_moment_beside_the_input_does_not_pass_through_the_actuator(name: str) -> None:
+    run = replace(WIND_ON, drive=replace(DRIVE, offset=50.0))
+    effect = effect_from(name, {NULL[name]: 2.0})
+    acting = EffectChain(run, (effect,), (None,)).physics().drive
+    plain = EffectChain(replace(run, drive=DRIVE), (effect,), (None,)).physics().drive
+    assert acting is not None
+    assert plain is not None
+    assert acting.acting.values == pytest.approx(plain.acting.values + 50.0)
+
+
+@pytest.mark.parametrize("name", NULL)
+def test_a_moving_root_has_no_actuator(name: str) -> None:
+    run = replace(WIND_ON, drive=replace(DRIVE, on_body=False))
+    chain = EffectChain(run, (effect_from(name, {NULL[name]: 0.1}),), (None,))
+    assert chain.physics().drive.acting.values is not None
+    assert np.array_equal(chain.physics().drive.acting.values, DRIVE.values)
