@@ -72,6 +72,7 @@ class Effect:
     - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
     - ``delays``: whether it shifts the input of driven runs in time.
+    - ``of_moment``: whether it changes an input that is a moment on the body, not the motion of a spring's root.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
@@ -107,6 +108,7 @@ class Effect:
     parts: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     delays: ClassVar[bool] = False
+    of_moment: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""

@@ -30,6 +30,7 @@ class _OfActuator(Effect):
     condition = "always"
     autonomous = False
     driven = True
+    of_moment = True
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the actuator; a free decay has none."""
@@ -62,8 +63,7 @@ class ActuatorSaturation(_OfActuator):
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """Limits below the greatest moment that any run asks for."""
-        greatest = campaign.greatest_moment
-        return [Trial({"limit": share * greatest}, None) for share in _LIMITS if greatest]
+        return [Trial({"limit": share * campaign.greatest_moment}, None) for share in _LIMITS]
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,7 @@ class ActuatorRateLimit(_OfActuator):
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """Rates below the greatest one that any run asks for."""
-        fastest = campaign.fastest_moment
-        return [Trial({"rate": share * fastest}, None) for share in _RATES if fastest]
+        return [Trial({"rate": share * campaign.fastest_moment}, None) for share in _RATES]
 
 
 @dataclass(frozen=True)
@@ -114,8 +113,3 @@ class ActuatorLag(_OfActuator):
         "τ", "s", "time constant of the lag",
         scale=0.002, lower=0.0, upper=10.0, fit_upper=1.0,
     )  # fmt: skip
-
-    @classmethod
-    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Its usual size, where a moment moves the body."""
-        return super().trials(campaign) if campaign.greatest_moment else ()

@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from diagnosis import diagnose, vocabulary
+from diagnosis.diagnosable import kinds_for
+from diagnosis.model.rig import Rig
+from tests.marks import slow
+from tests.unit.driven.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, RATE, SPRING, campaign
 from tunnel_reference.conditions import Actuator as Reference
 from tunnel_reference.inputs import exerted, finer
-from tunnel_sim.effects import EffectChain, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_class, effect_from
 from tunnel_sim.engine.effect_laws import DRIVE, WIND_ON
+from tunnel_sim.engine.virtual_campaign import plan_effects
+from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.actuator import Actuator, Samples
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import EffectSetting
+from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
 
 STEP = 0.01
 TIME = STEP * np.arange(40)
@@ -188,3 +203,68 @@ def test_a_moving_root_has_no_actuator(name: str) -> None:
     chain = EffectChain(run, (effect_from(name, {NULL[name]: 0.1}),), (None,))
     assert chain.physics().drive.acting.values is not None
     assert np.array_equal(chain.physics().drive.acting.values, DRIVE.values)
+
+
+def test_a_campaign_tries_them_where_a_moment_moves_the_body() -> None:
+    driven = campaign()
+    free = replace(driven, runs=tuple(replace(run, drive=None) for run in driven.runs))
+    by_root = replace(
+        driven, runs=tuple(replace(run, drive=replace(run.drive, column="base_rad")) for run in driven.runs)
+    )
+    own = {effect_class(name) for name in NULL}
+    assert own <= set(kinds_for(driven, ALL_EFFECTS, Rig())[0])
+    for other in (free, by_root):
+        assert not own & set(kinds_for(other, ALL_EFFECTS, Rig())[0])
+
+
+def test_a_plan_whose_drive_moves_the_root_refuses_them_in_one_line() -> None:
+    drive = Drive("base_rad", np.sin(np.arange(100.0)))
+    plan = paper_plan()
+    plan = replace(
+        plan,
+        conditions=tuple(replace(one, drive=drive) for one in plan.conditions),
+        effects=(EffectSetting("actuator_lag", {"lag": 0.01}),),
+    )
+    with pytest.raises(TunnelError, match="here the drive moves the spring's root") as caught:
+        plan_effects(plan)
+    assert "\n" not in str(caught.value)
+
+
+KINDS = vocabulary([*NULL, DELAY.name])
+
+
+def through(**actuator: Any) -> Campaign:
+    """The campaign with its moment through an actuator of the reference simulator, and the input as asked for."""
+    found, runs = campaign(), []
+    linear = np.array([False])
+    for run in found.runs:
+        assert run.drive is not None
+        time = run.record.time_s
+        moment, _ = exerted(
+            finer(run.drive.values[:, None], linear), Reference(**actuator), 0.125 / RATE, linear
+        )
+        acting = DriveMoment(0.125 / RATE * np.arange(len(moment)), moment[:, 0])
+        settings = replace(
+            WIND_ON, wind_speed=0.0, spring_stiffness=SPRING, yaw_inertia=INERTIA, mechanical_damping=DAMPING,
+            release_angle=0.02, duration=time.size / RATE, drive=acting,
+        )  # fmt: skip
+        moved = forward_motion(load_rig(), settings, RATE).angle
+        noise = NOISE * np.random.default_rng([7, len(runs)]).standard_normal(time.size)
+        runs.append(replace(run, record=Record(time, moved + noise)))
+    return replace(found, runs=tuple(runs))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("actuator_lag", 0.03), slow("actuator_saturation", 0.6), slow("actuator_rate_limit", 8.0)],
+)
+def test_each_is_named_with_its_value(name: str, value: float) -> None:
+    """The lag is 0.4 of the reciprocal of the resonance's angular frequency, where it is not a delay."""
+    found = diagnose(
+        through(**{"lags": (value,)} if name == "actuator_lag" else {NULL[name]: value}), kinds=KINDS
+    )
+    assert found.causes == (name,)
+    own = found.candidates[0].parameters[NULL[name]]
+    assert own.std is not None
+    assert abs(own.value - value) < 4.0 * own.std < 0.02 * value
+    assert found.gap.closed > 0.99
