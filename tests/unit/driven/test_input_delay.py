@@ -115,7 +115,7 @@ def test_it_is_left_out_without_a_word_where_no_run_is_driven() -> None:
     driven = campaign()
     free = replace(driven, runs=tuple(replace(run, drive=None) for run in driven.runs))
     assert kinds_for(free, ALL_EFFECTS, Rig()) == (
-        tuple(kind for kind in ALL_EFFECTS if kind is not DELAY),
+        tuple(kind for kind in ALL_EFFECTS if not kind.driven),
         (),
     )
     assert DELAY in kinds_for(driven, ALL_EFFECTS, Rig())[0]
