@@ -145,7 +145,7 @@ def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | Non
 
 
 def _within(infos: Sequence[ParameterInfo], values: Array) -> bool:
-    """Whether values are such as parameters may have: of an arm that turns over the top an effect may want others."""
+    """Whether parameters may have such values: of an arm that turns over the top an effect may want others."""
     return all(info.lower <= value <= info.upper for info, value in zip(infos, values, strict=True))
 
 
