@@ -35,6 +35,7 @@ from diagnosis.words.numbers import (
     unit_shown,
     windy,
 )
+from diagnosis.words.own_model import model_step, model_words
 from diagnosis.words.scatter import (
     BETWEEN_RUNS,
     named_answer,
@@ -98,6 +99,7 @@ def verdict(document: Document, rest: str) -> str:
         _answer(document, rest),
         _choices(document),
         hold_words(document),
+        model_words(document),
         *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
@@ -394,6 +396,8 @@ def next_steps(document: Document) -> list[str]:
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         words = f"Make the run that distinguishes the answers: {run_words(run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
+    if step := model_step(document):
+        steps.append(f"{step}.")
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):
