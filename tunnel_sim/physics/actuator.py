@@ -19,7 +19,7 @@ _SERIES = 0.01  # interval over time constant, below which a series is more exac
 _FIRST_LOOK = 32  # intervals in which the end of a ramp is looked for first
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """An input at increasing times: constant from each to the next, or linear between them.
 
@@ -90,10 +90,13 @@ class Samples:
         return type(self)(both, given[first], False)
 
     def lagged(self, lag: float) -> Self:
-        """Followed with a lag of first order, in s.
+        """Followed with a lag of first order.
 
         In every interval the response is a line and an exponential; the line with the same impulse and the same
         first moment takes the place of the exponential.
+
+        Args:
+            lag: time constant, s.
         """
         if lag == 0.0 or self.time_s.size < 2:
             return self
