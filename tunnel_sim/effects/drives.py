@@ -16,6 +16,8 @@ from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.physics.run_settings import RunSettings
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
+_SLOW = 0.03
+"""Least ωτ of a lag: the gain of a faster one falls by (ωτ)²/2, less than half a thousandth, and it is a delay."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.3)
 """Greatest moments that are tried, over the greatest one asked for."""
 _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
@@ -113,3 +115,7 @@ class ActuatorLag(_OfActuator):
         "τ", "s", "time constant of the lag",
         scale=0.002, lower=0.0, upper=10.0, fit_upper=1.0,
     )  # fmt: skip
+
+    def plausible(self, omega: float) -> bool:
+        """Whether it is more than a delay of the input to the motion: as slow as `_SLOW`."""
+        return self.lag * omega > _SLOW

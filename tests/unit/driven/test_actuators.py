@@ -268,3 +268,9 @@ def test_each_is_named_with_its_value(name: str, value: float) -> None:
     assert own.std is not None
     assert abs(own.value - value) < 4.0 * own.std < 0.02 * value
     assert found.gap.closed > 0.99
+
+
+@pytest.mark.parametrize(("lag", "named"), [(0.001, False), (0.004, True)])
+def test_a_lag_far_faster_than_the_motion_is_a_delay(lag: float, named: bool) -> None:
+    """The gain of the first falls by 1e-4 at a resonance of 2 Hz, that of the second by 1.3e-3."""
+    assert effect_from("actuator_lag", {"lag": lag}).plausible(4.0 * np.pi) == named
