@@ -17,7 +17,9 @@ from tests.unit.driven.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, R
 from tunnel_reference.conditions import Actuator as Reference
 from tunnel_reference.inputs import exerted, finer
 from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_class, effect_from
-from tunnel_sim.engine.effect_laws import DRIVE, WIND_ON
+from tunnel_sim.engine.effect_laws import DRIVE, INTEGRATION_TOLERANCE, WIND_ON
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -274,3 +276,19 @@ def test_each_is_named_with_its_value(name: str, value: float) -> None:
 def test_a_lag_far_faster_than_the_motion_is_a_delay(lag: float, named: bool) -> None:
     """The gain of the first falls by 1e-4 at a resonance of 2 Hz, that of the second by 1.3e-3."""
     assert effect_from("actuator_lag", {"lag": lag}).plausible(4.0 * np.pi) == named
+
+
+@each_hold
+@pytest.mark.parametrize("name", NULL)
+def test_mujoco_agrees_in_second_order(name: str, held: bool) -> None:
+    """MuJoCo's model has the mean of the moment over each step, as of a delayed input."""
+    value = {"actuator_lag": 0.02, "actuator_saturation": 0.6, "actuator_rate_limit": 3.0}[name]
+    run = replace(WIND_ON, drive=replace(DRIVE, held=held))
+    physics = EffectChain(run, (effect_from(name, {NULL[name]: value}),), (None,)).physics()
+    expected = forward_motion(load_rig(), physics, 100.0).angle
+    away = [
+        float(np.max(np.abs(simulate_motion(build_model(load_rig(), one), 100.0).angle - expected)))
+        for one in (physics, replace(physics, timestep=5e-4))
+    ]
+    assert away[0] < INTEGRATION_TOLERANCE
+    assert away[1] < 0.3 * away[0] or away[0] < 1e-9  # clipped and held, it has its kinks at the steps

@@ -118,6 +118,6 @@ def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
     kind = the_effect(delays=True)
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
-    assert found.fault.endswith("actuator_lag does")  # of small ones, linear theory tells no delay from a lag
-    assert list(found.cosines.values())[1] < 0.5
+    # of small ones, linear theory tells no delay from a lag
+    assert found.fault == "it moves the rig as actuator_lag does"
     assert "12 simulated driven runs" in found.lines()[0]
