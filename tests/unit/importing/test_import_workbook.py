@@ -91,6 +91,7 @@ def test_a_cover_sheet_speaks_of_all_runs(tmp_path: Path, cover: Rows) -> None:
     found = read_records([book(tmp_path, {"Deckblatt": cover, "A": None, "B": None})])
     assert conditions(found) == [(name, pytest.approx(15.0), 44.84, 1.196) for name in ("A", "B")]
     np.testing.assert_allclose(found.campaign.runs[0].record.yaw_rad, ANGLE, atol=1e-12)
+    assert not any("holds text" in note for note in found.said)
 
 
 def test_a_row_comes_before_the_cover(tmp_path: Path) -> None:
