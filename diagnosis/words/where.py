@@ -133,7 +133,8 @@ def _places(where: Mapping[str, Any], place: Mapping[str, Any]) -> list[str]:
     if "time_s" in found:
         places.append("between {:.1f} and {:.1f} s of the record".format(*found["time_s"]))
     if "amplitude_rad" in found:
-        places.append("at amplitudes from {:.2g}° to {:.2g}°".format(*map(degrees, found["amplitude_rad"])))
+        least, most = (f"{float(f'{degrees(one):.2g}'):g}" for one in found["amplitude_rad"])
+        places.append(f"at amplitudes from {least}° to {most}°")
     if "frequency_hz" in found:
         places.append("at {:.2f} to {:.2f} Hz".format(*found["frequency_hz"]))
     return places
