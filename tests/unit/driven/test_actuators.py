@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
 from diagnosis.model.rig import Rig
 from tests.marks import slow
+from tests.reference.robot_joints import GEAR, robot, robot_campaign
 from tests.unit.driven.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, RATE, SPRING, campaign
+from tests.unit.driven.test_robot_joints import TRUE, own_model
 from tunnel_reference.conditions import Actuator as Reference
 from tunnel_reference.inputs import exerted, finer
 from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_class, effect_from
@@ -292,3 +295,28 @@ def test_mujoco_agrees_in_second_order(name: str, held: bool) -> None:
     ]
     assert away[0] < INTEGRATION_TOLERANCE
     assert away[1] < 0.3 * away[0] or away[0] < 1e-9  # clipped and held, it has its kinks at the steps
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "truth", "actuator", "step"),
+    [
+        ("actuator_lag", 0.03, '<general {} dyntype="filterexact" dynprm="0.03"/>', 1e-3),
+        ("actuator_saturation", 0.15 * GEAR, '<motor {} forcerange="-0.15 0.15"/>', 0.0),
+    ],
+)
+def test_mujocos_own_actuators_are_named_and_the_patched_joint_moves_as_they_do(
+    tmp_path: Path, name: str, truth: float, actuator: str, step: float
+) -> None:
+    """The truth is simulated by MuJoCo with its filter and its range of forces, within one step of which it acts."""
+    motor = actuator.format(f'name="motor" joint="elbow" gear="{GEAR:g}"')
+    data = robot_campaign(robot(TRUE, actuators=motor))
+    kinds = vocabulary([*NULL, DELAY.name, "coulomb_friction", "quadratic_damping"])
+    found = diagnose(data, kinds=kinds, model=own_model(tmp_path, data, robot()))
+    assert found.causes == (name,)
+    own = found.candidates[0].parameters[NULL[name]]
+    assert own.std is not None
+    assert abs(own.value - truth) < step + 3.0 * own.std
+    assert found.model is not None
+    assert found.model.closure.native_closed > 0.999
+    assert any("The actuator is not part of the model" in note for note in found.model.notes)
