@@ -308,7 +308,7 @@ def test_mujoco_agrees_in_second_order(name: str, held: bool) -> None:
 def test_mujocos_own_actuators_are_named_and_the_patched_joint_moves_as_they_do(
     tmp_path: Path, name: str, truth: float, actuator: str, step: float
 ) -> None:
-    """The truth is simulated by MuJoCo with its filter and its range of forces, within one step of which it acts."""
+    """MuJoCo simulates the truth with its filter, which acts within one step, or its range of forces."""
     motor = actuator.format(f'name="motor" joint="elbow" gear="{GEAR:g}"')
     data = robot_campaign(robot(TRUE, actuators=motor))
     kinds = vocabulary([*NULL, DELAY.name, "coulomb_friction", "quadratic_damping"])
