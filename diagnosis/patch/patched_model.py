@@ -142,7 +142,8 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
         "soft friction": bool(physics.parameters.get("friction_moment")),
         "presliding": bool(physics.parameters.get("presliding")),
         "rod": physics.rod_twist is not None,
-        "delayed input": any(kind.driven for kind in problem.effects),
+        "delayed input": any(kind.delays for kind in problem.effects),
+        "actuator": any(kind.driven and not kind.delays for kind in problem.effects),
         "air": problem.data.wind_on,
     }
     found = [Fact(kind) for kind, left in left_out.items() if left]
@@ -274,14 +275,11 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
     measured = change.own(blocks * run.interval, "s")
     start, given = _start(problem, own, index), chain.physics().drive
     if given is not None:  # without the constant moment, which is written into the model
-        bare = run.moment(1.0)
-        assert bare is not None
+        acting = replace(given, offset=0.0).acting
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
         lead = problem.data.model.lead  # the engine has its own
-        times, delay = given.time_s * seconds, (given.delay + lead) * seconds
-        start = replace(
-            start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)
-        )
+        times, delay = acting.time_s * seconds, (given.delay + lead) * seconds
+        start = replace(start, drive=replace(acting, time_s=times, scale=scale, delay=delay))
     motion = simulate(common, start, measured)
     scaled = Motion(
         motion.time_s * change.similar(1.0, "s"), motion.angle, motion.rate * change.similar(1.0, "rad/s")

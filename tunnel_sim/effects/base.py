@@ -71,6 +71,8 @@ class Effect:
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
+    - ``delays``: whether it shifts the input of driven runs in time.
+    - ``of_moment``: whether it changes an input that is a moment on the body, not the motion of a spring's root.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
@@ -105,6 +107,8 @@ class Effect:
     on_spring: ClassVar[bool] = False
     parts: ClassVar[bool] = False
     driven: ClassVar[bool] = False
+    delays: ClassVar[bool] = False
+    of_moment: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""

@@ -160,12 +160,16 @@ class Circumstances:
     Args:
         greatest_reading: greatest absolute reading of any run, rad.
         slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
+        greatest_moment: that an input asks for, N m, by the fit without the effect; 0 where none moves the body.
+        fastest_moment: greatest rate of change that an input asks for, N m/s, from sample to sample.
     """
 
     springs: tuple[float, ...]
     greatest_reading: float
     normalised: bool
     slowest_wind: float
+    greatest_moment: float = 0.0
+    fastest_moment: float = 0.0
 
 
 @dataclass(frozen=True)
