@@ -27,7 +27,7 @@ class Problem:
     Args:
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
-        free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
+        free_forms: form parameters that are free, as ``effect.parameter``; the others keep the textbook form.
         instants: how many instants every run has for an effect that skips samples.
         scatter: chance differences between runs beside the effects; each run has a deviation of its own of each.
         rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
@@ -51,7 +51,7 @@ class Problem:
         for kind in self.effects:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
-                free = not info.of_input and (not info.form or kind.name in self.free_forms)
+                free = not info.of_input and (not info.form or name in self.free_forms)
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))

@@ -274,6 +274,15 @@ class SpringMiscalibration(Effect):
         runs.spring_stiffness[concerned] *= 1.0 + cls.column(effects, "error")[concerned]
 
 
+_CONTACT = {  # parameters of the moment law by those of the friction's forms
+    "presliding": "presliding",
+    "friction_exponent": "exponent",
+    "friction_saturation": "saturation",
+    "friction_peak": "peak",
+    "friction_peak_rate": "peak_rate",
+}
+
+
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
     """Dry friction in the rod's bearing and potentiometer.
@@ -281,6 +290,10 @@ class CoulombFriction(Effect):
     With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
     doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
     2 Tc/zs is the stiffness just after the sliding reverses.
+
+    Sliding friction depends on the rate in three ways: it rises as a power less than one, it saturates, or it has a
+    peak near rest (Armstrong-Hélouvry et al. 1994). All of them leave the friction less than proportional to the
+    rate, which separates the family from damping.
     """
 
     name = "coulomb_friction"
@@ -290,7 +303,8 @@ class CoulombFriction(Effect):
     size = "dry friction of {friction_moment}"
     advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (
-        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
+        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general forms: −Tc z/zs, ż = β̇ − |β̇| z/zs; "
+        "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc"
     )
     signature = (
         "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
@@ -299,10 +313,13 @@ class CoulombFriction(Effect):
     references = (
         "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
         "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
+        "Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994) 1083, doi 10.1016/0005-1098(94)90209-7",
     )
     example = (0.05,)
 
-    friction_moment: float = parameter("Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4)
+    friction_moment: float = parameter(
+        "Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4, rate_exponent="exponent"
+    )
     presliding: float = parameter(
         "zs",
         "rad",
@@ -313,18 +330,41 @@ class CoulombFriction(Effect):
         fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
         form=True,
     )
+    exponent: float = parameter(
+        "n", "1", "power of the rate in the moment (unchanged at 2 rad/s)",
+        scale=0.4, lower=0.0, upper=0.9, form=True, exponent=True,
+    )  # fmt: skip
+    saturation: float = parameter(
+        "v0", "rad/s", "rate at which the friction has risen to 76 %; 0: no rise",
+        scale=0.1, lower=0.0, upper=10.0, fit_lower=2e-3, form=True,
+    )  # fmt: skip
+    peak: float = parameter(
+        "b", "1", "friction near rest over that of fast sliding, less one",
+        scale=1.0, lower=0.0, upper=9.0, form=True,
+    )  # fmt: skip
+    peak_rate: float = parameter(
+        "vs", "rad/s", "rate at which 37 % of the peak remains",
+        scale=0.1, lower=1e-3, upper=10.0, fit_lower=0.01, default=0.2, form=True,
+    )  # fmt: skip
+
+    @classmethod
+    def forms(cls) -> tuple[tuple[str, ...], ...]:
+        """The contact's deflection, and each dependence on the rate."""
+        return ("presliding",), ("exponent",), ("saturation",), ("peak", "peak_rate")
 
     def stands(self, stiffness: float) -> float:
         """The angle at which the spring's moment is that of the friction, rad."""
         return self.friction_moment / stiffness if stiffness > 0.0 else 0.0
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the terms of the moment law, with steps short enough to resolve the presliding range."""
+        """Set the terms of the moment law, with steps short enough to resolve the contact."""
         del stated, drawn
-        sliding = run.with_parameters({"friction_moment": self.friction_moment})
-        if self.is_null or self.presliding == 0.0:
-            return sliding
-        return steps.for_contact(sliding.with_parameters({"presliding": self.presliding}))
+        law = {"friction_moment": self.friction_moment}
+        if not self.is_null:
+            law |= {term: value for term, own in _CONTACT.items() if (value := getattr(self, own)) != 0.0}
+            if self.peak == 0.0:
+                del law["friction_peak_rate"]
+        return steps.for_contact(run.with_parameters(law))
 
     @classmethod
     def on_rows(
@@ -334,7 +374,9 @@ class CoulombFriction(Effect):
         del stated, drawn
         friction = cls.column(effects, "friction_moment")
         runs["friction_moment"][:] = friction
-        runs["presliding"][:] = np.where(friction != 0.0, cls.column(effects, "presliding"), 0.0)
+        for term, own in _CONTACT.items():
+            runs[term][:] = np.where(friction != 0.0, cls.column(effects, own), 0.0)
+        runs["friction_peak_rate"][runs["friction_peak"] == 0.0] = 0.0
 
 
 @dataclass(frozen=True)
@@ -357,7 +399,9 @@ class QuadraticDamping(Effect):
         "C2", "N m s2/rad2", "coefficient of the squared rate",
         scale=0.002, lower=-1e4, upper=1e4, fit_lower=0.0, rate_exponent="exponent",
     )  # fmt: skip
-    exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
+    exponent: float = exponent(
+        "n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0, fit_lower=1.0
+    )  # a lower power is dry friction
 
 
 _AFTER_EFFECT = parse("size*log((t + lead)/length)", frozenset({"size", "t", "lead", "length"}))

@@ -119,15 +119,16 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
-def exponent(symbol: str, meaning: str, textbook: float) -> Any:
+def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float | None = None) -> Any:
     """A form parameter that is the exponent of a term; its default is the textbook's.
 
     Args:
         textbook: exponent of the textbook form, dimensionless.
+        fit_lower: least value a fit may take; None: the least that is allowed.
     """
     return parameter(
-        symbol, "1", meaning,
-        scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True, exponent=True,
+        symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True,
+        exponent=True, fit_lower=fit_lower,
     )  # fmt: skip
 
 

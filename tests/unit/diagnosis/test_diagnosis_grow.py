@@ -250,7 +250,7 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
         whole.effects, fit(replace(whole.fit.problem, free_forms=()), textbook_point(whole.fit))
     )
     (freed,) = with_forms([kept], misfit(base), 0.0)
-    assert freed.fit.problem.free_forms == ("asymmetric_stiffness",)
+    assert freed.fit.problem.free_forms == ("asymmetric_stiffness.exponent",)
     assert freed.textbook is kept.fit
     assert within_noise(freed.fit)
 
