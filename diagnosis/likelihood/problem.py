@@ -20,6 +20,9 @@ from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 
+_BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What is fitted: prepared runs, and the effects added to the nominal model.
@@ -137,14 +140,15 @@ class Problem:
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.
 
-        In rad; infinite where the motion grows without bound, or a parameter is not finite.
+        In rad; infinite where the motion grows without bound, or a parameter is not finite or an initial state
+        beyond any motion.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
         places = [
             (i, int(r))
             for i, point in enumerate(points)
             if np.all(np.isfinite(point.common))
-            for r in np.flatnonzero(np.all(np.isfinite(point.release), axis=1))
+            for r in np.flatnonzero(np.all(np.abs(point.release) < _BEYOND, axis=1))
         ]
         if places:
             for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):

@@ -190,17 +190,18 @@ def is_plausible(fitted: Fit) -> bool:
     """Whether every effect of a fit is still what its name means, in enough of the runs.
 
     Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
-    Neither is a power law whose free exponent ends at a bound: the readings ask for another law.
+    Neither is a power law whose free exponent ends at a bound, nor friction whose rate does: the readings ask for
+    another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     chosen = fitted.settings.search
     spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
     if spring is not None and -gravity > chosen.gravity_cancels * spring:
         return False
-    exponents = [
-        f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent
+    inside = [
+        f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.inside
     ]
-    if any(name in problem.names and fitted.bound(name) for name in exponents):
+    if any(name in problem.names and fitted.bound(name) for name in inside):
         return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(

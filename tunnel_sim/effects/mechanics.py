@@ -274,6 +274,7 @@ class SpringMiscalibration(Effect):
         runs.spring_stiffness[concerned] *= 1.0 + cls.column(effects, "error")[concerned]
 
 
+_LOW_RATE = 1.0  # rad/s: at 2 rad/s any form of the friction is within 4 % of Tc; beyond, it would follow damping
 _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "presliding": "presliding",
     "friction_exponent": "exponent",
@@ -332,11 +333,12 @@ class CoulombFriction(Effect):
     )
     exponent: float = parameter(
         "n", "1", "power of the rate in the moment (unchanged at 2 rad/s)",
-        scale=0.4, lower=0.0, upper=0.9, form=True, exponent=True,
+        scale=0.4, lower=0.0, upper=0.9, form=True, inside=True,
     )  # fmt: skip
     saturation: float = parameter(
         "v0", "rad/s", "rate at which the friction has risen to 76 %; 0: no rise",
-        scale=0.1, lower=0.0, upper=10.0, fit_lower=2e-3, form=True,
+        scale=0.1, lower=0.0, upper=10.0, fit_lower=2e-3, fit_upper=_LOW_RATE,
+        form=True, inside=True,
     )  # fmt: skip
     peak: float = parameter(
         "b", "1", "friction near rest over that of fast sliding, less one",
@@ -344,7 +346,8 @@ class CoulombFriction(Effect):
     )  # fmt: skip
     peak_rate: float = parameter(
         "vs", "rad/s", "rate at which 37 % of the peak remains",
-        scale=0.1, lower=1e-3, upper=10.0, fit_lower=0.01, default=0.2, form=True,
+        scale=0.1, lower=1e-3, upper=10.0, fit_lower=0.01, fit_upper=_LOW_RATE, default=0.2,
+        form=True, inside=True,
     )  # fmt: skip
 
     @classmethod
