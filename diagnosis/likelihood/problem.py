@@ -19,7 +19,6 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
-
 _BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
 
 
