@@ -267,8 +267,8 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
 )
 def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
     """One form of several, at its own values."""
-    friction = effect_from("coulomb_friction", {"friction_moment": 0.005, **form})
-    base = nominal(campaign(friction))
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.008, **form})
+    base = nominal(gap_campaigns.campaign(friction))
     (lead,) = starting_points(base, type(friction))
     textbook = Hypothesis(("coulomb_friction",), fit(lead.problem, lead.point, base=base))
     assert not within_noise(textbook.fit)
