@@ -399,6 +399,8 @@ class _State:
     def __init__(self, problem: Problem, point: Point) -> None:
         self.problem = problem
         self.here = _Place.of(problem, point)
+        if not np.isfinite(self.here.cost):
+            raise FitError("the model's motion grows without bound")
         self.damping = 1e-6
         self.jacobian: list[tuple[Array, Array]] = []
         self.products: Products | None = None
@@ -474,7 +476,7 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    with np.errstate(invalid="ignore"):  # a run that grew without bound; its cost is infinite
+    with np.errstate(invalid="ignore", over="ignore"):  # a run that grew without bound; its cost is infinite
         return [
             run.scaled(run.reading - values)
             for run, values in zip(problem.data.runs, prediction, strict=True)
@@ -482,5 +484,6 @@ def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
 
 
 def _cost(problem: Problem, point: Point, residuals: list[Array]) -> float:
-    total = sum(float(r @ r) for r in residuals) + problem.parameters.surprise(point)
+    with np.errstate(invalid="ignore", over="ignore"):  # as above
+        total = sum(float(r @ r) for r in residuals) + problem.parameters.surprise(point)
     return total if np.isfinite(total) else np.inf

@@ -192,6 +192,16 @@ def test_a_model_that_grows_without_bound_is_refused():
         fit(Problem(data), Point(wild, start.release))
 
 
+@pytest.mark.parametrize("greatest", [1e160, 1e308])
+def test_a_motion_whose_square_overflows_costs_without_bound(monkeypatch, greatest):
+    """It has no warning: a step that leads there is taken back."""
+    base = nominal(campaign())
+    far = [np.full_like(values, greatest) for values in base.problem.predict([base.point])[0]]
+    monkeypatch.setattr(Problem, "predict", lambda _, points: [far for _ in points])
+    with pytest.raises(FitError):
+        fit(base.problem, base.point)
+
+
 def test_a_parameter_that_is_not_finite_predicts_what_grows_without_bound():
     base = nominal(campaign())
     release = base.point.release.copy()
