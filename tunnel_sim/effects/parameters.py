@@ -124,7 +124,7 @@ def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float | None
 
     Args:
         textbook: exponent of the textbook form, dimensionless.
-        fit_lower: least value a fit may take; None: the least that is allowed.
+        fit_lower: least value a fit may take, dimensionless; None: the least that is allowed.
     """
     return parameter(
         symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True,
