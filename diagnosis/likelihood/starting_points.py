@@ -251,8 +251,8 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
     spring = kind.chosen_spring()
     held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
-    freed = any(info.form and info.name in trial.values for info in kind.parameters())
-    free_forms = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
+    freed = next((form for form in kind.forms() if any(name in trial.values for name in form)), ())
+    free_forms = (*base.problem.free_forms, *(f"{kind.name}.{name}" for name in freed))
     effects = (*base.problem.effects, kind)
     return dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
 
@@ -376,7 +376,9 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
     if trial is None or (kind.condition == "wind_on" and not data.wind_on):
         return None
     effects = (*base.problem.effects, kind)
-    problem = dataclasses.replace(base.problem, effects=effects, free_forms=(kind.name,))
+    form = next(iter(kind.forms()), ())
+    free_forms = tuple(f"{kind.name}.{name}" for name in form)
+    problem = dataclasses.replace(base.problem, effects=effects, free_forms=free_forms)
     infos = _own_parameters(problem, kind)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
     if not _within(infos, values):

@@ -40,6 +40,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _GRID = 201
+_FRICTION_FORMS = ("exponent", "saturation", "peak")
 _NAMES = frozenset(
     {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
 )
@@ -141,6 +142,7 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
     left_out = {
         "soft friction": bool(physics.parameters.get("friction_moment")),
         "presliding": bool(physics.parameters.get("presliding")),
+        "friction against rate": any(physics.parameters.get(f"friction_{form}") for form in _FRICTION_FORMS),
         "rod": physics.rod_twist is not None,
         "delayed input": any(kind.delays for kind in problem.effects),
         "actuator": any(kind.driven and not kind.delays for kind in problem.effects),

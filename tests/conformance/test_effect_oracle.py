@@ -58,6 +58,10 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("coulomb_friction", {"friction_moment": 0.02}, replace(RUN, spring=67.98, speed=0.0, release=-0.2)),
     ("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.005}, RUN),
     ("coulomb_friction", {"friction_moment": 0.5, "presliding": 1e-4}, RUN),  # needs steps below 1 ms
+    ("coulomb_friction", {"friction_moment": 0.02, "exponent": 0.3}, RUN),
+    ("coulomb_friction", {"friction_moment": 0.02, "saturation": 0.1}, RUN),
+    ("coulomb_friction", {"friction_moment": 0.05, "saturation": 0.005}, RUN),  # needs steps below 1 ms
+    ("coulomb_friction", {"friction_moment": 0.02, "peak": 1.0, "peak_rate": 0.3}, RUN),
     ("quadratic_damping", {"coefficient": -0.002}, RUN),
     ("cubic_stiffness", {"coefficient": -2.0}, replace(RUN, release=-0.3)),
     ("asymmetric_stiffness", {"coefficient": -0.5}, replace(RUN, release=-0.3)),

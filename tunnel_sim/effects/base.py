@@ -145,6 +145,12 @@ class Effect:
         )
 
     @classmethod
+    def forms(cls) -> tuple[tuple[str, ...], ...]:
+        """The general forms, each by the names of its parameters; a fit frees one of them, the first by default."""
+        names = tuple(info.name for info in cls.parameters() if info.form)
+        return (names,) if names else ()
+
+    @classmethod
     def column(cls, effects: Sequence[Effect], name: str) -> Array:
         """A parameter of several effects of the class, in its unit, shape (effects,)."""
         return np.array([getattr(effect, name) for effect in effects], np.float64)
