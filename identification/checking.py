@@ -146,7 +146,7 @@ def _made(estimator: object) -> Estimator:
     if isinstance(estimator, type):
         try:
             estimator = estimator()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             what = f"cannot be made without arguments: {raised_line(error)}"
             raise TunnelError(what, where=where, remedy="give each setting a default") from error
     name = getattr(estimator, "name", None)

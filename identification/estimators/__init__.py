@@ -101,7 +101,7 @@ def register_estimator(kind: KindT) -> KindT:
         raise TunnelError("is the name of a packaged estimator", where=where, remedy="choose another name")
     try:
         kind()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         what = f"cannot be made without arguments ({type(error).__name__}: {one_line(error)})"
         raise TunnelError(what, where=where, remedy="give each setting a default") from error
     _registered[name] = kind

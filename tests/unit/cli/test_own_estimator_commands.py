@@ -164,6 +164,33 @@ def test_one_that_leaves_the_program_is_counted_as_a_failure(tunnel) -> None:
 
 
 @pytest.mark.usefixtures("folder")
+def test_one_that_leaves_the_program_ends_identify_with_one(tunnel, tiny_campaign: Path) -> None:
+    status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:Leaves")
+    assert (status, out) == (1, "")
+    assert "tunnel: leaves raised an exception: SystemExit: 3, own_method.py line" in err
+
+
+def test_a_module_that_leaves_the_program_is_one_line(tunnel, folder: Path, tiny_campaign: Path) -> None:
+    (folder / "own_method.py").write_text('raise SystemExit("bye")\n', encoding="utf-8")
+    status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:Mine")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "own_method:Mine: cannot be loaded (SystemExit: bye, own_method.py line 1)" in err
+
+
+@pytest.mark.usefixtures("folder")
+def test_any_code_that_leaves_the_program_is_said(tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever code of one's own is called, its exit is not taken for success."""
+
+    def leaves() -> None:
+        raise SystemExit(0)
+
+    monkeypatch.setattr("tunnel_lab.experiments.score_grid.packaged_grid", leaves)
+    status, out, err = tunnel("score", "-e", "hilbert")
+    assert (status, out) == (1, "")
+    assert err.startswith("tunnel: the command was ended by its own code (SystemExit: 0, test_own_est")
+
+
+@pytest.mark.usefixtures("folder")
 def test_an_exception_fails_the_check(tunnel) -> None:
     here = ("--jobs", "0", "grid.toml")
     assert tunnel("score", *here, "-e", "own_method:Mine", "--write-baseline", "base.parquet")[0] == 0

@@ -12,8 +12,8 @@ import pytest
 
 from identification import Estimate, Quantity, RunEstimate, Status, identify
 from identification.datasets import measured_campaign
-from identification.estimators import ENTRY_POINTS, SUMMARIES, known_estimators, make_estimator
 from identification.estimate import WindowEstimate
+from identification.estimators import ENTRY_POINTS, SUMMARIES, known_estimators, make_estimator
 from identification.returned import WrongReturn
 from tunnel_lab.terminal.inputs import chosen_estimator
 from tunnel_sim import Campaign, TunnelError
