@@ -77,6 +77,14 @@ class NotANumber(Mine):
         return replace(found, runs=tuple(runs))
 
 
+class Bare(Mine):
+    name = "bare"
+
+    def estimate(self, campaign):
+        found = super().estimate(campaign)
+        return replace(found, runs=tuple(replace(run, zeta=None) for run in found.runs))
+
+
 class Dies:
     name = "dies"
 
@@ -191,6 +199,30 @@ def test_any_code_that_leaves_the_program_is_said(tunnel, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("folder")
+def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
+    """The class gives ωn and no ζ, and says that nothing failed."""
+    score = ("score", "--jobs", "0", "grid.toml", "-e", "own_method:Bare,own_method:Mine")
+    status, out, err = tunnel(*score)
+    assert (status, err) == (0, "")
+    bare, mine = out.partition(" bare ")[2].split(" mine ")
+    assert ("ωn" in bare, "ζ" in bare, "ζ" in mine) == (True, False, True)
+    assert "Not given by bare: ζ.\n" in out
+    status, out, _ = tunnel(*score[:-1], "own_method:Leaves")
+    assert "Not given" not in out
+    assert out.count("100 (51–100)") == 2
+
+
+def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
+    sys.path.insert(0, str(folder))
+    names = [estimators.register_from(f"own_method:{kind}") for kind in ("Bare", "Mine")]
+    run_sweep(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    status, out, err = tunnel("sweep", "--summary", "out")
+    assert (status, err) == (0, "")
+    assert "Not given by bare: ζ, zero.\n" in out
+    assert "Not given by mine: zero.\n" in out
+
+
+@pytest.mark.usefixtures("folder")
 def test_an_exception_fails_the_check(tunnel) -> None:
     here = ("--jobs", "0", "grid.toml")
     assert tunnel("score", *here, "-e", "own_method:Mine", "--write-baseline", "base.parquet")[0] == 0
@@ -267,7 +299,7 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     (folder / "own_method.py").write_text(MODULE + "\nMORE = 1\n", encoding="utf-8")
     again = in_a_process(*words, cwd=folder)
     assert again.returncode == 2
-    assert "the sweep was begun with estimator mine" in again.stderr
+    assert "the file of estimator mine has changed since the sweep was begun; name another" in again.stderr
 
 
 @pytest.mark.slow
