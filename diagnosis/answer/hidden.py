@@ -149,6 +149,17 @@ _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may s
 _REAL = 1e-6  # share of a root that its imaginary part may be
 
 
+def _at_once(fit: Fit, start: StartingPoint, point: Point) -> Array:
+    """What an effect changes of the coefficients where the other parameters stay, shape (coefficients,)."""
+    model, smaller = fit.problem.data.model, fit.problem
+    changes = []
+    for name in coefficients_of(fit):
+        given = model.coefficient(start.problem.names, point.common, name)
+        without = model.coefficient(smaller.names, fit.point.common, name)
+        changes.append(0.0 if given is None or without is None else given - without)
+    return np.array(changes, np.float64)
+
+
 def _profiled(
     fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
 ) -> tuple[Array, Array] | None:
@@ -173,6 +184,7 @@ def _profiled(
         return None
     there = absorbed(fit, change)
     moved = coefficient_gradients(fit) @ (there.common - fit.point.common)
+    moved = moved + _at_once(fit, start, Point(common, release))
     own = np.column_stack([there.release, release[:, there.release.shape[1] :]])
     change = change_to(fit, start.problem, Point(np.concatenate([there.common, effect]), own))
     if not all(np.all(np.isfinite(one)) for one in change):

@@ -131,15 +131,22 @@ class _TrialChange:
 
 
 def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | None:
-    """A trial at a moderate size; None where it changes the prediction without bound."""
+    """A trial at a moderate size; None where it changes the prediction without bound, or may not be so large."""
     problem = _tried(base, kind, trial)
     own = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
     sizes = np.array([trial.values.get(info.name, info.default) for info in own])
+    if not _within(own, sizes):
+        return None
     names = base.problem.names
     replaced = names.index(trial.replaces) if trial.replaces in names else None
     change = _moderate_change(base, problem, sizes, scaled, replaced, second_order=trial.second_order)
     return None if change is None else _TrialChange(problem, own, sizes, scaled, replaced, change)
+
+
+def _within(infos: Sequence[ParameterInfo], values: Array) -> bool:
+    """Whether parameters may have such values: of an arm that turns over the top an effect may want others."""
+    return all(info.lower <= value <= info.upper for info, value in zip(infos, values, strict=True))
 
 
 def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
@@ -364,6 +371,8 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
     problem = dataclasses.replace(base.problem, effects=effects, free_forms=(kind.name,))
     infos = _own_parameters(problem, kind)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    if not _within(infos, values):
+        return None
     scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
     change = _moderate_change(base, problem, values, scaled)
     if change is None:

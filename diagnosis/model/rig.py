@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.model.nominal import NominalModel, Start
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.starts import Shown, decay_squares
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -21,6 +21,7 @@ from tunnel_sim.vocabulary.units import dimension, in_si, product
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
 
+_STEP = 1e-5  # of a derivative by central differences, as a share of the parameter
 _LOSS = 0.01  # of a start, in angular frequencies: a small damping
 
 #: Parameters of effects that add to the spring's stiffness at small amplitudes, as gravity does.
@@ -29,6 +30,15 @@ _STIFFNESSES = tuple(
     for kind in ALL_EFFECTS
     if kind.channel == "stiffness" and kind.parameters()[0].unit == "N m/rad"
 )
+
+
+_OF_SWINGS = tuple(kind for kind in ALL_EFFECTS if "small_swings" in vars(kind))
+
+
+def _changing_swings(names: Sequence[str]) -> dict[type[Effect], list[str]]:
+    """The effects that change the motion of small swings, with the names of their parameters."""
+    found = {kind: [one for one in names if one.startswith(f"{kind.name}.")] for kind in _OF_SWINGS}
+    return {kind: own for kind, own in found.items() if own}
 
 
 #: Units of what acts on the yaw axis, and of the same per unit inertia.
@@ -174,21 +184,30 @@ class PerInertia(Rig):
         value = dict(zip(names, common.tolist(), strict=True))
         if name not in self.coefficient_units:
             return value.get(name)
-        omega = float(np.sqrt(max(sum(value[part] for part in self._stiffnesses(names)), 0.0)))
-        return omega if name == "omega_n" else value["mechanical_damping"] / max(2.0 * omega, 1e-150)
+        stiffness = max(sum(value[part] for part in self._stiffnesses(names)), 0.0)
+        damping = value["mechanical_damping"]
+        for kind, own in _changing_swings(names).items():
+            given = {info.name: info.default for info in kind.parameters()}
+            given |= {one.rpartition(".")[2]: value[one] for one in own}
+            stiffness, damping = kind.small_swings(stiffness, damping, given)
+        omega = float(np.sqrt(stiffness))
+        return omega if name == "omega_n" else damping / max(2.0 * omega, 1e-150)
 
     def gradient(self, names: Sequence[str], common: Array, name: str) -> Array:
         """Derivative of a coefficient with respect to the common parameters, shape (common,)."""
         if name not in self.coefficient_units:
             return super().gradient(names, common, name)
-        found = dict.fromkeys(names, 0.0)
-        omega = max(self.coefficient(names, common, "omega_n") or 0.0, 1e-150)
-        damping = float(common[list(names).index("mechanical_damping")])
-        slope = 0.5 / omega if name == "omega_n" else -0.25 * damping / omega / omega / omega
-        found |= dict.fromkeys(self._stiffnesses(names), slope)
-        if name == "zeta":
-            found["mechanical_damping"] = 0.5 / omega
-        return np.array(list(found.values()))
+        found = np.zeros(len(names))
+        of_swings = [one for own in _changing_swings(names).values() for one in own]
+        for one in ("mechanical_damping", *self._stiffnesses(names), *of_swings):
+            place = list(names).index(one)
+            step = _STEP * max(abs(float(common[place])), _STEP)
+            ends = [common.copy(), common.copy()]
+            ends[0][place] -= step
+            ends[1][place] += step
+            low, high = (self.coefficient(names, end, name) or 0.0 for end in ends)
+            found[place] = (high - low) / (2.0 * step)
+        return found
 
     def bounded_by(self, names: Sequence[str], name: str) -> str | None:
         """The damping; of the frequency the spring where gravity does not restore the body in its place."""

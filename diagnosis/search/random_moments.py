@@ -32,6 +32,7 @@ from diagnosis.search.process_noise import (
     random_moments,
     with_response,
 )
+from diagnosis.search.scatter import settled
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 
@@ -107,8 +108,12 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
             excess = abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)
             names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
             share, by_channel = excess / view.repeating.gap, excess / nominal.gap * view.gap.excess
-            cost = seen.fit.scatter_cost(scale.known)
-            numbers, compared = seen.further_numbers, seen.fit.compared
+            # of a random motion, taken for the sensor's noise, the runs would seem to differ
+            cost, numbers, compared = (
+                top.fit.scatter_cost(scale.known),
+                seen.further_numbers,
+                top.fit.compared,
+            )
             left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
             return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
     return []
@@ -273,7 +278,7 @@ def _settled(best: Hypothesis, view: View) -> Hypothesis:
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
-            base = fit(replace(nominal.problem, data=noisy), nominal.point)
+            base = settled(fit(replace(nominal.problem, data=noisy), nominal.point))
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap in the wind for effects to be compared there: more are added

@@ -202,7 +202,7 @@ def consequence(document: Document) -> str:
             continue
         label = f"the size of {label}" if one["value"] < 0.0 and two["value"] < 0.0 else label
         share = 100.0 * (abs(two["value"]) / abs(one["value"]) - 1.0)
-        values = f"{_digits(one['value'])} → {_digits(two['value'])}"
+        values = _apart(one["value"], two["value"])
         if one["value"] * two["value"] < 0.0:
             said.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
@@ -219,6 +219,14 @@ def consequence(document: Document) -> str:
 _OPEN = 0.5  # standard deviations, as a share of the value, beyond which its change says nothing
 
 
-def _digits(value: float) -> str:
-    """A coefficient to three digits."""
-    return f"{'−' if value < 0.0 else ''}{significant(abs(value), 3)}"
+def _apart(before: float, after: float) -> str:
+    """Two coefficients to three digits, or as many as show that they differ."""
+    for digits in range(3, 7):
+        one, two = _digits(before, digits), _digits(after, digits)
+        if one != two:
+            break
+    return f"{one} → {two}"
+
+
+def _digits(value: float, digits: int) -> str:
+    return f"{'−' if value < 0.0 else ''}{significant(abs(value), digits)}"

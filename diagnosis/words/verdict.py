@@ -35,6 +35,7 @@ from diagnosis.words.numbers import (
     unit_shown,
     windy,
 )
+from diagnosis.words.own_model import model_step, model_words
 from diagnosis.words.scatter import (
     BETWEEN_RUNS,
     named_answer,
@@ -94,10 +95,10 @@ def verdict(document: Document, rest: str) -> str:
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
         *map(_disturbed, document.get("disturbed", ())),
-        *(_second_mode(one, unit_of(document)) for one in found["second_modes"]),
-        _answer(document, rest),
+        *_with_second_modes(_answer(document, rest), document),
         _choices(document),
         hold_words(document),
+        model_words(document),
         *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
@@ -222,6 +223,14 @@ def _disturbed(found: Mapping[str, Any]) -> str:
         return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used all the same: {why}."
     without = "without this run" if kept is None else f"without what it recorded from {kept:.4g} s on"
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
+
+
+def _with_second_modes(answer: str, document: Document) -> list[str]:
+    """The answer and the second modes that single runs contain; these come first where every run has one."""
+    modes = document["found"]["second_modes"]
+    said = [_second_mode(one, unit_of(document)) for one in modes]
+    of_all = {one["run"] for one in modes} >= {run["id"] for run in document["gap"]["runs"]}
+    return [*said, answer] if of_all else [answer, *said]
 
 
 def _second_mode(found: Mapping[str, Any], unit: str) -> str:
@@ -394,13 +403,15 @@ def next_steps(document: Document) -> list[str]:
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         words = f"Make the run that distinguishes the answers: {run_words(run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
+    if step := model_step(document):
+        steps.append(f"{step}.")
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):
         springs = not unplannable(document) and document.get("model") is None  # stated, and can be chosen
         kinds = ["springs"] * springs + ["wind speeds"] * windy(document) + ["release angles"]
         steps += [
-            f"Add runs with other {plain(*kinds)}, and diagnose again: no answer has a probability of one half.",
+            f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
         ]
     elif causes == ["unknown"]:

@@ -237,6 +237,20 @@ class Effect:
         del spring, damping, air_stiffness, air_damping
         return 0.0, 0.0, 0.0
 
+    @classmethod
+    def small_swings(
+        cls, stiffness: float, damping: float, values: Mapping[str, float]
+    ) -> tuple[float, float]:
+        """Stiffness and damping of the rigid body whose small swings are those of the body with the effect.
+
+        Args:
+            stiffness: without it, per unit inertia, 1/s².
+            damping: without it, per unit inertia, 1/s.
+            values: its parameters by name, per unit inertia.
+        """
+        del values
+        return stiffness, damping
+
     def plausible(self, omega: float) -> bool:
         """Whether a fitted effect is still what its name means.
 

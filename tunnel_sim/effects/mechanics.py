@@ -202,6 +202,23 @@ class RodFlexibility(Effect):
             for r in ratios
         ]
 
+    @classmethod
+    def small_swings(
+        cls, stiffness: float, damping: float, values: Mapping[str, float]
+    ) -> tuple[float, float]:
+        """The slow one of the two modes, in which the rod twists little."""
+        twist, share = values["compliance"], values["inertia_share"]
+        if twist <= 0.0 or stiffness <= 0.0:
+            return stiffness, damping
+        rod = 1.0 / twist
+        upper, lower = np.array([-stiffness - rod, rod]) / share, np.array([rod, -rod]) / (1.0 - share)
+        motion = np.zeros((4, 4))  # of both angles, then of both rates
+        motion[:2, 2:] = np.eye(2)
+        motion[2:, :2] = upper, lower
+        motion[2, 2] = -damping / share
+        slow = min(np.linalg.eigvals(motion), key=abs)
+        return float(abs(slow) ** 2), float(-2.0 * slow.real)
+
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Let the rod twist, with steps short enough for its own oscillation."""
         del stated, drawn

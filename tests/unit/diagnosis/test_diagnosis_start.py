@@ -17,6 +17,7 @@ from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.effects.parameters import Trial
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
 NOISE = 4e-4
@@ -252,3 +253,12 @@ def test_resonance_is_the_undamped_frequency_with_the_air():
 def test_a_gross_misfit_is_distinguished_from_a_small_one():
     assert not misses_motion(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
     assert misses_motion(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))
+
+
+def test_an_effect_that_would_have_to_be_larger_than_it_may_is_not_tried(monkeypatch):
+    """The readings of an arm that turns over the top are beyond what a sensor's centre may be."""
+    clipping, base = effect_class("sensor_clipping"), nominal(campaign())
+    assert starting_points(base, clipping)
+    far = Trial({"limit": 3.6, "centre": 6.4}, None)
+    monkeypatch.setattr(clipping, "trials", lambda _: (far,))
+    assert starting_points(base, clipping) == []

@@ -441,3 +441,23 @@ def test_effects_say_their_sizes_as_a_person_would():
         == "play of 0.705 ± 0.069° to each side between spring and rod"
     )
     assert said_size(document(), one, "cubic_stiffness") == ""
+
+
+def of_model(armature: float, *free: str) -> dict[str, Any]:
+    """A document without a cause of a joint whose model's file has an armature of 0.01 kg m²."""
+    written = [
+        {"name": "joint armature", "before": [0.01], "after": [armature], "unit": "kg m2"},
+        {"name": "joint frictionloss", "before": [0.0], "after": [0.2], "unit": "N m"},
+    ]
+    return answer_of() | {"model": {"file": "arm.xml", "free": list(free), "written": written}}
+
+
+def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
+    given = of_model(0.03, "inertia", "damping")
+    assert verdict(given, "").endswith(
+        "arm.xml as given does not fit: joint armature is 0.0100 kg m² there, and the runs say 0.0300 kg m²."
+    )
+    assert next_steps(given)[0] == ("Correct these values in arm.xml; --patch FILE writes a model with them.")
+    for fits in (of_model(0.0101, "inertia"), of_model(0.03, "damping"), answer_of()):
+        assert "as given" not in verdict(fits, "")
+        assert not any("Correct these" in step for step in next_steps(fits))
