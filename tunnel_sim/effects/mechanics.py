@@ -77,6 +77,7 @@ class FreePlay(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
+    jumps = True
     size = "play of {half_width} to each side between spring and rod"
     parts = True
     advice = "Take up the play between spring and rod"
@@ -304,6 +305,7 @@ class CoulombFriction(Effect):
     place = 1
     channel = "damping"
     condition = "always"
+    jumps = True
     size = "dry friction of {friction_moment}"
     advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (
