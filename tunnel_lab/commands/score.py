@@ -166,8 +166,8 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
-        what = f"the baseline has {', '.join(gone)}, which the registry does not have"
-        remedy = "write a new baseline with --write-baseline, or name what to score with --estimator"
+        what = f"the baseline has {', '.join(gone)}, which no installed package adds"
+        remedy = "name a class of your own again with -e module:Class, or what else to score with --estimator"
         raise TunnelError(what, where="--check", remedy=remedy)
     return baseline
 

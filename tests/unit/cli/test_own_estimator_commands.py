@@ -226,6 +226,12 @@ def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
 def test_an_exception_fails_the_check(tunnel) -> None:
     here = ("--jobs", "0", "grid.toml")
     assert tunnel("score", *here, "-e", "own_method:Mine", "--write-baseline", "base.parquet")[0] == 0
+    status, _, err = tunnel("score", "--jobs", "0", "--check", "base.parquet")
+    assert (status, err.count("\n")) == (2, 1)
+    assert (
+        "the baseline has mine, which no installed package adds; name a class of your own again with -e"
+        in err
+    )
     status, out, err = tunnel("score", "--jobs", "0", "--check", "base.parquet", "-e", "own_method:Mine")
     assert (status, err) == (0, "")
     assert "to the last bit" in out
