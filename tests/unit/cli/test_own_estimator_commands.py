@@ -385,6 +385,12 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
             "gone_module:Mine",
             "gone_module:Mine: cannot be loaded (ModuleNotFoundError: No module",
         ),
+        (
+            "own_method.py:Mine",
+            "own_method.py:Mine: names a file, not a module; leave out .py: own_method:Mine",
+        ),
+        ("own_method:", "own_method:: names no class; give it as module:Class"),
+        (":Mine", ":Mine: names no module; give it as module:Class"),
         ("own_method:one_of", "is not a class of an estimator; state a name and a method estimate"),
         ("own_method:Loud", "estimator loud: cannot be made without arguments (TypeError"),
         ("min", "there is no estimator 'min'; use one of"),
