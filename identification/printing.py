@@ -61,7 +61,12 @@ def coefficient_label(name: str, unit: str) -> str:
 
 
 def in_degrees(angle: float, digits: int = 2) -> str:
-    """An angle in rad as people read it, such as ``5.2°``."""
+    """An angle as people read it, such as ``5.2°``.
+
+    Args:
+        angle: rad.
+        digits: significant digits (a count).
+    """
     return f"{significant(math.degrees(angle), digits)}°"
 
 

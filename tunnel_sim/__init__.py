@@ -9,7 +9,7 @@ from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
     from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
-    from tunnel_sim.engine.model import build_model
+    from tunnel_sim.engine.model import build_model, load_plugin
     from tunnel_sim.engine.simulate import simulate
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, simulate_campaigns
     from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
@@ -40,7 +40,7 @@ else:
         __name__,
         {
             ".effects": "ALL_EFFECTS Effect effect_class effect_from",
-            ".engine.model": "build_model",
+            ".engine.model": "build_model load_plugin",
             ".engine.simulate": "simulate",
             ".engine.virtual_campaign": "simulate_campaign simulate_campaigns",
             ".files.campaign_folder": "read_campaign write_campaign",
@@ -79,6 +79,7 @@ __all__ = [
     "effect_class",
     "effect_from",
     "load_plan",
+    "load_plugin",
     "load_rig",
     "paper_plan",
     "read_campaign",

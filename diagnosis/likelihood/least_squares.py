@@ -238,7 +238,7 @@ class Fit:
         """−2 ln of the evidence of the chance differences between the runs, beside χ²; 0 without any.
 
         Args:
-            known: how well the runs show them, as `Between.cost` has it.
+            known: how well the runs show them, as `Between.cost` has it, shape (runs, kinds, kinds).
         """
         return 0.0 if self.between is None else self.between.cost(known)
 

@@ -163,7 +163,8 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
 PATCH: Mapping[str, Sentence] = {
     "polynomial": "The {moment} is written as a polynomial of third order, which misses {missed_percent:.2g} % of "
     "its greatest moment within the records.",
-    "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it.",
+    "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it. Call "
+    "tunnel_sim.load_plugin() before MuJoCo reads the file.",
     "soft friction": "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint "
     "creeps. Its time constant is set to two steps, the shortest allowed.",
     "presliding": "The presliding of the friction has no native element and is left out.",

@@ -11,6 +11,7 @@ from diagnosis.words.numbers import (
     Document,
     change_up_to,
     left_over,
+    listed,
     misfit_of,
     part,
     percent,
@@ -19,7 +20,7 @@ from diagnosis.words.numbers import (
     unit_shown,
 )
 from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, with_std
+from identification.printing import COEFFICIENTS, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 
 
@@ -102,8 +103,30 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
         said.append(f"Most of it is in {largest}{run}.")
     if law is not None:
         formula = law["effect"].get("moment") or law["effect"]["reading"]
-        said.append(f"The formula {formula} closes {percent(law['closed'], law['std'])}.")
+        closes = percent(law["closed"], law["std"])
+        said.append(f"The formula {formula} closes {closes}{_with_values(law)}.")
     return said
+
+
+def _with_values(law: Document) -> str:
+    """The numbers of a formula, as a clause; empty where it has none."""
+    stated, said = law["effect"].get("parameters", {}), []
+    for name, one in law["parameters"].items():
+        unit = stated.get(name, {}).get("unit", "1")
+        mark = "" if unit == "1" else f" {unit_mark(unit)}"
+        said.append(f"{name} = {with_std(one['value'], one['std'])}{mark}")
+    return f", with {listed(said)}" if said else ""
+
+
+def formula_step(document: Document) -> str:
+    """How to try the formula that may be what is missing, without a full stop; empty where there is none."""
+    found = document["closable"]
+    if found is None or found["law"] is None:
+        return ""
+    return (
+        "Write the formula as an effect with --propose FILE, and diagnose again with --effects-file FILE: its "
+        "probability beside the known effects tells whether it is the cause"
+    )
 
 
 def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) -> list[str]:

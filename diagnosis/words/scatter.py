@@ -244,7 +244,7 @@ def repeatability_line(document: Document) -> str:
     if not found or len(found["runs"]) < 2:
         return ""
     if repeats(document):
-        return "Repeatability: the runs repeat; no scatter between them shows"
+        return "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
     beyond = f"; beyond it: {found['outlier']}" if found["outlier"] else ""
     return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}"

@@ -36,6 +36,7 @@ from diagnosis.words.numbers import (
     windy,
 )
 from diagnosis.words.own_model import model_step, model_words
+from diagnosis.words.remainder import formula_step
 from diagnosis.words.scatter import (
     BETWEEN_RUNS,
     named_answer,
@@ -385,6 +386,9 @@ def run_words(run: Mapping[str, float]) -> str:
     )
 
 
+_SUSPECT = "State the effect that you suspect in a file, and diagnose again with --effects-file"
+
+
 def next_steps(document: Document) -> list[str]:
     """What to do next, in the order in which to do it."""
     causes = document["causes"]
@@ -417,7 +421,7 @@ def next_steps(document: Document) -> list[str]:
     elif causes == ["unknown"]:
         steps += [
             "Read where the model departs from the runs, and examine the rig there.",
-            "State the effect that you suspect in a file, and diagnose again with --effects-file.",
+            f"{formula_step(document) or _SUSPECT}.",
         ]
     else:
         of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
@@ -425,6 +429,7 @@ def next_steps(document: Document) -> list[str]:
         steps += [
             *(f"{step}." for step in [hold_step(document)] if step),
             *(f"{advice(document, name)}." for name in to_mend),
+            *(f"{step}." for step in [formula_step(document)] if step),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]

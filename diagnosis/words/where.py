@@ -9,7 +9,7 @@ from typing import Any
 from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import BANDS, CONDITIONS, PLACES, Document, part, plain
 from diagnosis.words.scatter import scattering
-from identification.printing import p_text, significant
+from identification.printing import p_text
 from tunnel_sim.effects import effect_class
 
 _WIND = "whether it needs wind cannot be determined"
@@ -133,7 +133,7 @@ def _places(where: Mapping[str, Any], place: Mapping[str, Any]) -> list[str]:
     if "time_s" in found:
         places.append("between {:.1f} and {:.1f} s of the record".format(*found["time_s"]))
     if "amplitude_rad" in found:
-        least, most = (significant(degrees(one), 2) for one in found["amplitude_rad"])
+        least, most = (f"{float(f'{degrees(one):.2g}'):g}" for one in found["amplitude_rad"])
         places.append(f"at amplitudes from {least}° to {most}°")
     if "frequency_hz" in found:
         places.append("at {:.2f} to {:.2f} Hz".format(*found["frequency_hz"]))

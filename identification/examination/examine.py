@@ -42,13 +42,32 @@ def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
             f"follows from them; zero and noise are in {sensor.unit}"
         )
         remedy = "state quantity = 'angle' under [sensor] if the readings are angles"
-        return (Remark(Outcome.NOTED, tuple(run.id for run in campaign.runs), what, remedy),)
-    swings = {run.id: 0.5 * float(np.ptp(run.record.yaw_rad)) for run in campaign.runs}
+        noted = (Remark(Outcome.NOTED, tuple(run.id for run in campaign.runs), what, remedy),)
+        unit = sensor.unit.replace("rad", "deg").replace("²", "2")  # as the option takes it
+        return (*noted, *_wide_swings(campaign, f"if these are {unit}, import them with --unit {unit}"))
+    return _wide_swings(campaign, "if these are degrees, name the column yaw_deg")
+
+
+def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:
+    """Note the runs that swing by more than half a turn to either side; nothing where that is stated."""
+    sensor = campaign.sensor
+    swings = {run.id: _swing(run.record, sensor.derivative) for run in campaign.runs}
     wide = tuple(name for name, swing in swings.items() if swing > np.pi)
     if not wide or sensor.plausible is False:
         return ()
     what = f"the angle swings by up to ±{max(swings.values()):.3g} rad, more than half a turn"
-    return (Remark(Outcome.NOTED, wide, what, "if these are degrees, name the column yaw_deg"),)
+    return (Remark(Outcome.NOTED, wide, what, remedy),)
+
+
+def _swing(record: Record, derivative: int) -> float:
+    """Greatest angle to either side, rad: that of readings of rates or accelerations at their mean frequency."""
+    reading, time = record.yaw_rad, record.time_s
+    size = 0.5 * float(np.ptp(reading))
+    if not derivative:
+        return size
+    crossings = int(np.count_nonzero(np.diff(np.signbit(reading - np.mean(reading)))))
+    omega = np.pi * crossings / float(time[-1] - time[0])
+    return size / omega**derivative if omega > 0.0 else 0.0
 
 
 def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:

@@ -41,7 +41,7 @@ FIELDS = {
     "no-cut": "Cut records at releases",
 }
 """The label of the field, without its example and unit, by the option that states the same."""
-_OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"[^\"]*\"))?")
+_OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"([^\"]*)\"))?")
 
 _NAMED = ("answer", "effect", "parameter", "added")  # columns of the names of effects and parameters
 _HEAD = """
@@ -54,7 +54,14 @@ _HEAD = """
 def page_words(text: str) -> str:
     """A line of a command with the names of fields in place of options, and without the command's name."""
     plain = text.removeprefix("tunnel: ").replace("with --no-cut", "by switching off --no-cut")
-    return _OPTION.sub(lambda found: f"“{FIELDS[found[1]]}”" if found[1] in FIELDS else found[0], plain)
+    return _OPTION.sub(_field, plain)
+
+
+def _field(found: re.Match[str]) -> str:
+    """An option as its field, with what is to be typed there; an option without a field as it is."""
+    if found[1] not in FIELDS:
+        return found[0]
+    return f"“{FIELDS[found[1]]}” {found[2]}" if found[2] else f"“{FIELDS[found[1]]}”"
 
 
 def address(session: Session, stage: str) -> str:

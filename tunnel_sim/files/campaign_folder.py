@@ -337,7 +337,7 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             raise TunnelError("this is not a folder", where=where, remedy="choose another name")
         return
     if not overwrite:
-        remedy = "choose another one, or ask to overwrite it"
+        remedy = "choose another one, or overwrite it (--overwrite; overwrite=True in Python)"
         raise TunnelError("the folder exists", where=where, remedy=remedy)
     entries = list(folder.iterdir())
     if entries and not (folder / CAMPAIGN_FILE).is_file():

@@ -180,7 +180,10 @@ def test_every_run_is_listed_against_the_model(given: Document) -> None:
     assert f"frequency ± {100 * frequency**0.5:.2g} %" in repeatability_line(given)
     assert repeatability_line(given).endswith("; beyond it: beta")
     given["repeatability"]["spreads"] = []
-    assert repeatability_line(given) == "Repeatability: the runs repeat; no scatter between them shows"
+    assert (
+        repeatability_line(given)
+        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
+    )
     assert not repeatability_table(given).rows
     given["repeatability"] = None
     assert repeatability_line(given) == ""

@@ -14,6 +14,7 @@ from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, r
 from diagnosis.words.numbers import KINDS
 from diagnosis.words.remainder import closable_words, rest_line, rest_words
 from diagnosis.words.tables import closable_table
+from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
 from tests.unit.diagnosis_document import CAUSE, IDS, RIVAL, document
@@ -248,8 +249,18 @@ def test_what_could_be_closed(given: Document) -> None:
     assert "at most" not in table.title
     assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
-    law = {"effect": {"moment": "k*b"}, "closed": 0.8, "std": 0.01}
-    assert text(law=law).endswith("The formula k*b closes 80.0 ± 1.0 %.")
+    stated = {"moment": "k*b^n", "parameters": {"k": {"unit": "N m"}, "n": {"unit": "1"}}}
+    values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}
+    law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
+    assert text(law=law).endswith(
+        "The formula k*b^n closes 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
+    )
+    with_law = given | {"causes": ["unknown"], "decided": True, "closable": CLOSABLE | {"law": law}}
+    assert any(
+        step.startswith("Write the formula as an effect with --propose") for step in next_steps(with_law)
+    )
+    without = with_law | {"closable": CLOSABLE}
+    assert not any("formula" in step for step in next_steps(without))
     events = [{"run": "beta", "share": 0.9, "from_s": 1.0, "to_s": 2.5}] * 2
     assert text(events=events).endswith(
         "Most of it is in 2 runs, the largest part in run beta (1.00 to 2.50 s)."

@@ -322,14 +322,17 @@ def test_springs_that_may_be_off_are_said_with_what_would_tell():
     assert text.endswith(". Measure their stiffness again.")
 
 
-def test_a_second_mode_is_said_before_the_gap():
+def test_a_second_mode_of_every_run_is_said_before_the_gap():
     main = {"amplitude_rad": 0.3, "frequency_hz": 2.2, "decay_per_s": 0.1}
     second = {"amplitude_rad": 0.02, "frequency_hz": 2.9, "decay_per_s": 0.2}
     mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
-    text = said("unknown", second_modes=[mode])
-    assert text.startswith(
-        "swing contains a second mode: 1.1° at 2.9 Hz, which decays at 0.2 1/s, beside 17° at 2.2 Hz"
-    )
+    said_of_it = "contains a second mode: 1.1° at 2.9 Hz, which decays at 0.2 1/s, beside 17° at 2.2 Hz"
+    alone = said("unknown", second_modes=[mode])
+    assert alone.startswith("There is a gap")
+    assert f"swing {said_of_it}" in alone
+    runs = [run["id"] for run in answer_of("unknown")["gap"]["runs"]]
+    text = said("unknown", second_modes=[mode | {"run": run} for run in runs])
+    assert text.startswith(f"{runs[0]} {said_of_it}")
     assert "falls by 98 %" in text
 
 

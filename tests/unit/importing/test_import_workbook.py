@@ -85,12 +85,20 @@ def test_a_sheet_states_the_conditions_of_runs_within_another(tmp_path: Path) ->
         ],
         [("Luftdichte [kg/m3]", "V [km/h]", "Kr"), (1.196, 54, 44.84)],
         [("rho = 1,196 kg/m3",), ("Wind speed: 15 m/s",), ("Kr = 44.84",)],
+        [
+            ("Modell", "Davis", ""),
+            ("Luftdichte", 1.196, "kg/m3"),
+            ("V", 54, "km/h"),
+            ("Kr", 44.84, "N m/rad"),
+            *((f"Nr. {i}", i, "x") for i in range(8)),
+        ],
     ],
 )
 def test_a_cover_sheet_speaks_of_all_runs(tmp_path: Path, cover: Rows) -> None:
     found = read_records([book(tmp_path, {"Deckblatt": cover, "A": None, "B": None})])
     assert conditions(found) == [(name, pytest.approx(15.0), 44.84, 1.196) for name in ("A", "B")]
     np.testing.assert_allclose(found.campaign.runs[0].record.yaw_rad, ANGLE, atol=1e-12)
+    assert not any("holds text" in remark for remark in found.remarks())
 
 
 def test_a_row_comes_before_the_cover(tmp_path: Path) -> None:

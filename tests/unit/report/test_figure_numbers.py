@@ -6,6 +6,7 @@ Truth: a document written by hand.
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any
 
 import numpy as np
@@ -334,10 +335,15 @@ def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Documen
     assert fig is not None
     (axes,) = fig.axes
     (line,) = axes.lines
-    assert curve(line) == [(-0.1, 3.0), (0.0, 1.0), (0.1, -2.0)]
-    low_high = [(-0.1, 2.804), (-0.1, 3.196), (0.0, 0.608), (0.0, 1.392), (0.1, -2.588), (0.1, -1.412)]
+    far = math.degrees(0.1)
+    np.testing.assert_allclose(curve(line), [(-far, 3.0), (0.0, 1.0), (far, -2.0)])
+    low_high = [(-far, 2.804), (-far, 3.196), (0.0, 0.608), (0.0, 1.392), (far, -2.588), (far, -1.412)]
     assert band(axes.collections[0]) == pytest.approx(np.array(low_high))
+    assert axes.get_xlabel() == "angle [°]"
     assert axes.get_ylabel() == "missing moment [N m]"
+    (reading,) = law_figure(given | {"closable": {"curve": law | {"unit": "rad"}}}).axes
+    np.testing.assert_allclose([y for _, y in curve(reading.lines[0])], np.degrees([3.0, 1.0, -2.0]))
+    assert reading.get_ylabel() == "error of the reading [°]"
 
 
 def test_every_run_is_drawn_against_the_model_with_its_band() -> None:

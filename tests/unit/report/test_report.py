@@ -274,7 +274,7 @@ def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
     assert "deviates far beyond the others" in page
     found = document["repeatability"]
     page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
-    assert "<p>Repeatability: the runs repeat; no scatter between them shows.</p>" in page
+    assert "<p>Repeatability: the runs repeat; no scatter of their frequency or damping shows.</p>" in page
     assert 'data-figure="repeatability"' not in page
     assert "How the runs repeat" not in page
     assert "Repeatability" not in written(document | {"repeatability": None})

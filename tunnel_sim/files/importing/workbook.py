@@ -61,7 +61,10 @@ def _read(content: bytes, where: str) -> list[Table]:
                 covers |= facts_in(["\t".join(filter(None, row)) for row in sheet.rows]) | _one_row(sheet)
             # Of what no run was found for, the import says that it is not used.
             if not rows or len(rows) < len(found):
-                short += [replace(table, part=sheet.name) for table in _tables(book, sheet)]
+                # texts of a cover are read above, and are no columns of a record
+                short += [
+                    replace(table, part=sheet.name, said=table.said[:1]) for table in _tables(book, sheet)
+                ]
         several = len(book.sheet_names) > 1
         return [_with(table, sheet, described, covers, several) for sheet, table in found] + short
 
