@@ -84,7 +84,7 @@ def text_width(text: str, points: float) -> float:
 
     Args:
         text: without formulas.
-        points: size of the font.
+        points: size of the font, pt.
     """
     from matplotlib.textpath import TextPath
 
