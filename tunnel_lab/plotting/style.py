@@ -84,7 +84,7 @@ def text_width(text: str, points: float) -> float:
 
     Args:
         text: without formulas.
-        points: size of the font, pt.
+        points: size of the font, in 72nds of inches.
     """
     from matplotlib.textpath import TextPath
 
