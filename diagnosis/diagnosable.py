@@ -263,11 +263,16 @@ def kinds_for(
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
     """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
 
-    Where no run is driven, they are those that act on free decays, without a sentence.
+    Where no run is driven, they are those that act on free decays, without a sentence; where no run has a moment as
+    its input, those of a moment are left out likewise.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
-    kept, gone = tuple(kinds), dict[str, list[type[Effect]]]()
+    moments = any(run.drive is not None and run.drive.on_body for run in campaign.runs)
+    kept, gone = (
+        tuple(kind for kind in kinds if moments or not kind.of_moment),
+        dict[str, list[type[Effect]]](),
+    )
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])

@@ -35,6 +35,23 @@ class Rod:
     held_body: bool = True
 
 
+@dataclass(frozen=True)
+class Actuator:
+    """What stands between the input as written and the moment on the body.
+
+    Args:
+        limit: greatest moment, N m.
+        soft: whether the limit is approached as a hyperbolic tangent.
+        rate: greatest rate of change of the moment, N m/s.
+        lags: time constants of lags of first order, one after the other, s.
+    """
+
+    limit: float = np.inf
+    soft: bool = False
+    rate: float = np.inf
+    lags: tuple[float, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Input:
     """What drives the runs of a campaign; zero in its free decays.
@@ -47,6 +64,7 @@ class Input:
         gain: N m per unit of a ``drive``; 1 of other columns.
         stated: whether the campaign states the gain.
         delay: time by which the input acts later than its samples say, s, shape (runs,) or (1,).
+        actuator: that exerts the moment; None where the moment is that written.
     """
 
     column: str
@@ -56,6 +74,7 @@ class Input:
     gain: float = 1.0
     stated: bool = False
     delay: Array = field(default_factory=lambda: np.zeros(1))
+    actuator: Actuator | None = None
 
     @property
     def driven(self) -> NDArray[np.bool_]:
@@ -66,6 +85,11 @@ class Input:
     def on_body(self) -> bool:
         """Whether it is a moment on the body; else it moves the spring's root."""
         return self.column != "base_rad"
+
+    @property
+    def greatest(self) -> float:
+        """Greatest moment that is asked for in any run, N m."""
+        return float(self.gain * np.max(np.abs(self.values)))
 
 
 @dataclass(frozen=True, eq=False)

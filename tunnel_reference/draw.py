@@ -12,6 +12,7 @@ from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.departures import draw_departures
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
+from tunnel_reference.forms_actuators import ACTUATORS
 from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 
@@ -203,8 +204,8 @@ def draw_campaign(
         rng, conditions, probability=mixture.departures, mains=mains, certain=mixture.certain
     )
     if mixture.driven:
-        # The law of structural damping is that of a spring with a fixed root.
-        by_root = "structural_damping" not in (*names, *small)
+        # The law of structural damping is that of a spring with a fixed root, and an actuator exerts a moment.
+        by_root = not {"structural_damping", *ACTUATORS} & {*names, *small}
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
     effects = []
     for name in (*names, *small):

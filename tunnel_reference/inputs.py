@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, Conditions, Input
+from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Actuator, Array, Conditions, Input
 
 _MIXED = 0.3  # probability that free decays stand beside driven runs
 _FREE = 0.4  # share of such runs then
 _BAND = (0.3, 3.0)  # of the run's own frequency
 _UNKNOWN_GAIN = 0.25
 _BASE = 0.15
+_FINER = 8  # samples of an actuator's moment for each one of the input
 WAVEFORMS = ("multisine", "chirp", "square", "random")
 
 
@@ -127,6 +128,46 @@ def oscillator_response(c: Conditions, pole: np.ndarray) -> Array:
     return out
 
 
+def finer(values: Array, held: NDArray[np.bool_]) -> Array:
+    """The inputs at more samples, shape (samples, runs): between those given they are kept, or linear."""
+    place = np.arange(len(values) * _FINER) / _FINER
+    before = place.astype(np.intp)
+    after = np.minimum(before + 1, len(values) - 1)
+    part = (place - before)[:, None] * ~held
+    return np.asarray(values[before] + part * (values[after] - values[before]))
+
+
+def exerted(
+    asked: Array, actuator: Actuator, step: float, held: NDArray[np.bool_]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """The moment of an actuator that stands at what is asked for first.
+
+    Args:
+        asked: at the samples, N m, shape (samples, runs).
+        step: between samples, s.
+        held: whether the moment asked for is kept between samples, shape (runs,).
+
+    Returns:
+        The moment, N m, of that shape, and whether it is kept between samples.
+    """
+    limit, most = actuator.limit, actuator.rate * step
+    out = limit * np.tanh(asked / limit) if actuator.soft else np.clip(asked, -limit, limit)
+    if not (np.isfinite(most) or actuator.lags):
+        return out, held
+    out[1:] = np.where(held, out[:-1], out[1:])  # what is asked for just before the sample
+    jumps = held
+    if np.isfinite(most):
+        jumps = np.zeros_like(held)
+        for k in range(1, len(out)):
+            out[k] = out[k - 1] + np.clip(out[k] - out[k - 1], -most, most)
+    for lag in actuator.lags:
+        over = np.where(jumps, out, 0.5 * (out + np.roll(out, 1, axis=0)))  # its mean over each step
+        part, jumps = 1.0 - np.exp(-step / lag), np.zeros_like(held)
+        for k in range(1, len(out)):
+            out[k] = out[k - 1] + part * (over[k] - out[k - 1])
+    return out, np.zeros_like(held)
+
+
 @dataclass(frozen=True, eq=False)
 class Inputs:
     """The inputs of all runs of a batch, in N m or rad.
@@ -160,12 +201,19 @@ class Inputs:
             for c in conditions
         ]
         held = [np.zeros(c.runs, np.bool_) if c.drive is None else c.drive.held for c in conditions]
+        rate = conditions[0].sample_rate
+        if any(c.drive is not None and c.drive.actuator is not None for c in conditions):
+            rate *= _FINER
+            for place, c in enumerate(conditions):
+                actuator = None if c.drive is None else c.drive.actuator
+                columns[place] = finer(columns[place], held[place])
+                if actuator is not None:
+                    columns[place], held[place] = exerted(columns[place], actuator, 1.0 / rate, held[place])
         delay = [np.broadcast_to(0.0 if c.drive is None else c.drive.delay, (c.runs,)) for c in conditions]
         on_body = np.repeat([c.drive is None or c.drive.on_body for c in conditions], runs)
         return cls(
             np.concatenate(columns, axis=1), (1.0 - np.concatenate(held)).astype(np.float64),
-            np.concatenate(delay), on_body,
-            conditions[0].sample_rate,
+            np.concatenate(delay), on_body, rate,
         )  # fmt: skip
 
     def moment(self, time: float, middle: float) -> Array:

@@ -25,6 +25,11 @@ def stribeck_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> No
     s.level[rows] += p["moment"] * (1.0 + p["breakaway"] * np.exp(-((s.omega[rows] / p["speed"]) ** 2)))
 
 
+def sublinear_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Tc |θ̇/(1 rad/s)|^n with n < 1."""
+    s.level[rows] += p["moment"] * np.abs(s.omega[rows]) ** p["exponent"]
+
+
 def reid_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """(π/2) η Kr |θ|: Reid's loss, πηKrA² per cycle at any frequency."""
     s.level[rows] += (np.pi / 2) * p["loss"] * s.stiffness[rows] * np.abs(s.deflection[rows])

@@ -17,7 +17,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
 from tunnel_sim.effects.registry import the_effect
 
-DELAY = the_effect(driven=True)
+DELAY = the_effect(delays=True)
 
 
 def other_hold(study: Study) -> OtherHold | None:

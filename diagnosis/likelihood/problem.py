@@ -19,6 +19,8 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
+_BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -27,7 +29,7 @@ class Problem:
     Args:
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
-        free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
+        free_forms: form parameters that are free, as ``effect.parameter``; the others keep the textbook form.
         instants: how many instants every run has for an effect that skips samples.
         scatter: chance differences between runs beside the effects; each run has a deviation of its own of each.
         rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
@@ -51,7 +53,7 @@ class Problem:
         for kind in self.effects:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
-                free = not info.of_input and (not info.form or kind.name in self.free_forms)
+                free = not info.of_input and (not info.form or name in self.free_forms)
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))
@@ -137,14 +139,15 @@ class Problem:
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.
 
-        In rad; infinite where the motion grows without bound, or a parameter is not finite.
+        In rad; infinite where the motion grows without bound, or a parameter is not finite or an initial state
+        beyond any motion.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
         places = [
             (i, int(r))
             for i, point in enumerate(points)
             if np.all(np.isfinite(point.common))
-            for r in np.flatnonzero(np.all(np.isfinite(point.release), axis=1))
+            for r in np.flatnonzero(np.all(np.abs(point.release) < _BEYOND, axis=1))
         ]
         if places:
             for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):

@@ -83,7 +83,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     if kind.own_numbers(1):
         found = [_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one]
     else:
-        tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(data)))
+        tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
         found = [start for start in tried if start is not None]
     return sorted(found, key=lambda start: -start.predicted_drop)
 
@@ -158,7 +158,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
     data = base.problem.data
     if not _may_show(data, kind) or kind.own_numbers(1):
         return
-    for trial in kind.trials(_circumstances(data)):
+    for trial in kind.trials(_circumstances(base)):
         tried = _moderate(base, kind, trial)
         if tried is not None:
             yield tried.change
@@ -251,8 +251,8 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
     spring = kind.chosen_spring()
     held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
-    freed = any(info.form and info.name in trial.values for info in kind.parameters())
-    free_forms = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
+    freed = next((form for form in kind.forms() if any(name in trial.values for name in form)), ())
+    free_forms = (*base.problem.free_forms, *(f"{kind.name}.{name}" for name in freed))
     effects = (*base.problem.effects, kind)
     return dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
 
@@ -265,7 +265,7 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data, found = base.problem.data, []
     if kind.condition == "wind_on" and not data.wind_on:
         return []
-    for trial in kind.trials(_circumstances(data)):
+    for trial in kind.trials(_circumstances(base)):
         if trial.second_order and trial.scaled is not None:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
             own = _own_parameters(problem, kind)
@@ -292,10 +292,18 @@ def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]
     return [info for info in kind.parameters() if f"{kind.name}.{info.name}" in problem.names]
 
 
-def _circumstances(data: Data) -> Circumstances:
+def _circumstances(base: Fit) -> Circumstances:
+    data = base.problem.data
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
-    return Circumstances(data.springs, greatest, data.model.per_inertia, slowest)
+    moment, rate = 0.0, 0.0
+    for run, own in zip(data.runs, base.point.release, strict=True):
+        if run.drive is not None and run.drive.on_body:
+            drive = base.problem.stated(base.point.common, own, run).drive
+            assert drive is not None
+            own_moment, own_rate = drive.greatest
+            moment, rate = max(moment, own_moment), max(rate, own_rate)
+    return Circumstances(data.springs, greatest, data.model.per_inertia, slowest, moment, rate)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
@@ -364,11 +372,13 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
         runs cannot show the effect.
     """
     data = base.problem.data
-    trial = next(iter(kind.trials(_circumstances(data))), None)
+    trial = next(iter(kind.trials(_circumstances(base))), None)
     if trial is None or (kind.condition == "wind_on" and not data.wind_on):
         return None
     effects = (*base.problem.effects, kind)
-    problem = dataclasses.replace(base.problem, effects=effects, free_forms=(kind.name,))
+    form = next(iter(kind.forms()), ())
+    free_forms = tuple(f"{kind.name}.{name}" for name in form)
+    problem = dataclasses.replace(base.problem, effects=effects, free_forms=free_forms)
     infos = _own_parameters(problem, kind)
     values = np.array([trial.values.get(info.name, info.default) for info in infos])
     if not _within(infos, values):

@@ -190,8 +190,9 @@ class RunData:
         return dataclasses.replace(
             self.drive,
             time_s=self.drive.time_s[seen],
-            values=self.drive.values[seen] + (offset / scale if scale and offset else 0.0),
+            values=self.drive.values[seen],
             scale=scale,
+            offset=offset,
             delay=self.drive.delay - self.start,
         )
 

@@ -40,6 +40,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _GRID = 201
+_FRICTION_FORMS = ("exponent", "saturation", "peak")
 _NAMES = frozenset(
     {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
 )
@@ -141,8 +142,10 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
     left_out = {
         "soft friction": bool(physics.parameters.get("friction_moment")),
         "presliding": bool(physics.parameters.get("presliding")),
+        "friction against rate": any(physics.parameters.get(f"friction_{form}") for form in _FRICTION_FORMS),
         "rod": physics.rod_twist is not None,
-        "delayed input": any(kind.driven for kind in problem.effects),
+        "delayed input": any(kind.delays for kind in problem.effects),
+        "actuator": any(kind.driven and not kind.delays for kind in problem.effects),
         "air": problem.data.wind_on,
     }
     found = [Fact(kind) for kind, left in left_out.items() if left]
@@ -274,14 +277,11 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
     measured = change.own(blocks * run.interval, "s")
     start, given = _start(problem, own, index), chain.physics().drive
     if given is not None:  # without the constant moment, which is written into the model
-        bare = run.moment(1.0)
-        assert bare is not None
+        acting = replace(given, offset=0.0).acting
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
         lead = problem.data.model.lead  # the engine has its own
-        times, delay = given.time_s * seconds, (given.delay + lead) * seconds
-        start = replace(
-            start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)
-        )
+        times, delay = acting.time_s * seconds, (given.delay + lead) * seconds
+        start = replace(start, drive=replace(acting, time_s=times, scale=scale, delay=delay))
     motion = simulate(common, start, measured)
     scaled = Motion(
         motion.time_s * change.similar(1.0, "s"), motion.angle, motion.rate * change.similar(1.0, "rad/s")

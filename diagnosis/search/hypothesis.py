@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+import itertools
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
+
+#: The parameters of a general form, as ``effect.parameter``.
+Form: TypeAlias = tuple[str, ...]
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
 _SAME_READING = 0.2  # noise standard deviations of a block mean
@@ -48,8 +53,7 @@ class Hypothesis:
     @property
     def forms(self) -> int:
         """How many form parameters were freed."""
-        problem = self.fit.problem
-        return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
+        return len(self.fit.problem.free_forms)
 
     @property
     def further_numbers(self) -> int:
@@ -186,17 +190,18 @@ def is_plausible(fitted: Fit) -> bool:
     """Whether every effect of a fit is still what its name means, in enough of the runs.
 
     Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
-    Neither is a power law whose free exponent ends at a bound: the readings ask for another law.
+    Neither is a power law whose free exponent ends at a bound, nor friction whose rate does: the readings ask for
+    another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     chosen = fitted.settings.search
     spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
     if spring is not None and -gravity > chosen.gravity_cancels * spring:
         return False
-    exponents = [
-        f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent
+    inside = [
+        f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.inside
     ]
-    if any(name in problem.names and fitted.bound(name) for name in exponents):
+    if any(name in problem.names and fitted.bound(name) for name in inside):
         return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(
@@ -239,7 +244,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         large.data,
         tuple(kind for kind in large.effects if kind.name in names),
         tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
-        tuple(name for name in large.free_forms if name in names),
+        tuple(name for name in large.free_forms if name.split(".")[0] in names),
         large.instants,
         large.scatter,
         large.rod_followed,
@@ -278,25 +283,39 @@ def with_forms(
         if textbook.excess > least:
             textbook = deepest(textbook)
             ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
-        freed = _free_forms(textbook) if textbook.excess > least else None
-        if freed is None:
-            continue
-        needed = []  # effects without whose form χ² would rise by a good part
-        for kind in freed.problem.effects:
-            if kind.name in freed.problem.free_forms:
-                values = [
-                    (f"{kind.name}.{info.name}", info.default) for info in kind.parameters() if info.form
-                ]
-                # a form that the runs cannot tell has no standard deviation
-                pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
-                if max(np.square(pulls), default=0.0) > chosen.form_needed * textbook.excess * textbook.count:
-                    needed.append(kind.name)
-        if needed and tuple(needed) != freed.problem.free_forms:
-            freed = _free_forms(textbook, only=needed) or freed
-        ranked[place] = of_more_weight(
-            hypothesis, dataclasses.replace(hypothesis, fit=freed, textbook=textbook), gap
-        )
+        for forms in _choices(textbook) if textbook.excess > least else ():
+            freed = _free_forms(textbook, forms)
+            if freed is None:
+                continue
+            needed = _needed(freed, forms, chosen.form_needed * textbook.excess * textbook.count)
+            if needed and needed != forms:
+                freed = _free_forms(textbook, needed) or freed
+            ranked[place] = of_more_weight(
+                ranked[place], dataclasses.replace(hypothesis, fit=freed, textbook=textbook), gap
+            )
     return sorted(ranked, key=lambda h: h.fit.total)
+
+
+def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
+    """One form of every effect that has any, in all ways; of an effect whose form is free already that one."""
+    free = fitted.problem.free_forms
+    by_effect = [
+        [tuple(f"{kind.name}.{name}" for name in form) for form in kind.forms()]
+        for kind in fitted.problem.effects
+    ]
+    by_effect = [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
+    return itertools.product(*by_effect) if by_effect else iter(())
+
+
+def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:
+    """The forms without which χ² would rise by more than a given number."""
+    infos = {f"{k.name}.{i.name}": i for k in freed.problem.effects for i in k.parameters()}
+
+    def pull(name: str) -> float:
+        std = freed.std(name)  # a form that the runs cannot tell has none
+        return (freed.value(name) - infos[name].default) / std if std > 0.0 else 0.0
+
+    return tuple(form for form in forms if max(pull(name) ** 2 for name in form) > rise)
 
 
 def polish(chosen: Hypothesis) -> Hypothesis:
@@ -312,7 +331,10 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
         # adding the ringing to the slow motion is not exact enough; the confirmation says how far off it is
         first = try_fit(problem, first.point) or first
-    better = _free_forms(first, tolerance=_POLISH) or try_fit(first.problem, first.point, tolerance=_POLISH)
+    forms = next(_choices(first), ())
+    better = _free_forms(first, forms, tolerance=_POLISH) or try_fit(
+        first.problem, first.point, tolerance=_POLISH
+    )
     if better is None or better.total > first.total:
         better = first
     better = deepest(better, tolerance=_POLISH)
@@ -327,19 +349,17 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     return Hypothesis(chosen.effects, better, textbook)
 
 
-def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | None = None) -> Fit | None:
-    """The same effects with all forms, or only those of some, free; None where none is, or nothing is gained."""
+def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:
+    """The same effects with some forms free and no others; None where none is, or nothing is gained."""
     problem = fitted.problem
-    kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
-    kinds = kinds if only is None else [kind for kind in kinds if kind.name in only]
-    if not kinds:
+    if not forms:
         return None
-    freed = dataclasses.replace(problem, free_forms=tuple(kind.name for kind in kinds))
+    freed = dataclasses.replace(problem, free_forms=tuple(name for form in forms for name in form))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
     # a form starts at the textbook value, or half a step inside a bound, where its slope may vanish
     defaults = {
         f"{k.name}.{i.name}": i.default + 0.5 * i.scale if i.default == i.lower else i.default
-        for k in kinds
+        for k in problem.effects
         for i in k.parameters()
         if i.form
     }

@@ -115,7 +115,7 @@ def likeliest_lead(study: Study) -> float:
     leads, totals = np.array(study.model.possible_leads()), []
     if not (leads.size and study.campaign.driven and study.gap.test.detected):
         return 0.0
-    effects = tuple(kind for kind in problem.effects if not kind.driven)
+    effects = tuple(kind for kind in problem.effects if not kind.delays)
     whole = dict(zip(problem.names, point.common.tolist(), strict=True))
     for lead in leads:
         runs = tuple(

@@ -168,8 +168,10 @@ PATCH: Mapping[str, Sentence] = {
     "soft friction": "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint "
     "creeps. Its time constant is set to two steps, the shortest allowed.",
     "presliding": "The presliding of the friction has no native element and is left out.",
+    "friction against rate": "The friction's dependence on the rate has no native element and is left out.",
     "rod": "The twist of the rod is left out: it needs a body and a joint of its own.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
+    "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",
     "air": "The air's moment is left out: the patched model is that of the runs with the wind off.",
     "sensor": lambda given: (
         f"Of the sensor, and not part of the model: {', '.join(plain(name) for name in given['effects'])}; the "

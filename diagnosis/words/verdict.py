@@ -46,7 +46,7 @@ from diagnosis.words.scatter import (
     without_scatter,
 )
 from identification.printing import COEFFICIENTS, significant
-from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.effects import effect_class, known_effects, the_effect
 
 _UNKNOWN = ["unknown"]
 
@@ -55,7 +55,7 @@ def headline(document: Document) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
     words, kind = _answer_in_words(document)
     if document["found"].get("hold"):
-        delay = plain(*(kind.name for kind in known_effects() if kind.driven))
+        delay = plain(the_effect(delays=True).name)
         words = words.replace(delay, f"{delay} or wrong hold")
     disturbed = [one["run"] for one in document.get("disturbed", ())]
     return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind

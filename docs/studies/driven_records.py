@@ -77,7 +77,7 @@ def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
         study = nominal_study(chosen.campaign, chosen.kinds)
     nominal = study.nominal
     infos = {f"{kind.name}.{info.name}": info for kind in kinds for info in kind.parameters()}
-    freed = {name.split(".")[0] for name in parameters if infos[name].form}
+    freed = {name for name in parameters if infos[name].form}
     problem = replace(nominal.problem, effects=chosen.kinds, free_forms=tuple(sorted(freed)))
     values = dict(zip(nominal.problem.names, nominal.point.common.tolist(), strict=True))
     for name, given in parameters.items():

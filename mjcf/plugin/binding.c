@@ -171,13 +171,14 @@ static mjtNum friction(const mjModel* m, const mjData* d, vwt_instance* instance
   const mjtNum inertia = end_inertia(m, d, self, p);
   if (p->presliding > 0) {
     const mjtNum range = vwt_presliding_range(p, inertia, m->opt.timestep);
-    return -deflection_at(state, range, now) / range * p->friction_moment;
+    const mjtNum least = vwt_friction_least_rate(p, inertia, m->opt.timestep);
+    return -deflection_at(state, range, now) / range * vwt_friction_level(p, least, fabs(now->rate));
   }
   const vwt_motion start = start_motion(state, now);
   const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
   const vwt_moments law = moments_at_start(m, d, instance, p, state, &start, now, present);
   const mjtNum other = other_moment(m, self, p, law, &start) + applied;
-  return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep);
+  return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep, now->rate);
 }
 
 void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, const vwt_state* state) {

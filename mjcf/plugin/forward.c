@@ -99,7 +99,9 @@ static Motion derivative(const Step* s, double duration, const Motion* y) {
   const vwt_parameters* p = s->p;
   const double time = s->start + duration, air = air_at(s, duration, y);
   const int coulomb = !(s->range > 0);
-  const double friction = (coulomb ? -s->slip : -deflection_at(s, duration, y) / s->range) * p->friction_moment;
+  const double along = coulomb ? s->slip * y->rate : fabs(y->rate);
+  const double friction = (coulomb ? -s->slip : -deflection_at(s, duration, y) / s->range) *
+                          vwt_friction_level(p, s->least_rate, along);
   const int stuck = coulomb && p->friction_moment > 0 && s->slip == 0;
   Motion d = {y->rate, 0, y->twist_rate, 0};
   if (s->run->twist_stiffness > 0) {
@@ -150,7 +152,7 @@ static void move(Step* s, double h, const Motion* to) {
 // Sign of the slip that starts from rest in the present state; 0 while friction sticks.
 static int slip_from_rest(const Step* s) {
   const double other = other_moment(s, air_at(s, 0, &s->from), s->start, &s->from);
-  return fabs(other) <= s->p->friction_moment ? 0 : other > 0 ? 1 : -1;
+  return fabs(other) <= vwt_friction_level(s->p, s->least_rate, 0) ? 0 : other > 0 ? 1 : -1;
 }
 
 // Length of the step after which the rate is zero, by Newton's method on repeated steps, kept between a length with
@@ -222,8 +224,10 @@ void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at
 }
 
 Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weights) {
+  const double share = run->twist_stiffness > 0 ? run->inertia_share : 1;
   const Step s = {.p = p,
                   .run = run,
+                  .least_rate = vwt_friction_least_rate(p, share * p->yaw_inertia, run->step),
                   .from = {run->angle, run->rate, run->twist, run->twist_rate},
                   .lagged = run->lagged,
                   .slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0,

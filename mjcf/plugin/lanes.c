@@ -6,7 +6,7 @@
 
 #include "step.h"
 
-enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8 };
+enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16 };  // RATE: friction that depends on the rate
 
 // Compiled for wide registers too, among which the loader chooses: no operation is fused, so the bits are the same.
 #if VWT_WIDE
@@ -26,7 +26,7 @@ typedef struct {
   int rubs;      // whether any lane has Coulomb friction
   int count;     // of the lanes that are runs; the others repeat the first one's start
   const vwt_parameters* p[VWT_LANES];
-  Lane step, whole_step, half_step, body, inertia, spring, damping, rod, friction;
+  Lane step, whole_step, half_step, body, inertia, spring, damping, rod, friction, least_rate;
   Lane air_stiffness, air_damping, moment_cubic, damping_quadratic, flow_angle;
   Lane quadratic_damping, loss, cubic, quadratic, free_play, gravity, gravity_angle;
   Lane shedding, shedding_turn, shedding_phase;
@@ -62,7 +62,8 @@ static int features_of(const vwt_parameters* p, double wind) {
                      is_free(p->stiffness_quadratic, p->stiffness_quadratic_exponent, 2);
   return (powers ? POWERS : 0) | (p->gravity_stiffness != 0 ? GRAVITY : 0) |
          (p->shedding_amplitude != 0 && p->width > 0 && wind > 0 ? SHEDDING : 0) |
-         (vwt_lag_time(p, wind) != 0 ? LAG : 0);
+         (vwt_lag_time(p, wind) != 0 ? LAG : 0) |
+         (p->friction_exponent != 0 || p->friction_saturation != 0 || p->friction_peak != 0 ? RATE : 0);
 }
 
 static void set_lane(Coefficients* c, int k, const vwt_parameters* p, const vwt_run* run) {
@@ -83,6 +84,7 @@ static void set_lane(Coefficients* c, int k, const vwt_parameters* p, const vwt_
   c->spring[k] = p->spring_stiffness;
   c->damping[k] = p->mechanical_damping;
   c->friction[k] = p->friction_moment;
+  c->least_rate[k] = vwt_friction_least_rate(p, p->yaw_inertia, run->step);
   c->air_stiffness[k] = scale * p->cn_beta;
   c->air_damping[k] = flow * p->reference_length * p->cn_r;
   c->moment_cubic[k] = p->moment_cubic;
@@ -173,7 +175,13 @@ INLINE Lane acceleration(const Coefficients* c, Lane slip, int features, Lane an
   }
   moment = moment - c->spring * angle - c->damping * rate;
   moment = moment + c->body * air - c->rod * angle;
-  return (moment - slip * c->friction) / c->inertia;
+  Lane friction = c->friction;
+  if (features & RATE) {
+    for (int k = 0; k < VWT_LANES; k++) {
+      friction[k] = vwt_friction_level(c->p[k], c->least_rate[k], slip[k] * rate[k]);
+    }
+  }
+  return (moment - slip * friction) / c->inertia;
 }
 
 INLINE Lane shed_at(const Coefficients* c, Lane time) {

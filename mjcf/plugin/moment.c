@@ -91,20 +91,46 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflec
   return moment;
 }
 
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration) {
-  const double limit = p->friction_moment;
-  if (!(limit > 0)) {
+double vwt_friction_level(const vwt_parameters* p, double least, double along) {
+  double level = p->friction_moment;
+  if (p->friction_exponent != 0) {
+    level *= pow(fabs(along) / kRateReference, p->friction_exponent);
+  }
+  if (p->friction_saturation != 0) {
+    level *= tanh(along / fmax(p->friction_saturation, least));
+  }
+  if (p->friction_peak != 0 && p->friction_peak_rate != 0) {
+    const double share = along / fmax(p->friction_peak_rate, least);
+    level *= 1 + p->friction_peak * exp(-share * share);
+  }
+  return level;
+}
+
+double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
+  return p->friction_moment * (1 + p->friction_peak) * duration / inertia;  // 1 rad in a step
+}
+
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration,
+                           double now) {
+  if (!(p->friction_moment > 0)) {
     return 0;
   }
-  const double onward = other > 0 ? -limit : limit;  // friction after the other moments have reversed the motion
-  if (rate == 0) {
-    return fabs(other) <= limit ? -other : onward;
+  const double least = vwt_friction_least_rate(p, inertia, duration), limit = vwt_friction_level(p, least, 0);
+  const double level = vwt_friction_level(p, least, fabs(now));
+  if (limit == 0) {  // it vanishes where the rate does, and needs no care there
+    return -copysign(level, now);
   }
-  const double slip = rate > 0 ? -limit : limit;
+  // friction after the other moments have reversed the motion
+  const double onward = other > 0 ? -limit : limit;
+  if (rate == 0) {
+    return fabs(other) <= limit ? -other : other > 0 ? -level : level;
+  }
+  const double start = vwt_friction_level(p, least, fabs(rate));
+  const double slip = rate > 0 ? -start : start;
   const double acceleration = (other + slip) / inertia;
   const double stop = -rate / acceleration;  // time at which the rate passes zero
   if (!(stop >= 0 && stop < duration)) {
-    return slip;
+    return rate > 0 ? -level : level;
   }
   if (fabs(other) <= limit) {
     return -other - inertia * rate / duration;  // sticks: the rate is zero at the end of the step

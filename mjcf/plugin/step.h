@@ -23,6 +23,7 @@ typedef struct {
   Motion from;         // motion there
   double lagged;       // lag state there
   int slip;            // sign of the slip under Coulomb friction; 0: at rest
+  double least_rate;   // over which the friction changes, rad/s
   double range;        // of Dahl's friction, rad; 0: none
   double deflection;   // Dahl's state at the start, rad
   LagWeights* weights;

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import copysign, pi, sin, sqrt
+from math import copysign, exp, pi, sin, sqrt, tanh
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -75,6 +75,17 @@ class Oracle:
         )
         return moment - self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
 
+    def friction(self, speed: float) -> float:
+        """Moment against a slip, at a rate without its sign."""
+        level, power = self.term("friction_moment"), self.term("friction_exponent")
+        if power:
+            level *= (speed / 2.0) ** power
+        if self.term("friction_saturation"):
+            level *= tanh(speed / self.term("friction_saturation"))
+        if self.term("friction_peak"):
+            level *= 1.0 + self.term("friction_peak") * exp(-((speed / self.term("friction_peak_rate")) ** 2))
+        return level
+
     def others(self, t: float, y: Sequence[float]) -> tuple[float, float]:
         """Moments on the spring's end without friction, and on the body (0 where the rod is rigid)."""
         angle, rate, twist, twist_rate, lagged, _ = y
@@ -88,7 +99,7 @@ class Oracle:
         """`slip` is the sign of the rate under friction, None at rest."""
         angle, rate, twist, twist_rate, lagged, deflection = state = y.tolist()
         end, body = self.others(t, state)
-        friction, reach, yielding = self.term("friction_moment"), self.term("presliding"), 0.0
+        friction, reach, yielding = self.friction(abs(rate)), self.term("presliding"), 0.0
         share = 1.0  # of the friction's moment, against the slip
         if reach > 0.0 and slip is not None:  # Dahl's: slip is the side to which the motion goes
             share = slip * deflection / reach
@@ -129,7 +140,7 @@ class Oracle:
             rest = self._way_from_rest if self.term("presliding") > 0.0 else self._slip_from_rest
             slip = int(np.sign(y[1])) or rest(t, y)
             if slip is None:
-                events.append(lambda t, y: friction - abs(self.others(t, y)[0]))
+                events.append(lambda t, y: self.friction(0.0) - abs(self.others(t, y)[0]))
                 events[-1].direction = -1
             else:
                 events.append(lambda _, y: y[1])
@@ -156,12 +167,12 @@ class Oracle:
     def _slip_from_rest(self, t: float, y: np.ndarray) -> int | None:
         other = self.others(t, y)[0]
         # just broken away counts as slipping: the event above ends a rest on the edge
-        edge = self.term("friction_moment") * (1.0 - 1e-12)
+        edge = self.friction(0.0) * (1.0 - 1e-12)
         return None if abs(other) < edge else int(np.sign(other))
 
     def _way_from_rest(self, t: float, y: np.ndarray) -> int:
         end, body = self.others(t, y)
-        end -= self.term("friction_moment") * y[5] / self.term("presliding")
+        end -= self.friction(0.0) * y[5] / self.term("presliding")
         return 1 if (end if abs(end) > 1e-12 else body) > 0.0 else -1  # from balance it follows the body
 
 

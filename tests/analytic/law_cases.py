@@ -129,6 +129,30 @@ FRICTION = (
     ),
     Case("friction_and_lag", {"friction_moment": 0.02, "aero_lag": 2.0}, tolerance=1e-6),
 )  # fmt: skip
+OF_RATE = (
+    Case(
+        "sublinear_friction", {"friction_moment": 0.05, "friction_exponent": 0.3},
+        tolerance=2e-5, forward_tolerance=2e-5,
+    ),
+    Case(
+        "saturating_friction", {"friction_moment": 0.05, "friction_saturation": 0.2},
+        tolerance=1e-6, forward_tolerance=1e-8,
+    ),
+    Case(
+        "stribeck_friction",
+        {"friction_moment": 0.02, "friction_peak": 1.0, "friction_peak_rate": 0.3},
+        tolerance=2e-6, forward_tolerance=1e-7,
+    ),
+    Case(
+        "stribeck_friction_flexible_rod",
+        {"friction_moment": 0.02, "friction_peak": 1.0, "friction_peak_rate": 0.3},
+        twist=RodTwist(2e-3, 0.3, 0.02), tolerance=2e-5, forward_tolerance=1e-5,
+    ),
+    Case(
+        "presliding_and_peak",
+        {"friction_moment": 0.02, "presliding": 0.005, "friction_peak": 1.0, "friction_peak_rate": 0.3},
+    ),
+)  # fmt: skip
 PRESLIDING = (
     Case("presliding", {"friction_moment": 0.02, "presliding": 0.005}),
     Case("wide_presliding", {"friction_moment": 0.4, "presliding": 0.1}),
@@ -145,4 +169,4 @@ PRESLIDING = (
     ),
     Case("presliding_and_lag", {"friction_moment": 0.02, "presliding": 0.005, "aero_lag": 2.0}),
 )  # fmt: skip
-CASES = (*SMOOTH, FREE_PLAY, *FRICTION, *PRESLIDING)
+CASES = (*SMOOTH, FREE_PLAY, *FRICTION, *OF_RATE, *PRESLIDING)

@@ -62,6 +62,10 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("coulomb_friction", {"friction_moment": 0.02}, replace(RUN, spring=67.98, speed=0.0, release=-0.2)),
     ("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.005}, RUN),
     ("coulomb_friction", {"friction_moment": 0.5, "presliding": 1e-4}, RUN),  # needs steps below 1 ms
+    ("coulomb_friction", {"friction_moment": 0.02, "exponent": 0.3}, RUN),
+    ("coulomb_friction", {"friction_moment": 0.02, "saturation": 0.1}, RUN),
+    ("coulomb_friction", {"friction_moment": 0.05, "saturation": 0.005}, RUN),  # needs steps below 1 ms
+    ("coulomb_friction", {"friction_moment": 0.02, "peak": 1.0, "peak_rate": 0.3}, RUN),
     ("quadratic_damping", {"coefficient": -0.002}, RUN),
     ("cubic_stiffness", {"coefficient": -2.0}, replace(RUN, release=-0.3)),
     ("asymmetric_stiffness", {"coefficient": -0.5}, replace(RUN, release=-0.3)),
@@ -198,7 +202,8 @@ def test_a_law_that_jumps_needs_the_tolerance_that_its_class_states() -> None:
 def test_every_effect_is_compared() -> None:
     compared = {name for name, _, _ in VARIANTS} | {"buffeting", "sensor_quantisation"}
     assert compared == SOLVED
-    assert compared | set(REFERRED) | {the_effect(driven=True).name} == set(VOCABULARY)
+    # those of actuators in tests/unit/driven/test_actuators.py
+    assert compared | set(REFERRED) | ON_DRIVEN_RUNS == set(VOCABULARY)
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
@@ -209,7 +214,7 @@ def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, he
     driven = replace(settings(run), drive=DriveMoment(time, values, held=held))
     found = []
     for late in (delay, 0.0):
-        chain = EffectChain(driven, (the_effect(driven=True)(late),), (None,))
+        chain = EffectChain(driven, (the_effect(delays=True)(late),), (None,))
         found.append(forward_motion(RIG, chain.physics(), run.sample_rate).angle)
         expected = oracle.driven_reading(time, values, late, run, held=held)
         assert np.max(np.abs(found[-1] - expected)) < SMOOTH
@@ -222,7 +227,7 @@ def test_a_motion_is_continuous_in_the_delay_of_its_input() -> None:
     driven = replace(settings(replace(RUN, duration=1.5)), drive=DriveMoment(time, values, held=True))
 
     def moved(delay: float) -> np.ndarray:
-        chain = EffectChain(driven, (the_effect(driven=True)(delay),), (None,))
+        chain = EffectChain(driven, (the_effect(delays=True)(delay),), (None,))
         return forward_motion(RIG, chain.physics(), RUN.sample_rate).angle
 
     # around one sample, where every jump passes from one step of the integrator to the next

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, pi, sin, sqrt
+from math import exp, hypot, pi, sin, sqrt, tanh
 from typing import Any
 
 import numpy as np
@@ -91,7 +91,7 @@ def reading(name: str, p: Parameters, run: Setting, *, own: float = 0.0) -> np.n
     if name == "coulomb_friction":
         if p.get("presliding", 0.0) > 0.0:
             return _with_presliding(p["friction_moment"], p["presliding"], run)
-        return _with_friction(p["friction_moment"], run)
+        return _with_friction(p, run)
     if name == "free_play":
         return _with_free_play(p["half_width"], run)
     if name == "rod_flexibility":
@@ -245,9 +245,19 @@ def _two_masses(p: Parameters, run: Setting) -> np.ndarray:
     return np.asarray(_solve(derivative, (held, 0.0, run.release, 0.0), run).sol(run.times)[0])
 
 
-def _with_friction(limit: float, run: Setting) -> np.ndarray:
+def _sliding(p: Parameters, speed: float) -> float:
+    """The moment that friction at a rate without its sign makes."""
+    level = p["friction_moment"]
+    if p.get("exponent", 0.0) > 0.0:
+        level *= (speed / 2.0) ** p["exponent"]
+    if p.get("saturation", 0.0) > 0.0:
+        level *= tanh(speed / p["saturation"])
+    return level * (1.0 + p.get("peak", 0.0) * exp(-((speed / p.get("peak_rate", 0.2)) ** 2)))
+
+
+def _with_friction(p: Parameters, run: Setting) -> np.ndarray:
     """From reversal to reversal with a constant sign of the rate; at rest for good once friction holds."""
-    base = nominal(run.spring, run.speed)
+    base, limit = nominal(run.spring, run.speed), _sliding(p, 0.0)
     angle, start, at = np.empty(run.times.size), 0.0, run.release
 
     while True:
@@ -257,10 +267,9 @@ def _with_friction(limit: float, run: Setting) -> np.ndarray:
             angle[here] = at
             return angle
         sign = np.sign(pull)
-        slip = -limit * float(sign)
 
-        def slipping(t: float, y: np.ndarray, slip: float = slip) -> tuple[float, float]:
-            return y[1], (base(t, y[0], y[1]) + slip) / INERTIA
+        def slipping(t: float, y: np.ndarray, way: float = float(sign)) -> tuple[float, float]:
+            return y[1], (base(t, y[0], y[1]) - way * _sliding(p, abs(y[1]))) / INERTIA
 
         leg = _solve(slipping, (at, 0.0), run, start=start, events=[_crossing(1, 0.0, -sign)])
         angle[here] = leg.sol(run.times[here])[0]

@@ -16,6 +16,7 @@ from tunnel_reference import moments as m
 from tunnel_reference.conditions import Input
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, FORMS
+from tunnel_reference.forms_actuators import ACTUATORS
 from tunnel_reference.inputs import linear_response
 from tunnel_reference.integrator import Phase, Term, integrate
 from tunnel_reference.nominal_fit import fit_driven
@@ -118,7 +119,7 @@ def test_driven_draws_drive_some_run_and_keep_the_others(seed):
 
 
 def test_driven_families_are_those_that_a_driven_run_can_show():
-    assert set(DRIVEN_FAMILIES) == set(FAMILIES) | {"input_delay"}
+    assert set(DRIVEN_FAMILIES) == set(FAMILIES) | {"input_delay"} | ACTUATORS
 
 
 @pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])

@@ -69,14 +69,18 @@ def campaign(
     effects = tuple(effect for effect in effects if effect is not None)
     kinds = tuple(type(effect) for effect in effects)
     shaped = tuple(
-        e.name for e in effects if any(i.form and getattr(e, i.name) != i.default for i in e.parameters())
+        f"{e.name}.{name}"
+        for e in effects
+        for form in e.forms()
+        if any(getattr(e, i.name) != i.default for i in e.parameters() if i.name in form)
+        for name in form
     )
     problem = Problem(Data(runs, 0.036, 0.625, 0.225, Rig().among(runs)), kinds, free_forms=shaped)
     values = [
         getattr(e, i.name)
         for e in effects
         for i in e.parameters()
-        if not i.of_input and (not i.form or e.name in shaped)
+        if not i.of_input and (not i.form or f"{e.name}.{i.name}" in shaped)
     ]
     common = np.array([INERTIA, damping, CN_BETA, CN_R, 0.001, *values])
     # phases (rad) or instants (shares of the run)

@@ -72,6 +72,8 @@ class Effect:
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
+    - ``delays``: whether it shifts the input of driven runs in time.
+    - ``of_moment``: whether it changes an input that is a moment on the body, not the motion of a spring's root.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
@@ -108,6 +110,8 @@ class Effect:
     on_spring: ClassVar[bool] = False
     parts: ClassVar[bool] = False
     driven: ClassVar[bool] = False
+    delays: ClassVar[bool] = False
+    of_moment: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""
@@ -143,6 +147,12 @@ class Effect:
             ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
             for own in dataclasses.fields(cls)
         )
+
+    @classmethod
+    def forms(cls) -> tuple[tuple[str, ...], ...]:
+        """The general forms, each by the names of its parameters; a fit frees one of them, the first by default."""
+        names = tuple(info.name for info in cls.parameters() if info.form)
+        return (names,) if names else ()
 
     @classmethod
     def column(cls, effects: Sequence[Effect], name: str) -> Array:

@@ -1,4 +1,4 @@
-"""Effects of the spring, the rod and gravity, of friction and of mechanical damping."""
+"""Effects of the spring, the rod and gravity, and of mechanical damping."""
 
 from __future__ import annotations
 
@@ -293,70 +293,6 @@ class SpringMiscalibration(Effect):
 
 
 @dataclass(frozen=True)
-class CoulombFriction(Effect):
-    """Dry friction in the rod's bearing and potentiometer.
-
-    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
-    doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
-    2 Tc/zs is the stiffness just after the sliding reverses.
-    """
-
-    name = "coulomb_friction"
-    place = 1
-    channel = "damping"
-    condition = "always"
-    jumps = True
-    size = "dry friction of {friction_moment}"
-    advice = "Free the bearing and the potentiometer of their dry friction"
-    equation = (
-        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
-    )
-    signature = (
-        "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
-        "as the amplitude decays, and the body can come to rest off centre."
-    )
-    references = (
-        "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
-        "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
-    )
-    example = (0.05,)
-
-    friction_moment: float = parameter("Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4)
-    presliding: float = parameter(
-        "zs",
-        "rad",
-        "deflection at which the contact slides",
-        scale=0.005,
-        lower=0.0,
-        upper=0.2,
-        fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
-        form=True,
-    )
-
-    def stands(self, stiffness: float) -> float:
-        """The angle at which the spring's moment is that of the friction, rad."""
-        return self.friction_moment / stiffness if stiffness > 0.0 else 0.0
-
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the terms of the moment law, with steps short enough to resolve the presliding range."""
-        del stated, drawn
-        sliding = run.with_parameters({"friction_moment": self.friction_moment})
-        if self.is_null or self.presliding == 0.0:
-            return sliding
-        return steps.for_contact(sliding.with_parameters({"presliding": self.presliding}))
-
-    @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
-    ) -> None:
-        """Set the terms of the moment law."""
-        del stated, drawn
-        friction = cls.column(effects, "friction_moment")
-        runs["friction_moment"][:] = friction
-        runs["presliding"][:] = np.where(friction != 0.0, cls.column(effects, "presliding"), 0.0)
-
-
-@dataclass(frozen=True)
 class QuadraticDamping(Effect):
     """Damping that grows with the square of the rate."""
 
@@ -376,7 +312,9 @@ class QuadraticDamping(Effect):
         "C2", "N m s2/rad2", "coefficient of the squared rate",
         scale=0.002, lower=-1e4, upper=1e4, fit_lower=0.0, rate_exponent="exponent",
     )  # fmt: skip
-    exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
+    exponent: float = exponent(
+        "n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0, fit_lower=1.0
+    )  # a lower power is dry friction
 
 
 _AFTER_EFFECT = parse("size*log((t + lead)/length)", frozenset({"size", "t", "lead", "length"}))

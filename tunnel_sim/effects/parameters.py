@@ -37,7 +37,7 @@ class ParameterInfo:
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
-        exponent: whether it is the free exponent of a power law.
+        inside: whether a fit that ends at a bound of it asks for another law, as with a free exponent.
         of_input: whether it says what the effect has to do with the input of a driven run; values are tried and not
             fitted. Free decays do not depend on it.
     """
@@ -57,7 +57,7 @@ class ParameterInfo:
     beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
-    exponent: bool
+    inside: bool
     of_input: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
@@ -95,7 +95,7 @@ def parameter(
     beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
-    exponent: bool = False,
+    inside: bool = False,
     of_input: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
@@ -113,21 +113,22 @@ def parameter(
         "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,
-        "exponent": exponent,
+        "inside": inside,
         "of_input": of_input,
     }
     return field(default=default, metadata=metadata)
 
 
-def exponent(symbol: str, meaning: str, textbook: float) -> Any:
+def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float | None = None) -> Any:
     """A form parameter that is the exponent of a term; its default is the textbook's.
 
     Args:
         textbook: exponent of the textbook form, dimensionless.
+        fit_lower: least value a fit may take, dimensionless; None: the least that is allowed.
     """
     return parameter(
-        symbol, "1", meaning,
-        scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True, exponent=True,
+        symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True,
+        inside=True, fit_lower=fit_lower,
     )  # fmt: skip
 
 
@@ -160,12 +161,16 @@ class Circumstances:
     Args:
         greatest_reading: greatest absolute reading of any run, rad.
         slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
+        greatest_moment: that an input asks for, N m, by the fit without the effect; 0 where none moves the body.
+        fastest_moment: greatest rate of change that an input asks for, N m/s, from sample to sample.
     """
 
     springs: tuple[float, ...]
     greatest_reading: float
     normalised: bool
     slowest_wind: float
+    greatest_moment: float = 0.0
+    fastest_moment: float = 0.0
 
 
 @dataclass(frozen=True)

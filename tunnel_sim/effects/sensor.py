@@ -460,6 +460,7 @@ class InputDelay(Effect):
     example = (0.02,)
     autonomous = False
     driven = True
+    delays = True
 
     delay: float = parameter(
         "τ",

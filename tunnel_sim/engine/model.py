@@ -311,9 +311,9 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         values[f"{name}_interval"] = (series.interval,)
     if settings.program:
         values["moment_program"] = settings.program
-    drive = settings.drive
-    if drive is None:
+    if settings.drive is None:
         return values
+    drive = settings.drive.acting
     times, given, held, step = drive.time_s, drive.values, drive.held, settings.timestep
     if not drive.at_steps(step):  # by its means over the steps, which is of second order
         given = drive.means(step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 3))

@@ -199,6 +199,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         if effect.driven and not drives:
             what = "acts on driven runs only, and all runs of the plan are free decays"
             raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
+        if effect.of_moment and not any(drive.on_body for drive in drives):
+            what = "changes the moment of a drive, and here the drive moves the spring's root"
+            raise TunnelError(what, where=where, remedy="leave it out, or drive the body by amplitudes_nm")
         if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
             what = "is a loss in the spring, which is not simulated where its root moves"
             remedy = "leave out the effect, or drive the body by amplitudes_nm"

@@ -74,7 +74,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
     imposed = _NONE if forcing is None else np.array(forcing.values, dtype=np.float64)
     program = np.array(settings.program, dtype=np.float64) if settings.program else _NONE
-    drive = settings.drive
+    drive = None if settings.drive is None else settings.drive.acting
     driven = () if drive is None else (drive.values, drive.time_s)
     fields = {
         "wind": values.ctypes.data,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.physics.actuator import DIRECT, Actuator, Samples, recurrence
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -117,6 +118,8 @@ class DriveMoment:
         scale: N m per unit.
         delay: by which it acts later than its samples, s.
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
+        actuator: what stands between the samples and the body.
+        offset: a constant moment beside it, which does not pass through the actuator, N m.
     """
 
     time_s: Array
@@ -125,15 +128,35 @@ class DriveMoment:
     delay: float = 0.0
     held: bool = False
     on_body: bool = True
+    actuator: Actuator = DIRECT
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         """Copy and check the samples."""
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
-        numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay]])
+        numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay, self.offset]])
         if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
+
+    @cached_property
+    def acting(self) -> DriveMoment:
+        """What acts, as samples that need no actuator and no offset."""
+        if self.actuator == DIRECT and not self.offset:
+            return self
+        given = self.actuator.exerted(Samples(self.time_s, self.values, self.held), self.scale)
+        beside = self.offset / self.scale if self.scale and self.offset else 0.0
+        return DriveMoment(
+            given.time_s, given.values + beside, self.scale, self.delay, given.held, self.on_body
+        )
+
+    @property
+    def greatest(self) -> tuple[float, float]:
+        """Greatest magnitudes of the moment (N m) and of its rate of change from sample to sample (N m/s)."""
+        size = abs(self.scale)
+        rates = np.abs(np.diff(self.values)) / np.diff(self.time_s)
+        return size * float(np.max(np.abs(self.values))), size * float(np.max(rates, initial=0.0))
 
     def at_steps(self, step: float) -> bool:
         """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay.
@@ -159,10 +182,11 @@ class DriveMoment:
         Returns:
             In the unit of the values, shape (n,).
         """
-        times, given, ends = self.time_s, self.values, ends - self.delay
+        acting = self.acting
+        times, given, ends = acting.time_s, acting.values, ends - acting.delay
         before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
-        now = given[before] if self.held else np.interp(ends, times, given)
-        until = np.diff(times) * (given[:-1] if self.held else 0.5 * (given[:-1] + given[1:]))
+        now = given[before] if acting.held else np.interp(ends, times, given)
+        until = np.diff(times) * (given[:-1] if acting.held else 0.5 * (given[:-1] + given[1:]))
         integral = np.append(0.0, np.cumsum(until))[before]
         integral += 0.5 * (given[before] + now) * (ends - times[before])
         return np.asarray(np.diff(integral) / np.diff(ends), np.float64)
@@ -183,13 +207,14 @@ class DriveMoment:
         """
         ringing = np.sqrt(1.0 - damping_ratio**2)
         pole = frequency * complex(-damping_ratio, ringing)
-        kinks, last = self.time_s + self.delay, self.values.size - 1
+        acting = self.acting
+        kinks, last = acting.time_s + acting.delay, acting.values.size - 1
         starts = np.concatenate([[0.0], kinks[kinks > 0.0]])
         piece = np.searchsorted(kinks, starts, side="right") - 1  # -1 before the first sample
         at = np.clip(piece, 0, last)
-        slope = np.append(np.diff(self.values) / np.diff(self.time_s), 0.0)[at]
-        slope = np.where((piece < 0) | self.held, 0.0, slope)
-        level = self.values[at] + slope * (starts - kinks[at])
+        slope = np.append(np.diff(acting.values) / np.diff(acting.time_s), 0.0)[at]
+        slope = np.where((piece < 0) | acting.held, 0.0, slope)
+        level = acting.values[at] + slope * (starts - kinks[at])
 
         def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
             turn = pole * since
@@ -199,12 +224,7 @@ class DriveMoment:
 
         factor = np.exp(pole * np.diff(starts))
         state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
-        factor = np.concatenate([[0j], factor])
-        reach = 1
-        while reach < state.size:  # of z at the starts, each from twice as many pieces as before
-            state[reach:] += factor[reach:] * state[:-reach]
-            factor[reach:] *= factor[:-reach]
-            reach *= 2
+        state = recurrence(np.concatenate([[0j], factor]), state)  # z at the starts
         j = np.maximum(np.searchsorted(starts, time_s, side="right") - 1, 0)
         since = np.maximum(time_s - starts[j], 0.0)
         state = np.exp(pole * since) * state[j] + forced(j, since)
@@ -313,7 +333,8 @@ class RunSettings:
             the rod is rigid.
         """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
-        drive = self.drive  # given by its samples, or by its means over the steps
+        # given by its samples, or by its means over the steps
+        drive = None if self.drive is None else self.drive.acting
         driven = drive and (drive.values.size, drive.delay, drive.time_s[-1], drive.at_steps(self.timestep))
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 

@@ -141,17 +141,27 @@ def for_rod(run: RunSettings) -> RunSettings:
 
 
 def for_contact(run: RunSettings) -> RunSettings:
-    """The run with steps in which the motion after a reversal covers at most half the presliding range."""
-    reach, friction = (run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment"))
-    if reach == 0.0:
+    """The run with steps short enough for the contact that rubs.
+
+    The motion after a reversal covers at most half the presliding range, and friction that depends on the rate
+    changes the rate by at most half of what the friction itself changes over.
+    """
+    reach, friction, peak = (
+        run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
+    )
+    names = ("friction_saturation", "friction_peak_rate")
+    rates = [rate for name in names if (rate := run.parameters.get(name, 0.0)) > 0.0]
+    if friction == 0.0 or (reach == 0.0 and not rates):
         return run
     share = run.rod_twist.inertia_share if run.rod_twist is not None else 1.0
     inertia = share * run.yaw_inertia
-    swing = run.spring_stiffness * abs(run.release_angle)
-    swing += sqrt(run.spring_stiffness * inertia) * abs(run.release_rate)
-    acceleration = max(swing, friction) / inertia
-    step = sqrt(max(reach, _LEAST_RANGE) / acceleration)
-    return _divided(run, min(_MOST_CONTACT_SUBSTEPS, max(1, ceil(run.timestep / step))))
+    longest = [0.5 * rate * inertia / (friction * (1.0 + peak)) for rate in rates]
+    if reach != 0.0:
+        swing = run.spring_stiffness * abs(run.release_angle)
+        swing += sqrt(run.spring_stiffness * inertia) * abs(run.release_rate)
+        acceleration = max(swing, friction) / inertia
+        longest.append(sqrt(max(reach, _LEAST_RANGE) / acceleration))
+    return _divided(run, min(_MOST_CONTACT_SUBSTEPS, max(1, ceil(run.timestep / min(longest)))))
 
 
 def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:

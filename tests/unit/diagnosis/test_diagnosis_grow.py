@@ -250,9 +250,34 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
         whole.effects, fit(replace(whole.fit.problem, free_forms=()), textbook_point(whole.fit))
     )
     (freed,) = with_forms([kept], misfit(base), 0.0)
-    assert freed.fit.problem.free_forms == ("asymmetric_stiffness",)
+    assert freed.fit.problem.free_forms == ("asymmetric_stiffness.exponent",)
     assert freed.textbook is kept.fit
     assert within_noise(freed.fit)
+
+
+@pytest.mark.parametrize(
+    ("form", "freed"),
+    [
+        ({"exponent": 0.3}, ("exponent",)),
+        ({"saturation": 0.4}, ("saturation",)),
+        ({"peak": 1.0, "peak_rate": 0.4}, ("peak", "peak_rate")),
+        ({"presliding": 0.02}, ("presliding",)),
+    ],
+    ids=lambda given: next(iter(given)),
+)
+def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
+    """One form of several, at its own values."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.008, **form})
+    base = nominal(gap_campaigns.campaign(friction))
+    (lead,) = starting_points(base, type(friction))
+    textbook = Hypothesis(("coulomb_friction",), fit(lead.problem, lead.point, base=base))
+    assert not within_noise(textbook.fit)
+    (found,) = with_forms([textbook], misfit(base), 0.0)
+    assert found.fit.problem.free_forms == tuple(f"coulomb_friction.{name}" for name in freed)
+    assert within_noise(found.fit)
+    for name, value in form.items():
+        full = f"coulomb_friction.{name}"
+        assert abs(found.fit.value(full) - value) < max(5.0 * found.fit.std(full), 0.02 * value)
 
 
 def textbook_point(found: Fit) -> Point:

@@ -262,3 +262,15 @@ def test_an_effect_that_would_have_to_be_larger_than_it_may_is_not_tried(monkeyp
     far = Trial({"limit": 3.6, "centre": 6.4}, None)
     monkeypatch.setattr(clipping, "trials", lambda _: (far,))
     assert starting_points(base, clipping) == []
+
+
+@pytest.mark.parametrize("angle", [1e7, 1e308, np.inf])
+def test_a_start_beyond_any_motion_has_no_prediction(angle: float):
+    """A fit may try one; a rod would be released at an angle that is no number."""
+    base = nominal(campaign())
+    release = base.point.release.copy()
+    release[0, 0] = angle
+    rod = starting_points(base, effect_class("rod_flexibility"))[0]
+    first, second, *_ = rod.problem.predict([Point(rod.point.common, release)])[0]
+    assert np.all(np.isinf(first))
+    assert np.all(np.isfinite(second))

@@ -55,8 +55,10 @@ def test_a_stretch_moves_as_it_does_alone(kind, data):
     release = np.array([[0.05 * (k + 1), 0.2 - 0.1 * k] for k in range(len(stretches))])
     common = [0.11, 0.05, *(0.01 * (k + 1) for k in range(30))]
 
+    forms = tuple(f"{kind.name}.{info.name}" for info in kind.parameters() if info.form)
+
     def predicted(runs, release):
-        problem = Problem(data.with_runs(tuple(runs)), (kind,), free_forms=(kind.name,))
+        problem = Problem(data.with_runs(tuple(runs)), (kind,), free_forms=forms)
         within = np.clip(common[: len(problem.names)], *problem.bounds)
         return problem.predict([Point(within, release)])[0]
 

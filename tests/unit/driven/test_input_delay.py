@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
-DELAY = the_effect(driven=True)
+DELAY = the_effect(delays=True)
 FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness", "rod_flexibility", "sensor_drift"])
 
 
@@ -76,7 +76,11 @@ def test_it_is_named_with_its_value(delay: float, kinds: Sequence[type[Effect]])
     assert found.gap.closed > 0.99
     assert found.sizes == ()  # it has none in a free decay
     assert found.found.hold is None  # no hold is wrong by two samples
-    assert headline(found.to_json_dict())[0] == "input delay"
+    # of 4 ms, ωτ is 0.05 at the resonance: a lag of the actuator is then nearly the same
+    rival = 0.0 < delay < 0.01 and kinds is ALL_EFFECTS
+    said = headline(found.to_json_dict())[0]
+    assert said.startswith("either input delay") if rival else said == "input delay"
+    assert ("actuator lag" in said) == rival
 
 
 @SLOW
@@ -94,14 +98,19 @@ def test_it_is_not_named_where_there_is_none(cubic: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kinds", [FEW, ALL_EFFECTS], ids=["few", "all"])
-def test_a_lag_of_the_sensor_far_above_the_band_is_a_delay_of_the_input(
-    kinds: Sequence[type[Effect]],
+@pytest.mark.parametrize(
+    ("kinds", "name", "parameter"),
+    [(FEW, DELAY.name, "delay"), (ALL_EFFECTS, "actuator_lag", "lag")],
+    ids=["few", "all"],
+)
+def test_a_lag_of_the_sensor_far_above_the_band_is_a_delay_of_the_input_or_a_lag_of_the_actuator(
+    kinds: Sequence[type[Effect]], name: str, parameter: str
 ) -> None:
     """The page what-no-driven-record-can-show.md says so: of a lag of 5 ms, ωT is 0.06 at the resonance."""
     found = diagnose(campaign(lag=0.005), kinds=kinds)
-    assert found.causes == (DELAY.name,)
-    assert found.candidates[0].parameters["delay"].value == pytest.approx(0.005, rel=0.01)
+    assert found.causes == (name,)
+    assert found.candidates[0].parameters[parameter].value == pytest.approx(0.005, rel=0.01)
+    assert DELAY.name in [one.effect for one in found.candidates]
 
 
 def test_a_small_delay_changes_stiffness_and_damping_as_the_page_says() -> None:
@@ -115,7 +124,7 @@ def test_it_is_left_out_without_a_word_where_no_run_is_driven() -> None:
     driven = campaign()
     free = replace(driven, runs=tuple(replace(run, drive=None) for run in driven.runs))
     assert kinds_for(free, ALL_EFFECTS, Rig()) == (
-        tuple(kind for kind in ALL_EFFECTS if kind is not DELAY),
+        tuple(kind for kind in ALL_EFFECTS if not kind.driven),
         (),
     )
     assert DELAY in kinds_for(driven, ALL_EFFECTS, Rig())[0]

@@ -115,8 +115,9 @@ def test_a_twin_of_a_known_effect_is_recognised() -> None:
 
 
 def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
-    kind = the_effect(driven=True)
+    kind = the_effect(delays=True)
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
-    assert found.fault == ""
+    # of small ones, linear theory tells no delay from a lag
+    assert found.fault == "it moves the rig as actuator_lag does"
     assert "12 simulated driven runs" in found.lines()[0]

@@ -11,7 +11,11 @@ from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.parameters import SWING, WindOnRun
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.settings_table import SettingsTable
 
+RIG = load_rig()
 TIME = np.linspace(0.0, 10.0, 1001)
 ANGLE = 0.3 * np.exp(-0.1 * TIME) * np.cos(9.0 * TIME)
 STATED = dataclasses.replace(settings(Setting(duration=10.0)), wind_speed=25.0)
@@ -26,7 +30,7 @@ def read(name: str, **parameters: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("kind", "info"), FORMS, ids=[f"{k.name}-{i.name}" for k, i in FORMS])
 def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) -> None:
-    values = VALUES[kind.name]
+    values = VALUES[kind.name] | ({"peak": 0.5} if info.name == "peak_rate" else {})
     plain, stated = (
         effect_from(kind.name, values),
         effect_from(kind.name, {**values, info.name: info.default}),
@@ -132,3 +136,69 @@ def test_a_range_per_squared_angle_follows_the_swing() -> None:
         info for info in effect_class("coulomb_friction").parameters() if info.name == "presliding"
     )
     assert contact.fit_range(0.1 * SWING) == pytest.approx((0.1 * contact.fit_lower, contact.fit_upper))
+
+
+SLIDING = {
+    "exponent": ({"exponent": 0.3}, lambda v: (v / 2.0) ** 0.3),
+    "saturation": ({"saturation": 0.5}, lambda v: np.tanh(v / 0.5)),
+    "peak": ({"peak": 0.8, "peak_rate": 0.4}, lambda v: 1.0 + 0.8 * np.exp(-((v / 0.4) ** 2))),
+}
+
+
+@pytest.mark.parametrize(("form", "factor"), SLIDING.values(), ids=SLIDING)
+def test_sliding_friction_depends_on_the_rate_and_is_tc_at_the_reference_rate(form, factor) -> None:
+    """A body on no spring that slides for half a millisecond: its rate falls by the friction alone."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.02, **form})
+    run = dataclasses.replace(
+        STATED, spring_stiffness=0.0, wind_speed=0.0, mechanical_damping=0.0, release_angle=0.0, duration=0.002,
+        timestep=0.0005,
+    )  # fmt: skip
+    for speed in (0.1, 0.4, 2.0):
+        slid = friction.on_run(dataclasses.replace(run, release_rate=-speed), run, None)
+        lost = forward_motion(RIG, slid, 2000.0).rate[1] + speed
+        assert lost * run.yaw_inertia / slid.timestep == pytest.approx(0.02 * factor(speed), rel=2e-3)
+    assert factor(2.0) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_friction_in_rows_is_that_of_each_run() -> None:
+    forms = [{}, {"presliding": 0.01}, *(form for form, _ in SLIDING.values()), {"exponent": 0.2}]
+    severities = [0.02] * 5 + [0.0]
+    effects = [
+        effect_from("coulomb_friction", {"friction_moment": severity, **form})
+        for severity, form in zip(severities, forms, strict=True)
+    ]
+    rows, stated = (SettingsTable.of([STATED] * len(effects)) for _ in range(2))
+    type(effects[0]).on_rows(rows, stated, effects, [None] * len(effects))
+    single = SettingsTable.of([effect.on_run(STATED, STATED, None) for effect in effects])
+    assert np.array_equal(rows.law, single.law)
+
+
+def test_the_textbook_friction_has_no_term_of_the_rate() -> None:
+    plain = effect_from("coulomb_friction", {"friction_moment": 0.02}).on_run(STATED, STATED, None)
+    assert dict(plain.parameters) == {"friction_moment": 0.02}
+
+
+def test_friction_that_vanishes_at_rest_holds_nothing() -> None:
+    def stands(**form: float) -> float:
+        return effect_from("coulomb_friction", {"friction_moment": 0.02, **form}).stands(4.0)
+
+    assert stands() == pytest.approx(0.005)
+    assert stands(peak=0.5) == pytest.approx(0.0075)
+    assert stands(exponent=0.3) == stands(saturation=0.1) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [
+        ({}, "dry friction of 0.02 N m"),
+        ({"exponent": 0.3}, "dry friction of 0.02 N m that rises as the rate to the power of 0.3 1"),
+        ({"saturation": 0.1}, "dry friction of 0.02 N m that fades below a rate of 0.1 rad/s"),
+        (
+            {"peak": 0.5, "peak_rate": 0.1},
+            "dry friction of 0.02 N m and up to 50 % more below a rate of 0.1 rad/s",
+        ),
+    ],
+)
+def test_the_form_of_friction_is_said(form: dict[str, float], said: str) -> None:
+    kind = effect_class("coulomb_friction")
+    assert kind.phrase({"friction_moment": 0.02, **form}, {}, lambda v, _std, unit: f"{v:g} {unit}") == said

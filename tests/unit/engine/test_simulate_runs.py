@@ -43,6 +43,10 @@ MIXED = [
     replace(PLAIN, timestep=5e-4, parameters={"free_play": 0.01}),
     replace(PLAIN, rod_twist=TWIST, parameters={"friction_moment": 0.02, "aero_lag": -1.0}),
     replace(PLAIN, rod_twist=TWIST, parameters={"friction_moment": 0.02, "presliding": 0.003}),
+    replace(
+        PLAIN, parameters={"friction_moment": 0.02, "friction_exponent": 0.3, "friction_saturation": 0.1}
+    ),
+    replace(PLAIN, parameters={"friction_moment": 0.02, "friction_peak": 0.5, "friction_peak_rate": 0.1}),
 ]
 
 

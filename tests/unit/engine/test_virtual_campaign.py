@@ -109,9 +109,12 @@ def test_the_truth_holds_what_was_injected(plan: CampaignPlan) -> None:
     assert (truth["noise_std"], truth["sensor_zero"], truth["seed"]) == (0.0004, 0.002, 4)
     assert truth["effects"] == ["coulomb_friction", "mains_hum"]
     assert truth["parameters"] == {
-        "coulomb_friction": {"friction_moment": 0.05, "presliding": 0.0},
+        "coulomb_friction": {
+            "friction_moment": 0.05, "presliding": 0.0,
+            "exponent": 0.0, "saturation": 0.0, "peak": 0.0, "peak_rate": 0.2,
+        },
         "mains_hum": {"amplitude": 0.003, "frequency": 50.0},
-    }
+    }  # fmt: skip
     assert set(truth["versions"]) == {"mujoco", "numpy"}
 
 

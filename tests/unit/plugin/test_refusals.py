@@ -17,6 +17,7 @@ from tunnel_sim.physics.moment_law import parameter_names
 PLUGIN_SOURCE = Path(__file__).parents[3] / "mjcf" / "plugin"
 NOT_NEGATIVE = ("air_density", "frontal_area", "reference_length", "width", "strouhal_number")
 NOT_NEGATIVE += ("friction_moment", "presliding", "free_play")
+NOT_NEGATIVE += ("friction_exponent", "friction_saturation", "friction_peak", "friction_peak_rate")
 OWNED = ("spring_stiffness", "mechanical_damping", "yaw_inertia")
 SERIES = {"wind_speed": "20 21 22", "wind_speed_interval": "0.5"}
 

@@ -1,0 +1,121 @@
+"""Effects of the actuator of a driven run: its lag, its greatest moment and its greatest rate of change.
+
+They change the moment on the body that the run file states, not the motion of a spring's root. Between its samples
+the input is held or linear, as the run states it. However many of them act, the moment is first clipped, then
+limited in its rate, then lagged. A recorded run begins with an actuator that follows its first sample.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
+from tunnel_sim.physics.run_settings import RunSettings
+
+_FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
+_SLOW = 0.03
+"""Least ωτ of a lag: the gain of a faster one falls by (ωτ)²/2, less than half a thousandth, and it is a delay."""
+_LIMITS = (0.95, 0.85, 0.7, 0.5, 0.3)
+"""Greatest moments that are tried, over the greatest one asked for."""
+_RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
+"""Greatest rates that are tried, over the greatest one asked for: of a smooth input, and of one that jumps."""
+
+
+@dataclass(frozen=True)
+class _OfActuator(Effect):
+    """What the effects of an actuator share: they set one of its numbers, where it moves the body."""
+
+    channel = "forcing"
+    condition = "always"
+    autonomous = False
+    driven = True
+    of_moment = True
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Change the actuator; a free decay has none."""
+        del stated, drawn
+        if self.is_null or run.drive is None or not run.drive.on_body:
+            return run
+        own = {info.name: getattr(self, info.name) for info in self.parameters()}
+        actuator = dataclasses.replace(run.drive.actuator, **own)
+        return dataclasses.replace(run, drive=dataclasses.replace(run.drive, actuator=actuator))
+
+
+@dataclass(frozen=True)
+class ActuatorSaturation(_OfActuator):
+    """An actuator whose moment is limited."""
+
+    name = "actuator_saturation"
+    place = 30
+    size = "an actuator that exerts at most {limit}"
+    advice = "Ask the actuator for less, or record the moment that it exerts"
+    equation = "|moment| ≤ M, in driven runs"
+    signature = (
+        "Small inputs act as stated; at the peaks of large ones the motion falls short of the nominal model."
+    )
+    references = (_FRANKLIN,)
+    example = (0.6,)
+    tries = 2
+
+    limit: float = parameter("M", "N m", "greatest moment (0: no limit)", scale=1.0, lower=0.0, upper=1e6)
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Limits below the greatest moment that any run asks for."""
+        return [Trial({"limit": share * campaign.greatest_moment}, None) for share in _LIMITS]
+
+
+@dataclass(frozen=True)
+class ActuatorRateLimit(_OfActuator):
+    """An actuator whose moment changes at a limited rate."""
+
+    name = "actuator_rate_limit"
+    place = 31
+    size = "an actuator whose moment changes by at most {rate}"
+    advice = "Ask the actuator for slower changes, or record the moment that it exerts"
+    equation = "|d moment/dt| ≤ R, in driven runs"
+    signature = (
+        "Slow parts of the input act as stated; for fast and large ones the moment becomes a triangle, late and "
+        "too small."
+    )
+    references = (_FRANKLIN,)
+    example = (3.0,)
+    tries = 2
+
+    rate: float = parameter(
+        "R", "N m/s", "greatest rate of change (0: no limit)", scale=10.0, lower=0.0, upper=1e9
+    )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Rates below the greatest one that any run asks for."""
+        return [Trial({"rate": share * campaign.fastest_moment}, None) for share in _RATES]
+
+
+@dataclass(frozen=True)
+class ActuatorLag(_OfActuator):
+    """An actuator whose moment follows the input with a lag of first order."""
+
+    name = "actuator_lag"
+    place = 32
+    size = "an actuator that follows its input with a time constant of {lag}"
+    advice = "Record the moment that the actuator exerts, or use a faster one"
+    equation = "τ dm/dt + m = u for the moment m of the stated input u, in driven runs"
+    signature = (
+        "The phase between input and angle falls by arctan ωτ and the gain by √(1 + ω²τ²): like a delay at low "
+        "frequencies, less late and smaller at high ones."
+    )
+    references = (_FRANKLIN,)
+    example = (0.02,)
+
+    lag: float = parameter(
+        "τ", "s", "time constant of the lag",
+        scale=0.002, lower=0.0, upper=10.0, fit_upper=1.0,
+    )  # fmt: skip
+
+    def plausible(self, omega: float) -> bool:
+        """Whether it is more than a delay of the input to the motion: as slow as `_SLOW`."""
+        return self.lag * omega > _SLOW

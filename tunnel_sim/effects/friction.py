@@ -1,0 +1,140 @@
+"""Dry friction and its general forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.effects.base import Drawn, Effect, Text
+from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.physics import steps
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
+
+# At 2 rad/s, saturating friction has then risen to 96 %, and 2 % of a peak remain. Beyond, it would follow damping.
+_LOW_RATE = 1.0  # rad/s
+_CONTACT = {  # parameters of the moment law by those of the friction's forms
+    "presliding": "presliding",
+    "friction_exponent": "exponent",
+    "friction_saturation": "saturation",
+    "friction_peak": "peak",
+    "friction_peak_rate": "peak_rate",
+}
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """Dry friction in the rod's bearing and potentiometer.
+
+    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
+    doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
+    2 Tc/zs is the stiffness just after the sliding reverses.
+
+    Sliding friction depends on the rate in three ways: it rises as a power less than one, it saturates, or it has a
+    peak near rest (Armstrong-Hélouvry et al. 1994). All of them leave the friction less than proportional to the
+    rate, which separates the family from damping.
+    """
+
+    name = "coulomb_friction"
+    place = 1
+    channel = "damping"
+    condition = "always"
+    jumps = True
+    size = "dry friction of {friction_moment}"
+    advice = "Free the bearing and the potentiometer of their dry friction"
+    equation = (
+        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general forms: −Tc z/zs, ż = β̇ − |β̇| z/zs; "
+        "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc"
+    )
+    signature = (
+        "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
+        "as the amplitude decays, and the body can come to rest off centre."
+    )
+    references = (
+        "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
+        "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
+        "Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994) 1083, doi 10.1016/0005-1098(94)90209-7",
+    )
+    example = (0.05,)
+
+    friction_moment: float = parameter(
+        "Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4, rate_exponent="exponent"
+    )
+    presliding: float = parameter(
+        "zs",
+        "rad",
+        "deflection at which the contact slides",
+        scale=0.005,
+        lower=0.0,
+        upper=0.2,
+        fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
+        form=True,
+    )
+    exponent: float = parameter(
+        "n", "1", "power of the rate in the moment (unchanged at 2 rad/s)",
+        scale=0.4, lower=0.0, upper=0.9, form=True, inside=True,
+    )  # fmt: skip
+    saturation: float = parameter(
+        "v0", "rad/s", "rate at which the friction has risen to 76 %; 0: no rise",
+        scale=0.1, lower=0.0, upper=10.0, fit_lower=2e-3, fit_upper=_LOW_RATE,
+        form=True, inside=True,
+    )  # fmt: skip
+    peak: float = parameter(
+        "b", "1", "friction near rest over that of fast sliding, less one",
+        scale=1.0, lower=0.0, upper=9.0, form=True,
+    )  # fmt: skip
+    peak_rate: float = parameter(
+        "vs", "rad/s", "rate at which 37 % of the peak remains",
+        scale=0.1, lower=1e-3, upper=10.0, fit_lower=0.01, fit_upper=_LOW_RATE, default=0.2,
+        form=True, inside=True,
+    )  # fmt: skip
+
+    @classmethod
+    def forms(cls) -> tuple[tuple[str, ...], ...]:
+        """The contact's deflection, and each dependence on the rate."""
+        return ("presliding",), ("exponent",), ("saturation",), ("peak", "peak_rate")
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
+        """The friction, and how it depends on the rate."""
+        said = super().phrase(values, stds, text)
+        power, saturation, peak = (values.get(name, 0.0) for name in ("exponent", "saturation", "peak"))
+        if power > 0.0:
+            return f"{said} that rises as the rate to the power of {text(power, stds.get('exponent'), '1')}"
+        if saturation > 0.0:
+            return f"{said} that fades below a rate of {text(saturation, stds.get('saturation'), 'rad/s')}"
+        if peak > 0.0:
+            std, rate = stds.get("peak"), text(values["peak_rate"], stds.get("peak_rate"), "rad/s")
+            more = text(100.0 * peak, None if std is None else 100.0 * std, "%")
+            return f"{said} and up to {more} more below a rate of {rate}"
+        return said
+
+    def stands(self, stiffness: float) -> float:
+        """The angle at which the spring's moment is that of the friction at rest, rad; 0 where it then vanishes."""
+        rises = self.exponent > 0.0 or self.saturation > 0.0
+        at_rest = 0.0 if rises else self.friction_moment * (1.0 + self.peak)
+        return at_rest / stiffness if stiffness > 0.0 else 0.0
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Set the terms of the moment law, with steps short enough to resolve the contact."""
+        del stated, drawn
+        law = {"friction_moment": self.friction_moment}
+        if not self.is_null:
+            law |= {term: value for term, own in _CONTACT.items() if (value := getattr(self, own)) != 0.0}
+            if self.peak == 0.0:
+                del law["friction_peak_rate"]
+        return steps.for_contact(run.with_parameters(law))
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Set the terms of the moment law."""
+        del stated, drawn
+        friction = cls.column(effects, "friction_moment")
+        runs["friction_moment"][:] = friction
+        for term, own in _CONTACT.items():
+            runs[term][:] = np.where(friction != 0.0, cls.column(effects, own), 0.0)
+        runs["friction_peak_rate"][runs["friction_peak"] == 0.0] = 0.0

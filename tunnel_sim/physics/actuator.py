@@ -1,0 +1,231 @@
+"""An actuator between the stated input and the body: its greatest moment, its greatest rate of change, its lag.
+
+They act in this order: a clipped command changes at a limited rate, and the moment follows that with a lag. So the
+moment keeps to both limits whatever the lag. Before the first sample the input has been constant for long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tunnel_sim.vocabulary.record import Array
+
+_JUMP = 1e-8  # of an interval, which a jump takes: a shorter part than the integrator tells from rounding
+_ULPS = 8.0  # at least, so that the times still increase in other units
+_SERIES = 0.01  # interval over time constant, below which a series is more exact
+_FIRST_LOOK = 32  # intervals in which the end of a ramp is looked for first
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """An input at increasing times: constant from each to the next, or linear between them.
+
+    Args:
+        time_s: shape (n,), s.
+        values: shape (n,), in one unit throughout.
+    """
+
+    time_s: Array
+    values: Array
+    held: bool
+
+    @property
+    def after(self) -> Array:
+        """The value just after the start of every interval, shape (n − 1,)."""
+        return self.values[:-1]
+
+    @property
+    def before(self) -> Array:
+        """The value just before the end of every interval, shape (n − 1,)."""
+        return self.values[:-1] if self.held else self.values[1:]
+
+    def clipped(self, limit: float) -> Self:
+        """Within ±``limit``, in the unit of the values; exact for both holds."""
+        if not np.max(np.abs(self.values)) > limit:
+            return self
+        time, values = self.time_s, self.values
+        if not self.held:  # the clipped line has a kink wherever it crosses a limit
+            places = []
+            for level in (-limit, limit):
+                over = values > level
+                at = np.flatnonzero(over[1:] != over[:-1])
+                share = (level - values[at]) / (values[at + 1] - values[at])
+                places.append(time[at] + share * (time[at + 1] - time[at]))
+            kinks = np.setdiff1d(np.concatenate(places), time)
+            both = np.concatenate([time, kinks])
+            order = np.argsort(both, kind="stable")
+            time, values = both[order], np.interp(both, time, values)[order]
+        return type(self)(time, np.clip(values, -limit, limit), self.held)
+
+    def at_rate(self, rate: float) -> Self:
+        """Followed at a limited rate, in the unit per s; exact for both holds."""
+        time, width = self.time_s, np.diff(self.time_s)
+        jump = np.diff(self.values)
+        if self.held:
+            jump = np.append(0.0, jump[:-1])  # at the start of the interval
+        if not np.any(np.abs(jump) > (0.0 if self.held else rate * width)):
+            return self
+        ramps = _Ramps(self, rate)
+        steep = np.flatnonzero(np.abs(jump) > rate * width)
+        free = np.ones(
+            width.size, np.bool_
+        )  # intervals at whose end the input has been reached without a ramp
+        at = 0
+        while at < steep.size:
+            end = ramps.follow(int(steep[at]), float(self.after[steep[at] - self.held]))
+            free[steep[at] : end] = False
+            at = int(np.searchsorted(steep, end))
+        nodes = [time[:1], time[1:][free], *ramps.time]
+        values = [self.values[:1], self.before[free], *ramps.values]
+        if self.held:  # the start of every ramp that ends within its interval, and its end
+            short = free & (jump != 0.0)
+            lasting = np.maximum(np.abs(jump[short]) / rate, _shortest(time[:-1][short], width[short]))
+            nodes += [time[:-1][short] + lasting]
+            values += [self.values[:-1][short]]
+        both, given = np.concatenate(nodes), np.concatenate(values)
+        both, first = np.unique(both, return_index=True)
+        return type(self)(both, given[first], False)
+
+    def lagged(self, lag: float) -> Self:
+        """Followed with a lag of first order.
+
+        In every interval the response is a line and an exponential; the line with the same impulse and the same
+        first moment takes the place of the exponential.
+
+        Args:
+            lag: time constant, s.
+        """
+        if lag == 0.0 or self.time_s.size < 2:
+            return self
+        width = np.diff(self.time_s)
+        slope = (self.before - self.after) / width
+        ratio = width / lag
+        left, missed = np.exp(-ratio), -np.expm1(-ratio)
+        line = self.after - slope * lag  # which the response approaches, at the interval's start
+        added = np.concatenate([self.values[:1], line * missed + slope * width])
+        state = recurrence(np.append(0.0, left), added)
+        departure = state[:-1] - line
+        mean, tilt = missed / ratio, _tilt(ratio, left, missed)
+        begun = line + departure * (mean - 0.5 * tilt)
+        ended = line + slope * width + departure * (mean + 0.5 * tilt)
+        end = self.time_s[1:] - _shortest(self.time_s[1:], width)
+        time = np.stack([self.time_s[:-1], end], axis=1).ravel()
+        values = np.stack([begun, ended], axis=1).ravel()
+        return type(self)(np.append(time, self.time_s[-1]), np.append(values, state[-1]), False)
+
+
+class _Ramps:
+    """The stretches in which an input is followed at the greatest rate, as nodes between which it is linear."""
+
+    def __init__(self, given: Samples, rate: float) -> None:
+        self.given, self.rate = given, rate
+        self.time: list[Array] = []
+        self.values: list[Array] = []
+
+    def _node(self, time: float, value: float) -> None:
+        self.time.append(np.array([time]))
+        self.values.append(np.array([value]))
+
+    def follow(self, first: int, value: float) -> int:
+        """Follow from the start of an interval on, until the input has been reached at an interval's end.
+
+        Args:
+            first: the interval.
+            value: that has been reached before it.
+
+        Returns:
+            The first interval that starts where the input is.
+        """
+        given, time = self.given, self.given.time_s
+        at, look = first, _FIRST_LOOK
+        while at < time.size - 1:
+            some = slice(at, min(at + look, time.size - 1))
+            ahead = given.after[at] - value or given.before[at] - value
+            way = float(np.sign(ahead)) * self.rate
+            ramp = value + way * (time[some.start : some.stop + 1] - time[at])
+            reached = way * (given.before[some] - ramp[1:]) <= 0.0
+            passed = way * (given.after[some] - ramp[:-1]) < 0.0  # the input has jumped across
+            passed[0] = False
+            found = np.flatnonzero(reached | passed)
+            if not found.size:
+                at, value, look = some.stop, float(ramp[-1]), 2 * look
+                self._node(float(time[at]), value)
+                continue
+            step = int(found[0])
+            at, value, look = at + step, float(ramp[step]), _FIRST_LOOK
+            if passed[step]:
+                self._node(float(time[at]), value)
+                continue
+            width = float(time[at + 1] - time[at])
+            slope = float(given.before[at] - given.after[at]) / width
+            gap = float(given.after[at]) - value
+            since = min(max(gap / (way - slope), 0.0), width) if gap else 0.0
+            value += way * since
+            self._node(float(time[at]) + since, value)
+            if abs(slope) <= self.rate:
+                if since < width:
+                    self._node(float(time[at + 1]), float(given.before[at]))
+                return at + 1
+            value -= way * (width - since)  # the input runs away, the other way
+            at += 1
+            self._node(float(time[at]), value)
+        return at
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """What an actuator makes of the moment that it is told to exert.
+
+    Args:
+        limit: greatest moment, N m; 0: none.
+        rate: greatest rate of change of the moment, N m/s; 0: none.
+        lag: time constant, s.
+    """
+
+    limit: float = 0.0
+    rate: float = 0.0
+    lag: float = 0.0
+
+    def exerted(self, asked: Samples, scale: float) -> Samples:
+        """What it makes of the samples asked for.
+
+        Args:
+            scale: N m per unit of the samples.
+        """
+        size = abs(scale)
+        if size == 0.0:
+            return asked
+        found = asked.clipped(self.limit / size) if self.limit else asked
+        found = found.at_rate(self.rate / size) if self.rate else found
+        return found.lagged(self.lag)
+
+
+DIRECT = Actuator()
+"""What exerts every moment as asked for."""
+
+
+def _shortest(time: Array, width: Array) -> Array:
+    """How long a jump takes at these times in intervals of these widths, s, shape (n,)."""
+    return np.maximum(_JUMP * width, _ULPS * np.spacing(np.abs(time)))
+
+
+def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
+    """States of x_k = factor_k x_(k−1) + added_k from x_(−1) = 0, shape (n,), real or complex."""
+    factor, state, reach = factor.copy(), added.copy(), 1
+    while reach < state.size:  # each from twice as many steps as before
+        state[reach:] += factor[reach:] * state[:-reach]
+        factor[reach:] *= factor[:-reach]
+        reach *= 2
+    return state
+
+
+def _tilt(ratio: Array, left: Array, missed: Array) -> Array:
+    """By how much the line that takes the place of exp(−r v), 0 ≤ v ≤ 1, rises, for every r, shape (n,)."""
+    small = ratio < _SERIES
+    r = np.where(small, 1.0, ratio)
+    exact = (missed - r * left) / r**2 - 0.5 * missed / r
+    series = ratio * (-1.0 / 12.0 + ratio * (1.0 / 24.0 + ratio * (-1.0 / 80.0 + ratio / 360.0)))
+    return 12.0 * np.where(small, series, exact)
