@@ -6,7 +6,6 @@ The campaigns are of the nominal model in closed form, with white noise. How goo
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -87,16 +86,6 @@ class _Subject:
             self._check_deviations(run, RUN_UNITS, f"of run {run.id} with {of}")
             self._check_statuses(run, f"run {run.id} with {of}")
         self._check_statuses(found, f"the campaign with {of}")
-        self._check_covariance(found, of)
-        try:
-            text = json.dumps(found.to_json_dict(), allow_nan=False)
-            again = Estimate.from_json_dict(json.loads(text))
-        except (TypeError, ValueError, TunnelError) as error:
-            what = f"its estimate {of} cannot be written as JSON ({raised_line(error)})"
-            raise self.refuse(what, "use plain floats and tuples, and None for what is not known") from error
-        if again != found:
-            what = f"its estimate {of} is not the same after it was written as JSON"
-            raise self.refuse(what, "use plain floats and tuples")
 
     def _check_deviations(self, owner: object, names: Iterable[str], of: str) -> None:
         for name in names:
@@ -118,22 +107,6 @@ class _Subject:
         if owner.status.failed and isinstance(owner, RunEstimate) and owner.identified:
             what = f"{of} has a value and the status {owner.status.name}"
             raise self.refuse(what, "give None for what failed")
-
-    def _check_covariance(self, found: Estimate, of: str) -> None:
-        given = tuple(name for name in PARAMETERS if getattr(found, name) is not None)
-        if set(found.parameters) != set(given):
-            what = f"gives {', '.join(given) or 'no coefficient'} with {of}, and parameters is {found.parameters}"
-            raise self.refuse(what, "name the coefficients in parameters, in the order of the covariance")
-        if not given:
-            return
-        matrix = found.covariance_matrix
-        stds = np.array([getattr(found, name).std for name in found.parameters])
-        if not np.allclose(np.sqrt(np.diag(matrix)), stds, rtol=1e-3):
-            what = f"the covariance with {of} does not have the standard deviations of the values"
-            raise self.refuse(what, "give std as the root of the diagonal")
-        if np.linalg.eigvalsh(matrix / np.outer(stds, stds))[0] < -1e-6:
-            what = f"the covariance with {of} is not positive semidefinite"
-            raise self.refuse(what, "give correlations between -1 and 1")
 
 
 def check_estimator(estimator: str | Estimator | type[Any], *, free_decays: bool = True) -> None:
@@ -173,7 +146,7 @@ def _made(estimator: object) -> Estimator:
     if isinstance(estimator, type):
         try:
             estimator = estimator()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             what = f"cannot be made without arguments: {raised_line(error)}"
             raise TunnelError(what, where=where, remedy="give each setting a default") from error
     name = getattr(estimator, "name", None)

@@ -1,6 +1,7 @@
 """Estimates against the truth: accuracy, and whether a method got worse than a baseline.
 
-Standard errors of bias and RMSE are those of means (delta method for the root). The tests against a baseline use
+Standard errors of bias and RMSE are those of means (delta method for the root); see `root_mean_square` for few
+trials. The tests against a baseline use
 only ranks and counts, so they are exact, or nearly so, for any distribution of the errors. If nothing changed,
 old and new trials are exchangeable, and so is any choice made from both together (a direction, a threshold).
 """
@@ -164,13 +165,32 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 def root_mean_square(values: Array, unit: str) -> Quantity:
     """√mean(x²) with its standard error, that of mean(x²) through the root.
 
+    Few squares may be alike by chance, so that their own scatter says too little. The standard error is therefore
+    at least that of normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m² s².
+    Without a mean that is 1/√(2n) of the root.
+
     Args:
         values: shape (n,), n ≥ 2, in the unit.
     """
     scale = float(np.abs(values).max()) or 1.0  # squares of tiny numbers must not underflow
-    squares = mean_figure((values / scale) ** 2, "1")
+    scaled = values / scale
+    squares, mean, variance = mean_figure(scaled**2, "1"), float(scaled.mean()), float(scaled.var(ddof=1))
+    normal = sqrt((2.0 * variance**2 + 4.0 * mean**2 * variance) / values.size)
     root = sqrt(squares.value)
-    return Quantity(scale * root, scale * squares.std / (2.0 * root) if root > 0.0 else 0.0, unit)
+    std = max(squares.std, normal)
+    return Quantity(scale * root, scale * std / (2.0 * root) if root > 0.0 else 0.0, unit)
+
+
+def reach_of_rmse(trials: int) -> tuple[float, float]:
+    """The ends of the 95 % interval of an RMSE over the RMSE found, of normal errors without bias (χ²).
+
+    Args:
+        trials: number of errors in it, from 1.
+    """
+    from scipy.special import chdtri
+
+    low, high = (float(np.sqrt(trials / chdtri(trials, p))) for p in (0.025, 0.975))
+    return low, high
 
 
 def overall(scores: Iterable[Score]) -> Quantity | None:

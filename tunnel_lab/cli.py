@@ -35,6 +35,7 @@ from tunnel_lab.terminal.encoding import replace_what_cannot_be_encoded
 from tunnel_lab.terminal.inputs import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
+FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
 
@@ -179,10 +180,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error.format_message())  # type: ignore[attr-defined]  # click's, see CommandLineError
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
-    except (BrokenPipeError, SystemExit):  # Typer ends the process itself at some closed pipes
-        # The reader went away (``tunnel springs | head -1``): not an error, and Python must not flush again.
+    except BrokenPipeError:
         _settle_output()
         return 0
+    except SystemExit as error:
+        _settle_output()
+        return 0 if _by_typer(error) else _left(error)
     except OSError as error:
         _settle_output()
         return _refuse(
@@ -199,6 +202,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status if isinstance(status, int) else 0
 
 
+def _by_typer(error: SystemExit) -> bool:
+    """Whether Typer itself ends the process, as it does at some closed pipes and after completing a word."""
+    frame = error.__traceback__
+    while frame is not None and frame.tb_next is not None:
+        frame = frame.tb_next
+    return frame is not None and frame.tb_frame.f_globals.get("__name__", "").partition(".")[0] == "typer"
+
+
+def _left(error: SystemExit) -> int:
+    """Say that code of the user's own has ended the command."""
+    from tunnel_sim.vocabulary.errors import raised_line
+
+    print(f"tunnel: the command was ended by its own code ({raised_line(error)})", file=sys.stderr)
+    return FAILED
+
+
 def _flush() -> None:
     """Write out what was printed; a process may be started without standard output."""
     if sys.stdout is not None:
@@ -206,7 +225,10 @@ def _flush() -> None:
 
 
 def _settle_output() -> None:
-    """Discard what cannot be printed, so that Python's own flush at the end does not fail again."""
+    """Discard what cannot be printed, so that Python's own flush at the end does not fail again.
+
+    The reader of a pipe may have gone away (``tunnel springs | head -1``), which is not an error.
+    """
     try:
         _flush()
     except OSError:

@@ -101,7 +101,7 @@ def register_estimator(kind: KindT) -> KindT:
         raise TunnelError("is the name of a packaged estimator", where=where, remedy="choose another name")
     try:
         kind()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         what = f"cannot be made without arguments ({type(error).__name__}: {one_line(error)})"
         raise TunnelError(what, where=where, remedy="give each setting a default") from error
     _registered[name] = kind
@@ -118,6 +118,12 @@ def register_from(word: str) -> str:
         TunnelError: when the module or class cannot be loaded, or is not an estimator.
     """
     module, _, place = word.partition(":")
+    if not module or not place:
+        what = f"names no {'module' if not module else 'class'}"
+        raise TunnelError(what, where=word, remedy="give it as module:Class")
+    if module.endswith(".py"):
+        remedy = f"leave out .py: {module.removesuffix('.py').replace('/', '.')}:{place}"
+        raise TunnelError("names a file, not a module", where=word, remedy=remedy)
     with loading(word, "give it as module:Class, and correct the module"):
         kind = import_module(module)
         for part in place.split("."):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from test_tutorials import printed, steps
 from docs.studies.campaign_agent import fill
 from docs.studies.learning_curves import curves, from_csv
 from docs.studies.learning_curves import fill as filled_with_curves
+from tunnel_lab.envs.policies import packaged_agent
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "how-to" / "train-an-agent.md"
@@ -55,11 +57,19 @@ def test_the_curves_are_drawn() -> None:
 
 
 def test_the_first_example_prints_what_is_shown(tmp_path: Path) -> None:
-    (code, text), *_ = steps(PAGE)
-    assert printed([code], tmp_path) == [text]
+    """And an agent read from a file, here the packaged one, chooses the same runs."""
+    (code, text), (reading, _), *_ = steps(PAGE)
+    own = packaged_agent()
+    (tmp_path / "agent.safetensors").write_bytes(own.to_bytes())
+    assert printed([code, reading], tmp_path) == [text, "7 runs, 6.5 nats\n"]
+    assert "trained: 7 runs, " in text
 
 
 @pytest.mark.slow
 def test_the_bridge_of_the_page_runs(tmp_path: Path) -> None:
-    code, text = steps(PAGE)[1]
-    assert printed([code], tmp_path) == [text]
+    """With so few steps that it takes seconds."""
+    code, text = steps(PAGE)[2]
+    assert code.count("STEPS = 80_000") == 1
+    (said,) = printed([code.replace("80_000", "6_400")], tmp_path)
+    assert said.splitlines()[0] == text.splitlines()[0]
+    assert re.fullmatch(r"the last 16 runs: \d\.\d nats", said.splitlines()[1])

@@ -109,7 +109,7 @@ def test_an_estimator_is_added_in_one_class(tmp_path: Path) -> None:
     page = PAGES / "add-an-estimator.md"
     shown = steps(page)
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
-    assert [bool(text) for _, text in shown] == [False, True, True]
+    assert [bool(text) for _, text in shown] == [False, True, True, True]
 
 
 def test_the_commands_of_the_added_estimator_take_it(
@@ -119,7 +119,7 @@ def test_the_commands_of_the_added_estimator_take_it(
     page = PAGES / "add-an-estimator.md"
     (tmp_path / "zero_crossings.py").write_text(steps(page)[0][0], encoding="utf-8")
     given = re.findall(r"^tunnel (\w+) .*(?:-e|--estimator) (\S+:\S+)", page.read_text("utf-8"), re.MULTILINE)
-    assert {word for _, word in given} == {"zero_crossings:ZeroCrossings"}
+    assert {word for _, word in given} == {"zero_crossings:ZeroCrossings", "zero_crossings:Springs"}
     assert {command for command, _ in given} == {"identify", "score", "sweep"}
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path[:])

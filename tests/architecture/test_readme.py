@@ -99,6 +99,11 @@ def test_excerpts_are_the_beginning_of_what_the_how_to_pages_show() -> None:
         assert shown == whole[command][: len(shown)]
 
 
+def test_the_readme_shows_no_number_of_other_answers() -> None:
+    """It grows with every effect that is added."""
+    assert not any("more, together" in line for _, shown in sessions(README) for line in shown)
+
+
 def as_printed(shown: list[str], real: list[str]) -> bool:
     """Whether lines are the same, up to the last digit of decimals, which another processor may round otherwise."""
     decimal = re.compile(r"[-+]?\d+\.\d+(?:e[-+]\d+)?")

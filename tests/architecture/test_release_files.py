@@ -41,9 +41,13 @@ def test_the_citation_has_the_version_of_the_project():
     assert f"version: {PROJECT['project']['version']}\n" in CITATION
 
 
-def test_the_citation_has_a_date_that_has_been() -> None:
-    (day,) = re.findall(r"^date-released: (\d{4}-\d{2}-\d{2})$", CITATION, re.MULTILINE)
-    assert date(2025, 1, 1) < date.fromisoformat(day) <= datetime.now(UTC).date()
+def test_the_citation_has_the_date_of_a_release_only() -> None:
+    """As the changelog: a version that is not released has no date there, and a release has one that has been."""
+    version = re.escape(PROJECT["project"]["version"])
+    (stated,) = re.findall(rf"^## {version} \((.*)\)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    days = re.findall(r"^date-released: (.*)$", CITATION, re.MULTILINE)
+    assert days == ([] if stated == "unreleased" else [stated])
+    assert all(date(2025, 1, 1) < date.fromisoformat(day) <= datetime.now(UTC).date() for day in days)
 
 
 def test_the_image_runs_without_root_and_installs_extras_that_exist():

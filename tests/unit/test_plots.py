@@ -6,6 +6,7 @@ Truth: closed forms, and signals whose spectrum is known.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -149,6 +150,21 @@ def test_labels_of_a_logarithmic_axis_are_few(ends: tuple[float, float]) -> None
     shown = [t for t in axes.get_xticks() if ends[0] <= t <= ends[1]]
     assert 2 <= len(shown) <= 8
     assert not any(label.get_text() for label in axes.get_xticklabels(minor=True))
+
+
+@pytest.mark.parametrize("ends", [(0.09, 2.5), (0.5, 1.6), (0.8, 9.0), (0.7, 900.0)])
+def test_labels_of_a_short_logarithmic_axis_do_not_touch(ends: tuple[float, float]) -> None:
+    room = 0.8
+    fig = figure(room + 0.6, 1.0)
+    axes = fig.add_subplot()
+    axes.plot(ends, ends)
+    log_axis(axes, "x", room)
+    fig.canvas.draw()
+    boxes = [label.get_window_extent() for label in axes.get_xticklabels() if label.get_text()]
+    low, high = axes.get_window_extent().intervalx
+    boxes = [box for box in boxes if low <= 0.5 * (box.x0 + box.x1) <= high]
+    assert len(boxes) >= 1
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 def test_the_colours_are_those_of_the_style() -> None:

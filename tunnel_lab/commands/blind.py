@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -18,7 +19,7 @@ from tunnel_lab.terminal.inputs import (
     with_format,
     with_quiet,
 )
-from tunnel_lab.terminal.outputs import bar, console, rich_table, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import bar_or_lines, console, rich_table, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
@@ -147,7 +148,7 @@ def make(
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     refuse_unwritable_files(key)
-    with bar("writing campaigns", count) as progress:
+    with bar_or_lines("sizing effects and writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, key=key,
             mixture=Mixture(
@@ -159,6 +160,12 @@ def make(
         )  # fmt: skip
     say(f"Written: {out} ({counted(count, 'campaign')}), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")
+    folder, named = shlex.quote(str(out)), "" if key is None else f" --key {shlex.quote(str(where))}"
+    if key is None:
+        say(
+            f"{where} is the truth: move it out of {out} before you hand the folder out, and name it with --key"
+        )
+    say(f"Next: tunnel blind diagnose {folder}, then tunnel blind score {folder}{named}")
 
 
 @app.command("diagnose")
@@ -181,7 +188,7 @@ def diagnose(
     from diagnosis.blind import answer_set, answers_folder
 
     names = split_names(exclude)
-    with bar("diagnosing", None) as progress:
+    with bar_or_lines("diagnosing", None) as progress:
         sealed = answer_set(folder, excluded=names, jobs=jobs, progress=progress, effects_file=effects_file)
     say(f"Answers: {answers_folder(folder, names, effects_file)}")
     say(f"Answers sha256 {sealed}")

@@ -102,6 +102,7 @@ def score(
     """
     from identification.estimators import ALL_ESTIMATORS
     from tunnel_lab.experiments import score_trials, score_view
+    from tunnel_lab.experiments.score_drawing import score_figure
     from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
@@ -135,7 +136,7 @@ def score(
         written = [
             score_trials.write_trials(out / "trials.parquet", results),
             write_whole(out / "scores.parquet", score_trials.parquet(score_view.scores_frame(results))),
-            *save_both(score_view.score_figure(results), out / "score.png"),
+            *save_both(score_figure(results), out / "score.png"),
         ]
         shutil.rmtree(out / "parts", ignore_errors=True)
     if write_baseline is not None:
@@ -143,7 +144,8 @@ def score(
     show_tables(*score_view.summary_tables(results))
     if cells:
         show_tables(*score_view.cell_tables(results))
-    say(score_view.ABOUT)
+    for line in score_view.lines_below(results):
+        say(line)
     say_written(*written)
     failed = score_trials.failure_lines(rows)
     for line in failed:
@@ -164,8 +166,8 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
-        what = f"the baseline has {', '.join(gone)}, which the registry does not have"
-        remedy = "write a new baseline with --write-baseline, or name what to score with --estimator"
+        what = f"the baseline has {', '.join(gone)}, which no installed package adds"
+        remedy = "name a class of your own again with -e module:Class, or what else to score with --estimator"
         raise TunnelError(what, where="--check", remedy=remedy)
     return baseline
 
@@ -188,7 +190,8 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
 
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     from tunnel_lab.experiments import breakdown
-    from tunnel_lab.experiments.score_trials import failure_lines, parquet
+    from tunnel_lab.experiments.score_trials import failure_lines, not_given, parquet
+    from tunnel_lab.experiments.score_view import not_given_lines
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 
@@ -201,13 +204,14 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     if out is not None:
         frame = breakdown.breakdown_frame(biases)
         written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
-        for quantity in breakdown.SHOWN:
+        for quantity in (one for one in breakdown.SHOWN if any(bias.quantity == one for bias in biases)):
             path = out / f"breakdown-{quantity.replace('_', '-')}.png"
             written += save_both(breakdown.breakdown_figure(frame, quantity), path)
         shutil.rmtree(out / "parts", ignore_errors=True)
     for quantity in breakdown.SHOWN:
         show_tables(*breakdown.breakdown_tables(biases, quantity))
-    say(breakdown.ABOUT)
+    for line in (breakdown.ABOUT, *not_given_lines(not_given(rows))):
+        say(line)
     say_written(*written)
     for line in failure_lines(rows):
         say(line, stderr=True)

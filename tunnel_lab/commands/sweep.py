@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -106,6 +107,8 @@ def sweep(
     estimates = plan.size * len(plan.document.estimators)
     sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
     say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
+    if plan.document.estimators:
+        say(f"Tables and figures: tunnel sweep --summary {shlex.quote(str(out))}")
     for failed in outcome.failed:
         what = f"{counted(failed.count, 'estimate')} {VERBS[failed.status]}"
         say(f"{what}: see status '{failed.status}' in the results. The first:", stderr=True)
@@ -119,6 +122,7 @@ def _summarise(folder: Path) -> None:
     import polars as pl
 
     from tunnel_lab.experiments import sweep_summary
+    from tunnel_lab.experiments.score_view import not_given_lines
     from tunnel_lab.experiments.sweep import open_store
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import output_folder, write_encoded
@@ -141,4 +145,6 @@ def _summarise(folder: Path) -> None:
     along = map(sweep_summary.axis_table, grouped.values())
     show_tables(sweep_summary.overall_table(lines), *along)
     say(sweep_summary.BRACKETS)
+    for line in not_given_lines(sweep_summary.unanswered(store), sweep_summary.NAMES):
+        say(line)
     say(f"Written to {target}: {', '.join(path.name for path in written)}")

@@ -33,10 +33,16 @@ from tunnel_sim.envs import arguments_of, refuse_unknown
 from tunnel_sim.envs.conditions import refuse_long
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.arguments import POSITIVE, Number, checked_choice, checked_names, checked_numbers
+from tunnel_sim.vocabulary.arguments import (
+    POSITIVE,
+    Number,
+    checked_choice,
+    checked_names,
+    checked_numbers,
+    env_errors,
+)
 from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 Observation = dict[str, Array]
@@ -107,7 +113,8 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             raise refusal("a diagnosis needs the full simulation", "leave simulation out")
         if rig is not None and not isinstance(rig, str | Path):
             raise refusal(f"rig = {rig!r} is not a path", "give the path of a rig description (TOML)")
-        loaded = load_rig(None if rig is None else Path(rig))
+        with env_errors(WHERE, "rig"):
+            loaded = load_rig(None if rig is None else Path(rig))
         of_cn_beta, of_cn_r = checked_numbers(targets, "targets", WHERE, POSITIVE, length=2)
         self.targets = (of_cn_beta, of_cn_r)
         self.probability = Number(most=1.0, above=True).checked(probability, "probability", WHERE)
@@ -178,7 +185,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         truth = draw_truth(self.np_random, self.severities, options)
         if self.conditions.linear and truth.effects:
             remedy = "make the environment with simulation='full'"
-            raise TunnelError("effects are not part of linear theory", where="option effects", remedy=remedy)
+            raise refusal("option effects: effects are not part of linear theory", remedy)
         self._session = CampaignSession(self.conditions, truth, self.np_random.spawn(1)[0])
         self.known = first_knowledge(self.conditions)
         if self.render_mode == "human":

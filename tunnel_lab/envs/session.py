@@ -30,11 +30,11 @@ from identification.signal.decay_fit import Reading, RunFit
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.noise import stated_noise
 from identification.signal.run_fit import identify_run
-from tunnel_lab.envs.menu import WHERE, Choice, Costs, Menu
+from tunnel_lab.envs.menu import WHERE, Choice, Costs, Menu, refusal
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
-from tunnel_sim.vocabulary.arguments import Number, checked_names
+from tunnel_sim.vocabulary.arguments import Number, checked_names, env_errors
 from tunnel_sim.vocabulary.between_runs import Scatter, between_runs
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -368,8 +368,9 @@ def draw_truth(
     if stated is not None:
         if not isinstance(stated, Mapping):
             remedy = "give parameters by effect, as {'coulomb_friction': {'friction_moment': 0.004}}"
-            raise TunnelError("option effects is not a mapping", remedy=remedy)
-        effects = tuple(effect_from(name, dict(parameters)) for name, parameters in stated.items())
+            raise refusal(f"option effects = {stated!r} is not a mapping", remedy)
+        with env_errors(WHERE, "option effects"):
+            effects = tuple(effect_from(name, dict(parameters)) for name, parameters in stated.items())
     return RigTruth(Truth(**(values | given)), effects, zero)
 
 

@@ -20,6 +20,22 @@ REFUSED, RAISED, WRONG = "refused", "raised", "wrong_return"
 VERBS = {REFUSED: "refused", RAISED: "raised an exception", WRONG: "returned no valid estimate"}
 """What an estimator did, by status."""
 
+NOT_ASKED = (
+    "ok",
+    "model_departs",
+    "noise_disagrees",
+    "no_stiffness",
+    "no_wind_on",
+    "no_wind_off_pair",
+    "stiffness_not_separable",
+    "damping_not_separable",
+    "no_reference_size",
+)
+"""Statuses beside which a value is absent because the runs cannot give it, or the estimator does not.
+
+These are not failures of the estimator.
+"""
+
 
 @dataclass(frozen=True)
 class Failure:

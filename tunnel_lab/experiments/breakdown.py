@@ -21,7 +21,7 @@ from rich.text import Text
 from identification.printing import significant
 from identification.scoring import Score, collect, score
 from tunnel_lab.experiments.runner import Progress, knowing
-from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
+from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, not_given, outcome, rows_of
 from tunnel_lab.experiments.score_view import NAMES
 from tunnel_lab.plotting.style import figure, styled
 from tunnel_lab.terminal.outputs import table
@@ -245,11 +245,13 @@ class Bias:
 
 
 def biases(rows: Sequence[Row]) -> list[Bias]:
-    """Rows summarised over realisations."""
+    """Rows summarised over realisations; what an estimator does not give is left out."""
+    absent = not_given(rows)
     groups: dict[tuple[str, float, str, str], list[Row]] = {}
     for row in rows:
         key = (row["effect"], row["severity"], row["estimator"], row["quantity"])
-        groups.setdefault(key, []).append(row)
+        if row["quantity"] not in absent.get(row["estimator"], ()):
+            groups.setdefault(key, []).append(row)
     return [
         Bias(
             effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,

@@ -9,9 +9,9 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from importlib import resources
 from pathlib import Path
 from statistics import median
@@ -21,7 +21,7 @@ import polars as pl
 
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
-from tunnel_lab.experiments.asked import RAISED, VERBS, Failure, asked, counted_failures
+from tunnel_lab.experiments.asked import NOT_ASKED, RAISED, VERBS, Failure, asked, counted_failures
 from tunnel_lab.experiments.runner import Progress, knowing, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -285,6 +285,15 @@ class Results:
             outcomes.setdefault(key, []).append(outcome(row))
         return {key: collect(every) for key, every in outcomes.items()}
 
+    @cached_property
+    def not_given(self) -> dict[str, tuple[str, ...]]:
+        """Quantities of the grid by estimator; see `not_given`."""
+        return not_given(self.rows)
+
+    def gives(self, estimator: str, quantity: str) -> bool:
+        """Whether an estimator gives a quantity, or fails to; see `not_given`."""
+        return quantity not in self.not_given.get(estimator, ())
+
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
         """Median time of `identify` for one record of some cells, its examination included, ms."""
         wanted = set(cells)
@@ -293,6 +302,26 @@ class Results:
             for row in self.rows
             if row["estimator"] == estimator and row["cell"] in wanted
         )
+
+
+def not_given(rows: Iterable[Row]) -> dict[str, tuple[str, ...]]:
+    """Quantities that an estimator gives in no trial, without saying that it failed in all of them, by estimator.
+
+    It says so by its status: an exception, or a campaign none of whose runs could be identified, is a failure.
+
+    Args:
+        rows: with ``estimator``, ``quantity``, ``value`` and ``status``.
+    """
+    known: dict[tuple[str, str], list[bool]] = {}  # whether it is given, and whether it is not asked for
+    for row in rows:
+        seen = known.setdefault((row["estimator"], row["quantity"]), [False, False])
+        seen[0] |= row["value"] is not None
+        seen[1] |= row["status"] in NOT_ASKED
+    found: dict[str, tuple[str, ...]] = {}
+    for (name, quantity), (given, not_asked) in known.items():
+        if not_asked and not given:
+            found[name] = (*found.get(name, ()), quantity)
+    return found
 
 
 def failure_lines(rows: Sequence[Row]) -> list[str]:

@@ -1,8 +1,8 @@
-"""A score in tables and in a figure, and against its baseline. matplotlib is imported inside the functions."""
+"""A score in tables, and against its baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +13,6 @@ from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing import SYMBOLS, concise, significant
 from identification.scoring import (
-    INTERVAL,
-    NOMINAL_COVERAGE,
     Change,
     Score,
     Trials,
@@ -22,19 +20,16 @@ from identification.scoring import (
     holm,
     mean_figure,
     overall,
+    reach_of_rmse,
     score,
 )
 from identification.statistics import Proportion
-from tunnel_lab.experiments.score_grid import Cell
 from tunnel_lab.experiments.score_trials import Key, Results, groups_of
-from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
-from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.figure import Figure, SubFigure
     from rich.table import Table
 
 NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
@@ -45,9 +40,8 @@ ABOUT = (
     "record, its examination included."
 )
 _SHOWN_WORSE = 12
-_SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
-_TITLES = {"decay": "Single decays", "campaign": "Campaigns"}
-_PANEL, _LABELS, _ROW, _HEAD = 0.95, 1.7, 0.2, 0.85  # inches
+_FEW = 20
+"""Trials below which the χ² interval of an RMSE ends more than a tenth above 1 + 1.96 standard errors."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +133,16 @@ def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, i
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
-    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals."""
+    """A row for every estimator, cell and quantity that is given.
+
+    It has the conditions, the figures, and their standard errors and intervals.
+    """
     import polars as pl
 
     rows = []
     for (estimator, index, quantity), trials in results.trials().items():
+        if not results.gives(estimator, quantity):
+            continue
         cell, judged = results.grid.cells[index], score(trials)
         figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
         for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
@@ -188,8 +187,10 @@ def summary_tables(results: Results) -> list[Table]:
             right=("worst",),
         )
         for name in results.estimators:
-            _section(result, results, name, cells)
-            for quantity in results.grid.cells[cells[0]].quantities:
+            given = [q for q in results.grid.cells[cells[0]].quantities if results.gives(name, q)]
+            if given:
+                _section(result, results, name, cells)
+            for quantity in given:
                 result.add_row(
                     f"  {NAMES[quantity]}", *pooled_figures([trials[name, cell, quantity] for cell in cells])
                 )
@@ -198,12 +199,42 @@ def summary_tables(results: Results) -> list[Table]:
 
 
 def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -> None:
-    """The estimator's name and time."""
+    """The estimator's name and time, both in the first column, which has no heading."""
     if result.row_count:
         result.add_section()
     result.columns[0].no_wrap = True
     result.add_row(Text(name, style="bold"))
-    result.add_row("  identify [ms]", significant(results.milliseconds(name, cells), 2))
+    result.add_row(f"  {significant(results.milliseconds(name, cells), 2)} ms/record")
+
+
+def lines_below(results: Results) -> list[str]:
+    """What is said below the tables: what the figures are, which are not given, and how far few trials reach."""
+    return [ABOUT, *not_given_lines(results.not_given), *_few_trials(results)]
+
+
+def not_given_lines(not_given: Mapping[str, Sequence[str]], symbols: Mapping[str, str] = NAMES) -> list[str]:
+    """What an estimator does not give, a line for each.
+
+    Args:
+        not_given: names of quantities by estimator.
+        symbols: how the quantities are written.
+    """
+    return [
+        f"Not given by {name}: {', '.join(symbols[one] for one in quantities)}."
+        for name, quantities in not_given.items()
+    ]
+
+
+def _few_trials(results: Results) -> list[str]:
+    """How far the RMSE of the fewest trials may be from the one that many would have."""
+    fewest = min(results.grid.trials_for(name) for name in results.estimators)
+    if fewest >= _FEW:
+        return []
+    low, high = reach_of_rmse(fewest)
+    return [
+        f"Few trials: with {fewest} in a cell, the RMSE of many would be {low:.2g} to {high:.2g} times the one "
+        "shown (95 % interval for normal errors), which its standard error does not tell. --trials gives more."
+    ]
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
@@ -231,8 +262,10 @@ def cell_tables(results: Results) -> list[Table]:
     for index, cell in enumerate(results.grid.cells):
         result = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
         for name in results.estimators:
-            _section(result, results, name, [index])
-            for quantity in cell.quantities:
+            given = [quantity for quantity in cell.quantities if results.gives(name, quantity)]
+            if given:
+                _section(result, results, name, [index])
+            for quantity in given:
                 result.add_row(f"  {NAMES[quantity]}", *cell_figures(score(trials[name, index, quantity])))
         tables.append(result)
     return tables
@@ -301,94 +334,3 @@ def verdict_lines(verdict: Verdict) -> list[str]:
     if verdict.added:
         lines.append(f"Not in the baseline, so not checked: {', '.join(verdict.added)}")
     return lines
-
-
-@styled
-def score_figure(results: Results) -> Figure:
-    """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
-
-    Each kind of cell has two rows of panels, one panel for each estimator. Cells are in rows, in the order of
-    the grid, so that reading across compares the estimators; quantities differ in colour and marker.
-    """
-    kinds = [cell.kind for cell in results.grid.cells]
-    groups = {
-        title: [index for index, kind in enumerate(kinds) if kind == wanted]
-        for wanted, title in _TITLES.items()
-        if wanted in kinds
-    }
-    heights = [_HEAD + _ROW * len(cells) for cells in groups.values() for _ in range(2)]
-    fig = figure(_LABELS + _PANEL * len(results.estimators), sum(heights))
-    parts = iter(fig.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
-    for name, cells in groups.items():
-        _block(next(parts), results, name, cells, covered=False)
-        _block(next(parts), results, name, cells, covered=True)
-    return fig
-
-
-def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], *, covered: bool) -> None:
-    """One row of panels."""
-    labels, common = cell_labels([results.grid.cells[index] for index in cells])
-    trials = results.trials()
-    quantities = [name for name in _SHOWN if name in results.grid.cells[cells[0]].quantities]
-    panels = part.subplots(1, len(results.estimators), sharex=True, sharey=True, squeeze=False)[0]
-    for axes, name in zip(panels, results.estimators, strict=True):
-        axes.axvline(100 * NOMINAL_COVERAGE if covered else 1.0, color="0.4", linewidth=0.8, zorder=1)
-        for place, quantity in enumerate(quantities):
-            scores = [score(trials[name, cell, quantity]) for cell in cells]
-            shift = 0.36 * ((place + 0.5) / len(quantities) - 0.5)
-            spans: Any
-            if covered:
-                shares = [(row + shift, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
-                rows, values = (
-                    [row for row, _ in shares],
-                    np.array([100 * share.value for _, share in shares]),
-                )
-                ends = 100 * np.array([share.interval for _, share in shares]).reshape(-1, 2)
-                spans = np.maximum(np.stack((values - ends[:, 0], ends[:, 1] - values)), 0.0)
-            else:
-                errors = [
-                    (row + shift, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound
-                ]
-                rows, values = [row for row, _ in errors], np.array([error.value for _, error in errors])
-                spans = [min(INTERVAL * error.std, 0.9 * error.value) for _, error in errors]
-            axes.errorbar(
-                values, rows, xerr=spans, color=COLOURS[place], marker=MARKERS[place], label=NAMES[quantity],
-                linestyle="none", markersize=3.0, elinewidth=0.8,
-            )  # fmt: skip
-        axes.set_title(name.replace("_", " "), loc="center", fontsize=8)
-        axes.tick_params(axis="y", length=0)
-        grid(axes, "x")
-    panels[0].set_yticks(range(len(cells)), labels)
-    panels[0].set_ylim(len(cells) - 0.5, -0.5)
-    if covered:
-        panels[0].set_xlim(-4.0, 104.0)
-        panels[0].set_xticks([0, 50, 100])
-    else:
-        log_axis(panels[0], "x")
-    quantity = "95 % intervals that contain the truth [%]" if covered else "RMSE over the Cramér–Rao bound"
-    part.supxlabel(quantity, fontsize=9)
-    part.suptitle(f"{group}{', ' if common else ''}{common}", x=0.01, ha="left", fontsize=9)
-    handles, names = panels[0].get_legend_handles_labels()
-    part.legend(handles, names, loc="upper right", ncols=len(names), borderaxespad=0.0)
-
-
-def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
-    """What distinguishes each cell of one kind from the others, in a few words, and what is common."""
-    parts = []
-    for cell in cells:
-        noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
-        names = () if cell.effect == NO_EFFECT else cell.effect.split(" + ")
-        effect = " + ".join(name.partition(":")[0].replace("_", " ") for name in names)
-        if cell.kind == "decay":
-            parts.append((f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration))
-        else:
-            parts.append((f"{cell.wind_speed:g} m/s", noise, duration, effect))
-    if len(parts) == 1:
-        return [", ".join(filter(None, parts[0]))], ""
-    varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
-    common = [text for text, varies in zip(parts[0], varied, strict=True) if text and not varies]
-    labels = [
-        ", ".join(text for text, varies in zip(texts, varied, strict=True) if text and varies)
-        for texts in parts
-    ]
-    return labels, ", ".join(common)

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 2
 MANIFEST = "sweep.json"
 RESULTS, RECORDS, CHECKSUMS = "results", "records", "checksums"
+_OWN = "estimator "  # before the name of one of one's own, in what a sweep was made with
 _ELSEWHERE = "name another --out"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
@@ -107,7 +108,7 @@ def made_with() -> dict[str, str]:
 def made_with_all(sweep: Sweep) -> dict[str, str]:
     """The same with the code of the sweep's estimators of one's own."""
     own = own_estimators(sweep.document.estimators)
-    return {**made_with(), **{f"estimator {one.name}": one.code for one in own}}
+    return {**made_with(), **{f"{_OWN}{one.name}": one.code for one in own}}
 
 
 _sweep = lru_cache(maxsize=2)(Sweep.from_json)
@@ -341,6 +342,12 @@ def begin(sweep: Sweep, folder: Path) -> Store:
                 remedy=f"{_ELSEWHERE}, or undo the change",
             )
         if key := _first_difference(store.made_with, versions):
+            if key.startswith(_OWN) and {key} <= store.made_with.keys() & versions.keys():
+                raise TunnelError(
+                    f"the file of {key} has changed since the sweep was begun",
+                    where=where,
+                    remedy=f"{_ELSEWHERE}, or undo the change of that file",
+                )
             raise TunnelError(
                 f"the sweep was begun with {key} {store.made_with.get(key)}, and this is {versions.get(key)}",
                 where=where,

@@ -16,6 +16,8 @@ import numpy as np
 from identification.printing import SYMBOLS, concise, significant, unit
 from identification.scoring import Score, Trials, score
 from identification.statistics import Proportion
+from tunnel_lab.experiments.asked import NOT_ASKED
+from tunnel_lab.experiments.score_trials import not_given
 from tunnel_lab.experiments.score_view import share_text
 from tunnel_lab.experiments.sweep import SCATTER_COLUMNS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
@@ -41,26 +43,13 @@ AXES = {
     "spring_stiffness": ("spring stiffness", "N m/rad"),
     "duration": ("duration", "s"),
     **{
-        column: (
-            name.replace("_", " ") + " between runs" * ("between" not in name),
-            "rad" if name == "zero" else "1",
-        )
+        column: (f"scatter of {name}", "rad")
+        if name == "zero"
+        else (f"relative scatter of {name.removesuffix('_between_runs').replace('_', ' ')}", "1")
         for column, name in SCATTER_COLUMNS.items()
     },
 }
 """Columns that a summary uses as axes, each with its name and unit."""
-NOT_ASKED = (
-    "ok",
-    "model_departs",
-    "noise_disagrees",
-    "no_stiffness",
-    "no_wind_on",
-    "no_wind_off_pair",
-    "stiffness_not_separable",
-    "damping_not_separable",
-    "no_reference_size",
-)
-"""Statuses of values that the runs cannot give; these are not failures of the estimator."""
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
@@ -132,10 +121,13 @@ def summarise(store: Store) -> list[Line]:
         raise TunnelError(
             "the sweep has no estimators", where=str(store.folder), remedy="there is no estimate to summarise"
         )
+    absent = unanswered(store)
     pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
     columns = ("effect", "severity", *AXES, "truth", "value", "std", "bound", "status", "unit")
     lines: list[Line] = []
     for estimator, quantity in pairs.iter_rows():
+        if quantity in absent.get(estimator, ()):
+            continue
         mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
         asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
         data = frame.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
@@ -145,6 +137,16 @@ def summarise(store: Store) -> list[Line]:
     return sorted(
         lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
     )
+
+
+def unanswered(store: Store) -> dict[str, tuple[str, ...]]:
+    """Quantities by estimator that it gives in no case, without saying that it failed in all of them."""
+    import polars as pl
+
+    given = pl.when(pl.col("value").is_not_null()).then(1.0).alias("value")
+    asked = store.scan().filter(pl.col("truth").is_not_null())
+    kinds = asked.select("estimator", "quantity", "status", given).unique(maintain_order=True).collect()
+    return not_given(kinds.iter_rows(named=True))
 
 
 def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
@@ -273,11 +275,18 @@ def _label(line: Line) -> str:
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
-    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases."""
-    kept = [line for line in lines if line.axis == OVERALL]
-    pooled = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
+    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases but those of `_repeating`.
+
+    Its title says which cases these are.
+    """
+    every = list(lines)
+    kept = [line for line in every if line.axis == OVERALL]
+    pooled = "without effects" if all(line.effect == NO_EFFECT for line in kept) else "with effects pooled"
+    # where cases scatter and others do not, only the others are in the table
+    scattering = {line.at for line in every if line.axis in SCATTER_COLUMNS and line.at is not None}
+    repeating = " and without scatter" if 0.0 in scattering else ""
     result = table(
-        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
+        f"All cases {pooled}{repeating}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
         "95 % covers\n[%]", "failed\n[%]", right=("trials",),
     )  # fmt: skip
     last = ""

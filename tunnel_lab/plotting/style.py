@@ -5,10 +5,11 @@ The colours follow Okabe and Ito (2008), which colour-blind readers can distingu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from importlib import resources
-from math import log10
+from itertools import pairwise
+from math import ceil, floor, inf, log10
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
@@ -28,6 +29,8 @@ WIDTH = 7.2
 INTERVAL = 1.96
 """Standard deviations on either side of a 95 % interval."""
 _FEW_DECADES = 2.5
+_STEPS = ((1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
+_DIGIT, _POWER = 0.075, 0.24  # inches: a digit of a label, and a label such as 10² with the gap after it
 _WIDE = 5.0  # times the median standard deviation
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -76,18 +79,32 @@ def figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def text_width(text: str, points: float) -> float:
+    """Width of a text in inches, of its longest line.
+
+    Args:
+        text: without formulas.
+        points: size of the font, in 72nds of inches.
+    """
+    from matplotlib.textpath import TextPath
+
+    paths = [TextPath((0, 0), line, size=points) for line in text.splitlines() if line.strip()]
+    return max((float(path.get_extents().width) / 72.0 for path in paths), default=0.0)
+
+
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """A quiet grid behind the data."""
     axes.grid(visible=True, axis=axis)
 
 
-def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+def log_axis(axes: Axes, which: Literal["x", "y"], room: float = inf) -> None:
     """Make an axis logarithmic, with labels that are few enough not to touch.
 
     Matplotlib labels the ticks between the powers of ten as well, as 6×10⁰, where an axis is short.
 
     Args:
         axes: whose data are drawn, because the labels depend on the limits.
+        room: length of a horizontal axis, inches, where it may be too short for the labels.
     """
     from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
@@ -104,14 +121,33 @@ def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     decades = log10(max(limits) / min(limits))
     axis.set_minor_formatter(NullFormatter())
     if decades > _FEW_DECADES:
-        axis.set_major_locator(LogLocator(10.0, (1.0,), numticks=8))
+        axis.set_major_locator(LogLocator(10.0, (1.0,), numticks=int(min(8, max(2, room / _POWER)))))
         axis.set_major_formatter(LogFormatterSciNotation(10.0))
     else:
-        steps = (1.0, 2.0, 5.0) if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+        steps = next((one for one in _STEPS[decades > 1.0 :] if _fit(one, limits, room)), _STEPS[-1])
         axis.set_major_locator(LogLocator(10.0, steps))
         plain = min(limits) >= 1e-4 and max(limits) < 1e5
         powers = LogFormatterSciNotation(10.0, minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else powers)
+
+
+def _fit(steps: Sequence[float], limits: tuple[float, float], room: float) -> bool:
+    """Whether the labels of a logarithmic axis do not touch.
+
+    Args:
+        steps: labelled multiples of every power of ten.
+        limits: of the axis, above 0, in its unit.
+        room: its length, inches.
+    """
+    low, high = log10(min(limits)), log10(max(limits))
+    exponents = range(floor(low), ceil(high) + 1)
+    ticks = sorted(step * 10.0**power for power in exponents for step in steps)
+    shown = [tick for tick in ticks if low <= log10(tick) <= high]
+    widths = [_DIGIT * len(f"{tick:g}") for tick in shown]
+    apart = [room * log10(after / before) / (high - low) for before, after in pairwise(shown)]
+    return all(
+        gap >= 0.5 * (one + other) + _DIGIT for gap, (one, other) in zip(apart, pairwise(widths), strict=True)
+    )
 
 
 def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:

@@ -79,12 +79,12 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
     return [
         _section(
             "Causes exactly right",
-            ("campaigns where", "right", "of", "share", "95 %"),
+            ("group", "right", "of", "share", "95 %"),
             ((KINDS[name], *_share(share)) for name, share in score.exact().items()),
         ),
         _section(
             "Causes found and false",
-            ("campaigns", "sets exact", "true causes found", "named causes false", ""),
+            ("group", "sets exact", "true causes found", "named causes false", ""),
             ((one.group, _brief(one.exact), _brief(one.found), _brief(one.false), "") for one in found),
             "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
             "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as "
@@ -104,7 +104,7 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
         ),
         _section(
             "Decisions",
-            ("campaigns", "wrong set stated", "true causes in the smallest set of 0.9", "its mean size"),
+            ("group", "wrong set stated", "true causes in the smallest set of 0.9", "its mean size"),
             (
                 (one.group, _brief(one.stated_wrongly), _brief(one.covered), f"{one.credible_size:.2f}")
                 for one in found
@@ -167,6 +167,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
                     _brief(one.covered),
                 )
                 for one in found.by_number
+                if any(share.total for share in (one.named, one.false, one.within, one.covered))
             ),
         ),
     ]
@@ -207,7 +208,7 @@ def _other_sections(score: Score) -> list[ScoreSection]:
         ),
         _section(
             "Coefficients before and after the causes are added",
-            ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %"),
+            ("group", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %"),
             coefficients,
             "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
             "deviations of the estimate.",

@@ -207,7 +207,7 @@ def own_code(estimators: Sequence[str]) -> Iterator[None]:
         raise typer.Exit(1) from None
     except TunnelError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         from identification.estimators import SUMMARIES
 
         own = [name for name in estimators if name not in SUMMARIES]

@@ -13,6 +13,7 @@ from html import escape
 from math import sqrt
 from pathlib import Path
 from textwrap import wrap
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -393,6 +394,45 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
             progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
 
         yield advance
+
+
+@contextmanager
+def bar_or_lines(
+    what: str, total: int | None = None, *, every: float = 30.0
+) -> Iterator[Callable[..., None]]:
+    """A progress bar, or, where no terminal shows it, a line on standard error now and then: for work of minutes.
+
+    Args:
+        total: number of items, where it is known beforehand.
+        every: time between two lines, s.
+
+    Yields:
+        The function of `bar`.
+    """
+    terminal, begun, over = console(stderr=True), time.perf_counter(), Event()
+    reached = "" if total is None else f", 0 of {total}"
+
+    def print_lines() -> None:
+        while not over.wait(every):
+            seconds = time.perf_counter() - begun
+            terminal.print(f"{seconds:.0f} s: {what}{reached}", soft_wrap=True)
+
+    with bar(what, total) as advance:
+
+        def advance_and_note(done: int, count: int, name: str = "") -> None:
+            nonlocal reached
+            reached = f", {done} of {count}"
+            advance(done, count, name)
+
+        lines = Thread(target=print_lines, daemon=True)
+        if not terminal.is_terminal:
+            lines.start()
+        try:
+            yield advance_and_note
+        finally:
+            over.set()
+            if lines.is_alive():
+                lines.join()
 
 
 STEPS = {

@@ -57,8 +57,9 @@ class Effect:
     nothing unless an effect overrides it. ``stated`` is the run as the campaign states it, without any effect;
     ``drawn`` is what `draw` returned for the run.
 
-    Every effect states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect
-    takes the next number), and ``example``, values of its parameters in their order at which it is visible.
+    Every effect states ``example``, values of its parameters in their order at which it is visible. A built-in one
+    also states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect takes the
+    next number).
 
     Traits, with defaults that an effect overrides:
 
@@ -78,6 +79,8 @@ class Effect:
       ``mechanical_damping``; empty: none.
     - ``keeps_time``: the parameter of the moment law that gives a frequency in proportion to the wind speed; empty:
       none.
+    - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: a step of the
+      integration that contains one is less accurate, and the tests allow for it.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
@@ -112,6 +115,7 @@ class Effect:
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""
+    jumps: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""

@@ -41,6 +41,7 @@ class CoulombFriction(Effect):
     place = 1
     channel = "damping"
     condition = "always"
+    jumps = True
     size = "dry friction of {friction_moment}"
     advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (

@@ -77,6 +77,7 @@ class FreePlay(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
+    jumps = True
     size = "play of {half_width} to each side between spring and rod"
     parts = True
     advice = "Take up the play between spring and rod"

@@ -74,6 +74,7 @@ class SensorHysteresis(Effect):
     place = 18
     channel = "sensor"
     condition = "always"
+    jumps = True
     size = "backlash of {half_width} to each side at the sensor"
     advice = "Take up the backlash between rod and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"

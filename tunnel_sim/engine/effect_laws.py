@@ -229,7 +229,7 @@ def check(kind: type[Effect]) -> list[Verdict]:
     for law in (law for law in LAWS.values() if law not in left_out):
         try:
             fault = law(kind)
-        except Exception as error:  # code of others: whatever it raises is a fault of it
+        except (Exception, SystemExit) as error:  # code of others: whatever it raises is a fault of it
             name = "" if isinstance(error, TunnelError) else f"{type(error).__name__}: "
             fault = one_line(f"{name}{error}")
         verdicts.append(Verdict(" ".join((law.__doc__ or "").split()).rstrip("."), fault))

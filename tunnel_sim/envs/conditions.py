@@ -17,7 +17,7 @@ from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.arguments import Number, checked_choice
+from tunnel_sim.vocabulary.arguments import Number, checked_choice, env_errors
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import (
     POTENTIOMETER_RESOLUTION,
@@ -121,7 +121,8 @@ class FreeDecayConfig:
 
     def rig(self) -> Rig:
         """The rig of the description, or the packaged one."""
-        return load_rig(Path(self.rig_file) if self.rig_file is not None else None)
+        with env_errors(WHERE, "rig_file"):
+            return load_rig(Path(self.rig_file) if self.rig_file is not None else None)
 
 
 def angle_limit(rig: Rig) -> float:
@@ -173,6 +174,18 @@ INERTIA_SHARE = (0.95, 1.05)  # of the rig's Izz
 DAMPING_SHARE = (0.5, 1.5)  # of the rig's Cr
 SENSOR_ZERO = (-0.01, 0.01)  # rad
 SEVERITY_SHARE = (0.5, 2.0)  # of an effect's typical severity
+_UNITS = {
+    "cn_beta": "1/rad",
+    "cn_r": "1/rad",
+    "yaw_inertia": "kg m2",
+    "mechanical_damping": "N m s/rad",
+    "spring_stiffness": "N m/rad",
+    "wind_speed": "m/s",
+    "air_density": "kg/m3",
+    "release_angle": "rad",
+    "sensor_zero": "rad",
+}
+"""Of the numbers of a run."""
 STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the greatest Ka
 
 
@@ -281,7 +294,7 @@ def _number(
     """A given number, checked; if none is given, a drawn one, or the first bound without a generator."""
     if given.get(name) is None:
         return float(rng.uniform(*bounds)) if rng is not None else bounds[0]
-    return Number(least, most, unit="SI units").checked(given[name], name, f"option {name}")
+    return Number(least, most, unit=_UNITS[name]).checked(given[name], name, f"option {name}")
 
 
 def _effects(

@@ -205,6 +205,17 @@ def operator_action(
         wind_speed: set-point, m/s, from 0 to the limit.
         moment: applied yaw moment, N m, within the limit to either side.
     """
+    limits = {
+        "wind_speed": (wind_speed, 0.0, config.wind_limit, "wind_limit", "m/s"),
+        "moment": (moment, -config.moment_limit, config.moment_limit, "moment_limit", "N m"),
+    }
+    for name, (value, least, most, limit, unit) in limits.items():
+        if not least <= value <= most:
+            what = f"{name} = {value:g} {unit} is beyond {limit} = {most:g} {unit}"
+            if name == "wind_speed" and value < 0.0:
+                what = f"{name} = {value:g} {unit} is negative"
+            remedy = f"give {least:g} to {most:g} {unit}, or make the environment with a greater {limit}"
+            raise EnvError(what, where="operator_action", remedy=remedy)
     action = np.array([2.0 * wind_speed / config.wind_limit - 1.0, moment / config.moment_limit], np.float32)
     decode(config, action[None])
     return action

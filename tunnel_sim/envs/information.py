@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.arguments import Number, checked_names
+from tunnel_sim.vocabulary.arguments import EnvError, Number, checked_names
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Body
 
@@ -41,10 +41,22 @@ UNKNOWNS = (
 )  # fmt: skip
 """The order of rows and columns of the information matrix; the first five are eliminated."""
 
+REWARDED = UNKNOWNS[5:]
+"""The reward is the information about these, which is infinite from the start where they are known exactly."""
+_PRIOR_UNITS = {
+    "yaw_inertia": "shares of Izz",
+    "mechanical_damping": "shares of Cr",
+    "release_angle": "rad",
+    "release_rate": "rad/s",
+    "sensor_zero": "rad",
+    "cn_beta": "1/rad",
+    "cn_r": "1/rad",
+}
+
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before the run, as standard deviations; 0: known exactly.
+    """What is known before the run, as standard deviations; 0: known exactly, except of those `REWARDED`.
 
     Args:
         yaw_inertia, mechanical_damping: as a share of Izz and Cr; known from wind-off runs with the spring.
@@ -66,8 +78,10 @@ class Prior:
         """The prior with some of its standard deviations changed; ``where`` is for errors."""
         known = [item.name for item in fields(Prior)]
         for name, value in checked_names(changes, known, "prior", where).items():
-            deviation = Number(above=name in ("cn_beta", "cn_r"), unit="SI units")
-            deviation.checked(value, f"prior of {name}", where)
+            if name in REWARDED and value == 0:
+                what = f"prior of {name} = {value!r}: known exactly, it leaves nothing to learn"
+                raise EnvError(what, where=where, remedy="give a number above 0, in 1/rad")
+            Number(above=name in REWARDED, unit=_PRIOR_UNITS[name]).checked(value, f"prior of {name}", where)
         return replace(Prior(), **changes)
 
     def scales(self, run: RunSettings) -> Array:

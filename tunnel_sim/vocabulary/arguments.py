@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
@@ -14,6 +15,18 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean
 
 class EnvError(TunnelError, ValueError):
     """A bad argument, option or action of an environment, described in one line."""
+
+
+@contextmanager
+def env_errors(environment: str, argument: str) -> Iterator[None]:
+    """Convert errors of a lower layer within the block: they then name the environment and its argument."""
+    try:
+        yield
+    except EnvError:
+        raise
+    except TunnelError as error:
+        where = f"{environment}, {argument}{error.where and f', {error.where}'}"
+        raise EnvError(error.what, where=where, remedy=error.remedy) from error
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ def loading(where: str, remedy: str = "correct or uninstall its package") -> Ite
     """Say in one line whatever foreign code does wrong while it is loaded within the block."""
     try:
         yield
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         said = str(error) if isinstance(error, TunnelError) else raised_line(error)
         raise TunnelError(f"cannot be loaded ({one_line(said)})", where=where, remedy=remedy) from error
 

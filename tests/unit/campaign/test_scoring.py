@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
-from identification.scoring import ScoredEstimate, collect, overall, score
+from identification.scoring import INTERVAL, ScoredEstimate, collect, overall, reach_of_rmse, score
 from identification.statistics import Proportion
 from tunnel_sim.files.writing import as_json
 
@@ -23,8 +23,9 @@ def test_figures_are_the_sums_done_by_hand():
     assert found.relative_bias.value == pytest.approx(10.0)
     assert found.bias_in_stds.value == pytest.approx(1.0)
     assert found.rmse.value == pytest.approx(np.sqrt(7.0))
-    # mean of 1, 4, 16 is 7, their s² = 63, so se(√7) = √(63/3)/(2√7)
-    assert found.rmse.std == pytest.approx(np.sqrt(21.0) / (2.0 * np.sqrt(7.0)))
+    # of normal errors of mean 1 and variance 9: var(x²) = 2·81 + 4·9 = 198, so se(√7) = √(198/3)/(2√7); the squares
+    # 1, 4, 16 themselves scatter less, with s² = 63
+    assert found.rmse.std == pytest.approx(np.sqrt(66.0) / (2.0 * np.sqrt(7.0)))
     assert found.rmse_over_bound == Quantity(pytest.approx(np.sqrt(7.0)), pytest.approx(found.rmse.std), "1")
     assert (found.coverage.count, found.coverage.total) == (1, 3)
     assert {found.bias.unit, found.rmse.unit} == {"kg m2"}
@@ -38,6 +39,24 @@ def test_the_standard_errors_are_those_of_repeated_scores():
         scatter = np.std([figure.value for figure in figures], ddof=1)
         claimed = np.sqrt(np.mean([figure.std**2 for figure in figures]))
         assert claimed == pytest.approx(scatter, rel=0.15)  # 4σ of a scatter of 400
+
+
+def test_the_standard_error_of_few_trials_is_not_far_too_small():
+    """Of four normal errors the true RMSE is within 1.96 standard errors as often as χ² lets it: nine in ten."""
+    rng = np.random.default_rng(2)
+    many = [score(collect(outcomes(rng.normal(0.0, 1.0, 4)))).rmse for _ in range(2000)]
+    assert np.mean([abs(one.value - 1.0) <= INTERVAL * one.std for one in many]) > 0.85
+    alike = score(collect(outcomes([1.0, -1.0, 1.01, -1.01]))).rmse
+    assert alike.std / alike.value == pytest.approx(1.0 / np.sqrt(8.0), rel=0.4)
+
+
+def test_the_reach_of_an_rmse_is_that_of_its_distribution():
+    """The chi-squared quantiles 0.4844 and 11.143 of four degrees of freedom are in every table."""
+    low, high = reach_of_rmse(4)
+    assert (low, high) == (
+        pytest.approx((4 / 11.143) ** 0.5, rel=1e-3),
+        pytest.approx((4 / 0.4844) ** 0.5, rel=1e-3),
+    )
 
 
 def test_wilsons_interval_is_the_librarys():

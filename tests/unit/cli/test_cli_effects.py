@@ -68,7 +68,9 @@ def test_the_reference_page_is_the_registrys(tunnel: Tunnel, tmp_path: Path) -> 
     command = "tunnel effects --markdown docs/reference/effects.md"
     assert tunnel("effects", "--markdown", tmp_path / "effects.md")[0] == 0
     current = (tmp_path / "effects.md").read_text(encoding="utf-8")
-    assert current == page.read_text(encoding="utf-8"), f"out of date: {command}"
+    assert current == page.read_text(encoding="utf-8"), (
+        f"out of date: python -m tunnel_lab {command.removeprefix('tunnel ')}"
+    )
     assert command in current  # it says how it was written
     assert (page.parent / "../theory/what-no-free-decay-can-show.md").is_file()
 

@@ -184,7 +184,7 @@ def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
     frame.write_parquet(tmp_path / "gone.parquet")
     status, _, err = tunnel("score", grid, "--check", tmp_path / "gone.parquet", "--jobs", "0")
     assert status == 2
-    assert "gone_one, which the registry does not" in err
+    assert "gone_one, which no installed package adds" in err
 
 
 @pytest.mark.slow

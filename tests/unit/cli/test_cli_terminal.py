@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import shutil
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,6 +64,18 @@ def test_what_was_finished_before_does_not_count_for_the_time_left(monkeypatch: 
         now = 25.0
         advance(92, 100, "drift")
     assert "92/100 0:00:25 left 0:01:20" in terminal.file.getvalue()
+
+
+def test_work_of_minutes_says_where_it_is_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with outputs.bar_or_lines("diagnosing", 4, every=0.05) as advance:
+        advance(3, 4)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(line == "0 s: diagnosing, 3 of 4" for line in lines)
+    with outputs.bar_or_lines("diagnosing", 4):
+        pass
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("width", [60, 70, 80])

@@ -77,6 +77,14 @@ class NotANumber(Mine):
         return replace(found, runs=tuple(runs))
 
 
+class Bare(Mine):
+    name = "bare"
+
+    def estimate(self, campaign):
+        found = super().estimate(campaign)
+        return replace(found, runs=tuple(replace(run, zeta=None) for run in found.runs))
+
+
 class Dies:
     name = "dies"
 
@@ -164,9 +172,66 @@ def test_one_that_leaves_the_program_is_counted_as_a_failure(tunnel) -> None:
 
 
 @pytest.mark.usefixtures("folder")
+def test_one_that_leaves_the_program_ends_identify_with_one(tunnel, tiny_campaign: Path) -> None:
+    status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:Leaves")
+    assert (status, out) == (1, "")
+    assert "tunnel: leaves raised an exception: SystemExit: 3, own_method.py line" in err
+
+
+def test_a_module_that_leaves_the_program_is_one_line(tunnel, folder: Path, tiny_campaign: Path) -> None:
+    (folder / "own_method.py").write_text('raise SystemExit("bye")\n', encoding="utf-8")
+    status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:Mine")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "own_method:Mine: cannot be loaded (SystemExit: bye, own_method.py line 1)" in err
+
+
+@pytest.mark.usefixtures("folder")
+def test_any_code_that_leaves_the_program_is_said(tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever code of one's own is called, its exit is not taken for success."""
+
+    def leaves() -> None:
+        raise SystemExit(0)
+
+    monkeypatch.setattr("tunnel_lab.experiments.score_grid.packaged_grid", leaves)
+    status, out, err = tunnel("score", "-e", "hilbert")
+    assert (status, out) == (1, "")
+    assert err.startswith("tunnel: the command was ended by its own code (SystemExit: 0, test_own_est")
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
+    """The class gives ωn and no ζ, and says that nothing failed."""
+    score = ("score", "--jobs", "0", "grid.toml", "-e", "own_method:Bare,own_method:Mine")
+    status, out, err = tunnel(*score)
+    assert (status, err) == (0, "")
+    bare, mine = out.partition(" bare ")[2].split(" mine ")
+    assert ("ωn" in bare, "ζ" in bare, "ζ" in mine) == (True, False, True)
+    assert "Not given by bare: ζ.\n" in out
+    status, out, _ = tunnel(*score[:-1], "own_method:Leaves")
+    assert "Not given" not in out
+    assert out.count("100 (51–100)") == 2
+
+
+def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
+    sys.path.insert(0, str(folder))
+    names = [estimators.register_from(f"own_method:{kind}") for kind in ("Bare", "Mine")]
+    run_sweep(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    status, out, err = tunnel("sweep", "--summary", "out")
+    assert (status, err) == (0, "")
+    assert "Not given by bare: ζ, zero.\n" in out
+    assert "Not given by mine: zero.\n" in out
+
+
+@pytest.mark.usefixtures("folder")
 def test_an_exception_fails_the_check(tunnel) -> None:
     here = ("--jobs", "0", "grid.toml")
     assert tunnel("score", *here, "-e", "own_method:Mine", "--write-baseline", "base.parquet")[0] == 0
+    status, _, err = tunnel("score", "--jobs", "0", "--check", "base.parquet")
+    assert (status, err.count("\n")) == (2, 1)
+    assert (
+        "the baseline has mine, which no installed package adds; name a class of your own again with -e"
+        in err
+    )
     status, out, err = tunnel("score", "--jobs", "0", "--check", "base.parquet", "-e", "own_method:Mine")
     assert (status, err) == (0, "")
     assert "to the last bit" in out
@@ -240,7 +305,7 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     (folder / "own_method.py").write_text(MODULE + "\nMORE = 1\n", encoding="utf-8")
     again = in_a_process(*words, cwd=folder)
     assert again.returncode == 2
-    assert "the sweep was begun with estimator mine" in again.stderr
+    assert "the file of estimator mine has changed since the sweep was begun; name another" in again.stderr
 
 
 @pytest.mark.slow
@@ -320,6 +385,12 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
             "gone_module:Mine",
             "gone_module:Mine: cannot be loaded (ModuleNotFoundError: No module",
         ),
+        (
+            "own_method.py:Mine",
+            "own_method.py:Mine: names a file, not a module; leave out .py: own_method:Mine",
+        ),
+        ("own_method:", "own_method:: names no class; give it as module:Class"),
+        (":Mine", ":Mine: names no module; give it as module:Class"),
         ("own_method:one_of", "is not a class of an estimator; state a name and a method estimate"),
         ("own_method:Loud", "estimator loud: cannot be made without arguments (TypeError"),
         ("min", "there is no estimator 'min'; use one of"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -304,7 +305,7 @@ def test_an_open_set_is_scored_and_said_to_be_open(blind, quick, capsys):
     assert "not a blind test" in capsys.readouterr().out
 
 
-def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypatch):
+def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(answer, "simulate_set", lambda *_, **__: [])
     for words, made in (
         ([], (0.5, "mixed", 0.5, 0.5)),
@@ -319,6 +320,10 @@ def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypat
         )
         said = json.loads((folder / "key.json").read_text())["made_with"]
         assert tuple(said[n] for n in ("scatter", "scatter_level", "scatter_normal", "stated")) == made
+    said = capsys.readouterr()
+    assert f"key.json is the truth: move it out of {folder} before you hand the folder out" in said.out
+    named = shlex.quote(str(folder))
+    assert f"Next: tunnel blind diagnose {named}, then tunnel blind score {named}\n" in said.out
     assert main(["blind", "make", str(tmp_path / "x"), "--seed", "1", "--scatter", "1.5"]) == 2
 
 

@@ -131,3 +131,13 @@ def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
 def test_a_malformed_scatter_is_refused(said):
     with pytest.raises(ValueError, match="validation error"):
         case("c", {**TRUTH, "effects": []}, document([]) | {"repeatability": said})
+
+
+def test_where_no_width_is_asked_for_none_are_shown():
+    drifting = made([], ["unknown"], widths=SPEED, form="drifting")  # another form counts for the causes only
+    titles = [one.title for one in blind.sections(Score((drifting, made([], [])), (), "k", "a", {}, True))]
+    assert "Scatter between runs" in titles
+    assert "Widths of the scatter" not in titles
+    every = blind.sections(Score(CASES, (), "k", "a", {}, True))
+    (widths,) = (one for one in every if one.title == "Widths of the scatter")
+    assert [row[0] for row in widths.rows] == ["wind speed", "spring stiffness", "mechanical damping", "all"]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+PAGES = Path(__file__).parents[3] / "docs" / "reference" / "envs"
 
 
 def printed(code: str, *paths: Path) -> str:
@@ -36,3 +39,13 @@ def test_gymnasium_reads_no_entry_points(tmp_path: Path) -> None:
     said = printed(found + 'gymnasium.make("tunnel_sim/FreeDecay-v0")', tmp_path)
     assert said.startswith("1\n")
     assert "Namespace tunnel_sim not found" in said
+
+
+@pytest.mark.parametrize("page", ["free-decay", "campaign"])
+def test_the_pages_make_an_environment_by_a_name_that_works_alone(page: str) -> None:
+    """The name without its module needs an import before it."""
+    text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
+    (row,) = (line for line in text.splitlines() if line.startswith("| made with |"))
+    names = re.findall(r'make(?:_vec)?\("([^"]*)"', row)
+    assert names
+    assert all(name.startswith("tunnel_sim.envs:tunnel_sim/") for name in names)

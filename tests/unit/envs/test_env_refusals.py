@@ -11,6 +11,7 @@ from env_episodes import NAME, make
 
 from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.free_decay import FreeDecayEnv, FreeDecayVectorEnv
+from tunnel_sim.envs.information import UNKNOWNS
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -31,9 +32,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
         ({"noise_std": 1e-7, "resolution": 0.0}, ["below 1e-06 rad"]),
         ({"effect_probability": 1.5}, ["probability"]),
         ({"prior": {"cn_bta": 0.1}}, ["did you mean 'cn_beta'"]),
-        ({"prior": {"cn_r": 0.0}}, ["cn_r = 0.0"]),
+        ({"prior": {"cn_r": 0.0}}, ["cn_r = 0.0: known exactly", "nothing to learn", "above 0, in 1/rad"]),
+        ({"prior": {"release_angle": -0.1}}, ["release_angle = -0.1", "in rad"]),
         ({"prior": 5}, ["FreeDecay-v0: prior = 5 is not a mapping", "give values by name"]),
-        ({"rig_file": "nowhere.toml"}, ["nowhere.toml", "no such file"]),
+        ({"rig_file": "nowhere.toml"}, ["FreeDecay-v0, rig_file, nowhere.toml", "no such file"]),
         ({"rig_file": 5}, ["rig_file = 5 is not a path"]),
         ({"preset": ["operator"]}, ["unknown preset ['operator']"]),
         ({"duration": 1e9}, ["FreeDecay-v0: duration = 1e+09 s at 1000 Hz", "give at most 20000 s"]),
@@ -54,7 +56,7 @@ def test_arguments(arguments: dict[str, Any], parts: list[str]) -> None:
         ({"wind_speed": -1.0}, ["option wind_speed", "0 to 40"]),
         ({"wind_speed": 41.0}, ["option wind_speed", "0 to 40"]),
         ({"wind_speed": "fast"}, ["option wind_speed"]),
-        ({"release_angle": 20.0}, ["option release_angle", "1.03"]),  # degrees, surely
+        ({"release_angle": 20.0}, ["option release_angle", "1.03", "in rad"]),  # degrees, surely
         ({"spring": 11}, ["no spring 11", "use one of 1, 2"]),
         ({"spring": "five"}, ["option spring"]),
         ({"spring": 5, "spring_stiffness": 16.0}, ["both"]),
@@ -95,8 +97,35 @@ def test_actions_of_the_operator(action: Any) -> None:
     with pytest.raises(EnvError) as refusal:
         env.step(np.array(action))
     assert_one_line(refusal.value, ["action"])
-    with pytest.raises(EnvError, match="outside the space"):
-        env.unwrapped.operator_action(wind_speed=50.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (
+            {"wind_speed": 100, "moment": 0},
+            "wind_speed = 100 m/s is beyond wind_limit = 40 m/s; give 0 to 40 m/s",
+        ),
+        ({"wind_speed": -1.0}, "wind_speed = -1 m/s is negative; give 0 to 40 m/s"),
+        ({"wind_speed": np.nan}, "wind_speed = nan m/s"),
+        (
+            {"wind_speed": 1.0, "moment": -0.6},
+            "moment = -0.6 N m is beyond moment_limit = 0.5 N m",
+        ),
+    ],
+)
+def test_values_of_an_action_are_refused_in_their_units(values: dict[str, float], said: str) -> None:
+    with pytest.raises(EnvError, match=said) as refusal:
+        make(preset="operator").unwrapped.operator_action(**values)
+    assert_one_line(refusal.value, ["operator_action: "])
+
+
+def test_all_but_the_derivatives_may_be_known_exactly() -> None:
+    """What the page says of a prior of 0."""
+    exact = dict.fromkeys(UNKNOWNS[:5], 0.0)
+    env = make(preset="operator", duration=0.5, prior=exact)
+    env.reset(seed=1)
+    assert np.isfinite(env.step(np.zeros(2))[1])
 
 
 @pytest.mark.parametrize(

@@ -151,6 +151,18 @@ FAULTS: dict[str, tuple[Callable[[Estimate, Campaign], Any], str]] = {
         lambda found, _: replace(found, cn_beta=found.cn_beta and scaled(1.0, std=2.0)(found.cn_beta)),
         "does not have the standard deviations of the values",
     ),
+    "a negative variance": (
+        lambda found, _: replace(found, covariance=tuple(map(tuple, (-found.covariance_matrix).tolist()))),
+        r"variance of cn_beta in the covariance with noisy runs is negative \(-",
+    ),
+    "an array as covariance": (
+        lambda found, _: replace(found, covariance=found.covariance_matrix),
+        "the covariance with noisy runs is ndarray .*; give a tuple of rows",
+    ),
+    "an array as value": (
+        of_runs(zeta=lambda q: replace(q, value=np.array([q.value]))),
+        "the value of zeta of run r01 .* is ndarray .*; give one number",
+    ),
     "the input is changed": (changed_record, "read-only.*; copy an array before you change it"),
     "the input is forced": (forced, "changes the record of run r01; copy an array"),
     "not repeatable": (drawn, "another answer when it is asked again.*default_rng"),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.scoring import Trials, score
-from tunnel_lab.experiments.score_view import cell_figures, pooled_figures
+from tunnel_lab.experiments.score_trials import packaged_baseline
+from tunnel_lab.experiments.score_view import cell_figures, lines_below, pooled_figures, summary_tables
 
 
 def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Trials:
@@ -34,6 +37,25 @@ def test_what_a_cell_does_not_give_is_a_dash() -> None:
 def test_two_trials_have_a_bias_and_one_has_none() -> None:
     assert float(pooled_figures([trials([1.0, 2.0])])[2].partition("(")[0]) == pytest.approx(1.5, abs=0.05)
     assert pooled_figures([trials([1.0])])[2] == "–"
+
+
+def test_the_time_is_not_under_a_heading_of_another_figure() -> None:
+    """In a narrow terminal a row is printed as headings and values: a time is not one of an RMSE."""
+    decays, *_ = summary_tables(packaged_baseline())
+    texts = [list(map(str, column.cells)) for column in decays.columns]
+    times = [place for place, text in enumerate(texts[0]) if text.strip().endswith("ms/record")]
+    assert len(times) == len(packaged_baseline().estimators)
+    assert not any(column[place].strip() for column in texts[1:] for place in times)
+
+
+def test_few_trials_are_said() -> None:
+    results = packaged_baseline()
+    assert not any(line.startswith("Few trials") for line in lines_below(results))
+    few = replace(results, grid=replace(results.grid, trials=4))
+    (line,) = (line for line in lines_below(few) if line.startswith("Few trials"))
+    assert line.startswith(
+        "Few trials: with 4 in a cell, the RMSE of many would be 0.6 to 2.9 times the one shown"
+    )
 
 
 def test_a_cell_has_its_bias_in_per_cent_and_in_deviations() -> None:

@@ -123,7 +123,7 @@ def test_the_summary_of_a_sweep(
     shutil.rmtree(tmp_path / "out" / "summary")
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
-    for part in ("All cases, without effects", "Error against noise", "Error against coulomb friction"):
+    for part in ("All cases without effects", "Error against noise", "Error against coulomb friction"):
         assert part in said
     files = {path.name: path for path in (tmp_path / "out" / "summary").iterdir()}
     names = ("noise-std", "wind-speed", "coulomb-friction")
@@ -169,6 +169,20 @@ def test_figures_by_hand() -> None:
     assert (ten.bias.std, ten.coverage.value) == (pytest.approx(0.0, abs=1e-9), 0.0)
     assert one.rmse.value == pytest.approx(((1.0 + 1.0 + 100.0) / 3.0) ** 0.5)
     assert one.coverage.value == pytest.approx(2.0 / 3.0)
+
+
+def test_the_title_says_that_cases_with_scatter_are_left_out() -> None:
+    rows = hand_made([2.02, 1.98, 2.2, 2.2])
+    scattered = rows.with_columns(scatter_wind_speed=pl.lit(0.01), value=pl.lit(3.0))
+    mixed = list(lines_of(pl.concat([rows, scattered]), "e", "zeta"))
+    title = sweep_summary.overall_table(mixed).title
+    assert str(title) == "All cases without effects and without scatter"
+    assert mixed[0].score.count == 4
+    for alone in (rows, scattered):
+        title = sweep_summary.overall_table(lines_of(alone, "e", "zeta")).title
+        assert str(title) == "All cases without effects"
+    along = [line for line in mixed if line.axis == "scatter_wind_speed"]
+    assert str(sweep_summary.axis_table(along).columns[0].header) == "relative scatter of wind speed [1]"
 
 
 def test_errors_about_a_truth_of_zero_are_in_its_unit() -> None:
