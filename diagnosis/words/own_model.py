@@ -15,11 +15,11 @@ _APART = 0.02  # change of a value, as a share of the new one, that is worth a s
 
 def corrected(document: Document) -> list[Mapping[str, Any]]:
     """The attributes of the model that the runs do not agree with, as the patch has them; none without a model."""
-    model = document.get("model") or {"written": (), "free": ()}
+    model = document.get("model") or {}
     return [
         one
-        for one in model["written"]
-        if _FREE.get(one["name"]) in model["free"]
+        for one in model.get("written", ())
+        if _FREE.get(one["name"]) in model.get("free", ())
         and abs(one["after"][0] - one["before"][0]) > _APART * abs(one["after"][0])
     ]
 

@@ -153,6 +153,8 @@ OF_RATE = (
         {"friction_moment": 0.02, "presliding": 0.005, "friction_peak": 1.0, "friction_peak_rate": 0.3},
     ),
 )  # fmt: skip
+#: Friction that jumps, or rises without bound in its slope, where the rate reverses.
+REVERSING = (*FRICTION, *(c for c in OF_RATE if not {"presliding", "friction_saturation"} & c.terms.keys()))
 PRESLIDING = (
     Case("presliding", {"friction_moment": 0.02, "presliding": 0.005}),
     Case("wide_presliding", {"friction_moment": 0.4, "presliding": 0.1}),
