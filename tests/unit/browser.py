@@ -74,6 +74,10 @@ CONTRASTS = """() => {
     }
     return getComputedStyle(document.body).backgroundColor;
   };
+  // colours in mid-transition, from one scheme to the other, are nobody's to read
+  for (const one of document.getAnimations()) {
+    if (one.effect.getComputedTiming().endTime < Infinity) one.finish();
+  }
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
   for (let node = walker.nextNode(); node; node = walker.nextNode()) {
     const parent = node.parentElement;
