@@ -244,14 +244,12 @@ class Fit:
 
     @property
     def compared(self) -> int:
-        """How many effects chance differences between the runs could do: they are known by comparison of runs."""
+        """How many effects chance differences between the runs could do: their sizes are known by comparison."""
         if self.between is None:
             return 0
-        rows = list(zip(self.problem.names, self.between.compared.tolist(), strict=True))
-        of_effects = (
-            [seen for name, seen in rows if name.split(".")[0] == kind.name] for kind in self.problem.effects
-        )
-        return sum(bool(own) and all(own) for own in of_effects)
+        known = dict(zip(self.problem.names, self.between.compared.tolist(), strict=True))
+        sizes = (f"{kind.name}.{kind.parameters()[0].name}" for kind in self.problem.effects)
+        return sum(known.get(size, False) for size in sizes)
 
     @property
     def unlikelihood(self) -> float:

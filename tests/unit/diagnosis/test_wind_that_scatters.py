@@ -107,3 +107,14 @@ def test_vortices_keep_time_with_the_true_speed(monkeypatch: pytest.MonkeyPatch)
     stated = try_fit(start.problem, start.point)
     assert stated is not None
     assert followed.excess < 0.1 * stated.excess
+
+
+def test_the_size_of_an_effect_is_known_within_runs_or_by_their_comparison() -> None:
+    """Of gravity the angle of rest is seen in every run, and its stiffness by comparing springs."""
+    found = blown()
+    for effect, compared in (("gravity_stiffness", 1), ("wind_speed_offset", 1), ("cubic_stiffness", 0)):
+        _, fitted = beside_scatter(found, effect)
+        assert fitted.compared == compared, effect
+    base = scattered(nominal_study(found, known_effects()).prepared.nominal, known_effects())
+    assert base is not None
+    assert base.compared == 0
