@@ -5,31 +5,45 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnosis.settings import settings_of
 from diagnosis.words.numbers import Document
-from identification.printing import significant, unit_mark
+from identification.printing import significant, unit_mark, with_std
 
-#: What a fit leaves free, by the attribute in which it is written.
-_FREE = {"joint armature": "inertia", "joint damping": "damping", "joint stiffness": "stiffness"}
-_APART = 0.02  # change of a value, as a share of the new one, that is worth a sentence
+#: By the attribute in which it is written: what a fit leaves free, and the coefficient that it is a part of.
+_FREE = {
+    "joint armature": ("inertia", "yaw_inertia"),
+    "joint damping": ("damping", "mechanical_damping"),
+    "joint stiffness": ("stiffness", "added_stiffness"),
+}
+_STDS = 2.0  # of the coefficient, by which the file's value must be off
 
 
-def corrected(document: Document) -> list[Mapping[str, Any]]:
-    """The attributes of the model that the runs do not agree with, as the patch has them; none without a model."""
-    model = document.get("model") or {}
-    return [
-        one
-        for one in model.get("written", ())
-        if _FREE.get(one["name"]) in model.get("free", ())
-        and abs(one["after"][0] - one["before"][0]) > _APART * abs(one["after"][0])
-    ]
+def corrected(document: Document) -> list[tuple[Mapping[str, Any], float]]:
+    """The attributes of the model that the runs do not agree with, as the patch has them.
+
+    Returns:
+        With the standard deviation of each new value, in its unit; none without a model.
+    """
+    model, after = document.get("model") or {}, document["coefficients"]["after"]
+    found = []
+    for one in model.get("written", ()):
+        free, name = _FREE.get(one["name"], ("", ""))
+        known = after.get(name, {"std": None})
+        if free not in model["free"] or known["std"] is None:
+            continue
+        change = abs(one["after"][0] - one["before"][0])
+        share = settings_of(document).answer.material_share
+        if change > _STDS * known["std"] and change > share * abs(known["value"]):
+            found.append((one, known["std"]))
+    return found
 
 
 def model_words(document: Document) -> str:
     """How the values in the model's file differ from those of the runs, in a sentence; empty where they do not."""
     said = []
-    for one in corrected(document):
-        before, after = (significant(values[0], 3) for values in (one["before"], one["after"]))
-        unit = unit_mark(one["unit"].split(",")[0])
+    for one, std in corrected(document):
+        before, unit = significant(one["before"][0], 3), unit_mark(one["unit"].split(",")[0])
+        after = with_std(one["after"][0], std) if std > 0.0 else significant(one["after"][0], 3)
         said.append(f"{one['name']} is {before} {unit} there, and the runs say {after} {unit}")
     return f"{document['model']['file']} as given does not fit: {'; '.join(said)}." if said else ""
 

@@ -446,21 +446,31 @@ def test_effects_say_their_sizes_as_a_person_would():
     assert said_size(document(), one, "cubic_stiffness") == ""
 
 
-def of_model(armature: float, *free: str) -> dict[str, Any]:
-    """A document without a cause of a joint whose model's file has an armature of 0.01 kg m²."""
+def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str, Any]:
+    """A document without a cause of a joint of 0.08 kg m² whose model's file has an armature of 0.01 kg m²."""
     written = [
         {"name": "joint armature", "before": [0.01], "after": [armature], "unit": "kg m2"},
         {"name": "joint frictionloss", "before": [0.0], "after": [0.2], "unit": "N m"},
     ]
-    return answer_of() | {"model": {"file": "arm.xml", "free": list(free), "written": written}}
+    inertia = {"value": 0.08, "std": std, "unit": "kg m2"}
+    coefficients = {"before": {}, "after": {"yaw_inertia": inertia}}
+    model = {"file": "arm.xml", "free": list(free), "written": written}
+    return answer_of() | {"model": model, "coefficients": coefficients}
 
 
 def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
     given = of_model(0.03, "inertia", "damping")
     assert verdict(given, "").endswith(
-        "arm.xml as given does not fit: joint armature is 0.0100 kg m² there, and the runs say 0.0300 kg m²."
+        "arm.xml as given does not fit: joint armature is 0.0100 kg m² there, and the runs say 0.03000 ± 0.00020 "
+        "kg m²."
     )
     assert next_steps(given)[0] == ("Correct these values in arm.xml; --patch FILE writes a model with them.")
-    for fits in (of_model(0.0101, "inertia"), of_model(0.03, "damping"), answer_of()):
+    for fits in (
+        of_model(0.0107, "inertia"),  # less than 1 % of the inertia
+        of_model(0.03, "damping"),
+        of_model(0.03, "inertia", std=0.015),  # these runs do not tell
+        of_model(0.03, "inertia", std=None),
+        answer_of(),
+    ):
         assert "as given" not in verdict(fits, "")
         assert not any("Correct these" in step for step in next_steps(fits))
