@@ -23,6 +23,7 @@ from diagnosis.model.joint import Joint, LooseJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.study import Study
+from tunnel_sim.effects.friction import AGAINST_RATE
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
     JointPatch,
@@ -40,7 +41,6 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _GRID = 201
-_FRICTION_FORMS = ("exponent", "saturation", "peak")
 _NAMES = frozenset(
     {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
 )
@@ -142,7 +142,7 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
     left_out = {
         "soft friction": bool(physics.parameters.get("friction_moment")),
         "presliding": bool(physics.parameters.get("presliding")),
-        "friction against rate": any(physics.parameters.get(f"friction_{form}") for form in _FRICTION_FORMS),
+        "friction against rate": any(physics.parameters.get(term) for term in AGAINST_RATE),
         "rod": physics.rod_twist is not None,
         "delayed input": any(kind.delays for kind in problem.effects),
         "actuator": any(kind.driven and not kind.delays for kind in problem.effects),

@@ -22,6 +22,8 @@ _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "friction_peak": "peak",
     "friction_peak_rate": "peak_rate",
 }
+#: Terms of the moment law each of which makes friction depend on the rate.
+AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 
 
 @dataclass(frozen=True)
