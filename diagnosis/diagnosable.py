@@ -269,10 +269,8 @@ def kinds_for(
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
     moments = any(run.drive is not None and run.drive.on_body for run in campaign.runs)
-    kept, gone = (
-        tuple(kind for kind in kinds if moments or not kind.of_moment),
-        dict[str, list[type[Effect]]](),
-    )
+    kept = tuple(kind for kind in kinds if moments or not kind.of_moment)
+    gone: dict[str, list[type[Effect]]] = {}
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])

@@ -45,7 +45,8 @@ def other_hold(study: Study) -> OtherHold | None:
     if fitted.unlikelihood - fit.unlikelihood > chance:
         return None
     delay, own = f"{DELAY.name}.{DELAY.parameters()[0].name}", study.similarity.own
-    half = 0.5 * float(np.median([run.record.sample_interval for run in study.campaign.runs]))
+    driven = (run for run in study.campaign.runs if run.drive is not None)
+    half = 0.5 * float(np.median([run.record.sample_interval for run in driven]))
     return OtherHold(
         delay_s=own(fit.value(delay), "s"),
         half_sample_s=own(half, "s"),

@@ -16,7 +16,6 @@ from diagnosis.model.parameters import Point
 from diagnosis.result import GapSummary, RunGap
 from diagnosis.search.prepared import COARSE_STEP
 from diagnosis.search.study import Study
-from tunnel_sim.physics.actuator import DIRECT
 from tunnel_sim.physics.run_settings import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -130,9 +129,8 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         steps = report_substeps(physics, run.interval)
         if run.drive is not None:  # steps end at its samples
             # a delayed or changed input is given by its means over the steps, which is of second order
-            drive = physics.drive
-            late = drive is not None and (drive.delay != 0.0 or drive.actuator != DIRECT)
-            steps = run.block * -(-steps // run.block) * (_FINER if late else 1)
+            finer = physics.drive is not None and not physics.drive.as_sampled
+            steps = run.block * -(-steps // run.block) * (_FINER if finer else 1)
         duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
         settings.append(replace(physics, timestep=run.interval / steps, duration=duration))
         simulated.setdefault(run.interval, []).append(i)

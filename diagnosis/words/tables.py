@@ -177,8 +177,8 @@ def coefficients_line(document: Document) -> str:
     if not parts:
         return ""
     return (
-        f"± includes {listed(parts)}. tunnel identify knows the noise, the scatter between runs and what its own "
-        "model misses, so that its ± may be far smaller or larger."
+        f"± includes {listed(parts)}. tunnel identify includes the noise, the scatter between runs and what its "
+        "own model misses, so that its ± may be far smaller or larger."
     )
 
 

@@ -208,7 +208,7 @@ def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_tab
     line = coefficients_line(given)
     assert line == (
         "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
-        "other answers, by their probability. tunnel identify knows the noise, the scatter between runs and "
+        "other answers, by their probability. tunnel identify includes the noise, the scatter between runs and "
         "what its own model misses, so that its ± may be far smaller or larger."
     )
     assert line in [part for part in diagnosis_parts(given) if isinstance(part, str)]

@@ -152,6 +152,11 @@ class DriveMoment:
         )
 
     @property
+    def as_sampled(self) -> bool:
+        """Whether it acts at the times of its samples, and as they are; a constant moment may be beside it."""
+        return self.delay == 0.0 and self.actuator == DIRECT
+
+    @property
     def greatest(self) -> tuple[float, float]:
         """Greatest magnitudes of the moment (N m) and of its rate of change from sample to sample (N m/s)."""
         size = abs(self.scale)
