@@ -15,7 +15,6 @@ import numpy as np
 
 from diagnosis.answer.linear_theory import (
     Starts,
-    coefficient_gradients,
     coefficients_of,
     influences,
     size_range,
@@ -146,17 +145,29 @@ def _real_roots(polynomial: Array) -> list[float]:
 
 
 _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
+_LEAST_PART = 1e-3  # of the way to a trial
 _REAL = 1e-6  # share of a root that its imaginary part may be
 
 
-def _at_once(fit: Fit, start: StartingPoint, point: Point) -> Array:
-    """What an effect changes of the coefficients where the other parameters stay, shape (coefficients,)."""
-    model, smaller = fit.problem.data.model, fit.problem
+def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
+    """How far coefficients are from those of a fit where an effect is beside it, shape (coefficients,).
+
+    Args:
+        there: the common parameters of the start's problem, shape (common,). Where a trial of gravity is so large
+            that nothing would swing, a part of the way there is looked at.
+    """
+    assert start.scaled is not None
+    model, names = fit.problem.data.model, start.problem.names
+    here = np.concatenate([fit.point.common, there[fit.point.common.size :]])
+    here[start.scaled] = 0.0
+    part = 1.0
+    while part > _LEAST_PART and model.coefficient(names, here + part * (there - here), "omega_n") == 0.0:
+        part *= 0.5
     changes = []
     for name in coefficients_of(fit):
-        given = model.coefficient(start.problem.names, point.common, name)
-        without = model.coefficient(smaller.names, fit.point.common, name)
-        changes.append(0.0 if given is None or without is None else given - without)
+        before = model.coefficient(fit.problem.names, fit.point.common, name)
+        after = model.coefficient(names, here + part * (there - here), name)
+        changes.append(0.0 if before is None or after is None else (after - before) / part)
     return np.array(changes, np.float64)
 
 
@@ -183,8 +194,7 @@ def _profiled(
     if not np.isfinite(whole):
         return None
     there = absorbed(fit, change)
-    moved = coefficient_gradients(fit) @ (there.common - fit.point.common)
-    moved = moved + _at_once(fit, start, Point(common, release))
+    moved = _moved(fit, start, np.concatenate([there.common, effect]))
     own = np.column_stack([there.release, release[:, there.release.shape[1] :]])
     change = change_to(fit, start.problem, Point(np.concatenate([there.common, effect]), own))
     if not all(np.all(np.isfinite(one)) for one in change):

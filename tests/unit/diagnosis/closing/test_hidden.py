@@ -12,11 +12,12 @@ from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
+from diagnosis.search.investigate import nominal_study
 from diagnosis.words.tables import diagnosis_parts, hidden_line, hidden_table
 from tests.unit.diagnosis.test_diagnosis_noise_colour import colour, with_zero
 from tests.unit.diagnosis_document import document
 from tests.unit.gap_campaigns import CN_R, NOISE, campaign, nominal, precise, studied
-from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from, known_effects
 
 
 def found_beside(data, *names):
@@ -49,6 +50,20 @@ def test_a_refit_at_the_largest_size_is_four_units_above_the_least(name):
         assert abs(again.value(coefficient) - base.value(coefficient)) == pytest.approx(
             move.value, rel=0.1, abs=0.02 * base.std(coefficient)
         )
+
+
+def test_a_rod_and_gravity_hide_no_frequency_of_small_swings():
+    """Beside a spring that is not stated, both change what that spring seems to be, and not what the runs show."""
+    (still, *_) = (run for run in campaign().runs if run.wind_speed == 0.0)
+    data = replace(campaign(), runs=(replace(still, spring_stiffness=None),))
+    base = nominal_study(data, known_effects()).prepared.nominal
+    kinds = [effect_class(name) for name in ("rod_flexibility", "gravity_stiffness")]
+    found = hidden_effects(base, starts_beside(base, kinds))
+    assert "gravity_stiffness" in [one.effect for one in found]
+    for one in found:
+        # the spring's own frequency would move by 0.2 % and 0.3 %
+        assert one.moves["omega_n"].value < 1e-4 * base.value("stiffness") ** 0.5, one.effect
+        assert one.moves["zeta"].value < 1e-4, one.effect
 
 
 def test_an_offset_of_the_only_wind_speed_is_not_listed():
