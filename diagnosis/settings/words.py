@@ -86,6 +86,15 @@ class RemainderSettings:
 class WordsSettings:
     """What is said."""
 
+    file_off_stds: float = setting(
+        2.0,
+        "How far a coefficient may be from the value in a model's file that is said to fit.",
+        "convention",
+        unit="std",
+    )
+    file_off_share: float = setting(
+        0.01, "The same as a share of the coefficient: less is not worth a sentence.", "judgement"
+    )
     runs_without_caution: int = setting(3, "With fewer runs a caution is given.", "judgement", unit="runs")
     noise_contradicted: float = setting(
         3.0,

@@ -15,7 +15,6 @@ _FREE = {
     "joint damping": ("damping", "mechanical_damping"),
     "joint stiffness": ("stiffness", "added_stiffness"),
 }
-_STDS = 2.0  # of the coefficient, by which the file's value must be off
 
 
 def corrected(document: Document) -> list[tuple[Mapping[str, Any], float]]:
@@ -32,8 +31,8 @@ def corrected(document: Document) -> list[tuple[Mapping[str, Any], float]]:
         if free not in model["free"] or known["std"] is None:
             continue
         change = abs(one["after"][0] - one["before"][0])
-        share = settings_of(document).answer.material_share
-        if change > _STDS * known["std"] and change > share * abs(known["value"]):
+        chosen = settings_of(document).words
+        if change > max(chosen.file_off_stds * known["std"], chosen.file_off_share * abs(known["value"])):
             found.append((one, known["std"]))
     return found
 
