@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ _AIR = (
     "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
     "shedding_amplitude",
 )  # fmt: skip
+_Part = TypeVar("_Part")
 _POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
 
 
@@ -85,8 +87,13 @@ class Motions:
     ringing: Sequence[Ringing | None]
 
     @classmethod
-    def of(cls, asked: Asked) -> Motions:
-        """The motions of some runs."""
+    def of(cls, asked: Asked, like: int | None = None) -> Motions:
+        """The motions of some runs.
+
+        Args:
+            like: every so many runs are the same ones at another point, which has the steps of the first; None: the
+                steps of each run are its own.
+        """
         physics, runs, rig, count = (
             asked.physics.copy(),
             asked.runs,
@@ -122,6 +129,10 @@ class Motions:
         flexible = np.array([twist is not None for twist in physics.rod_twist])
         rough = (substeps > 1) | flexible | derived | driven
         stride = np.where(rough, 1, fit_stride(rig, physics, interval))
+        if like is not None:
+            points = count // like
+            substeps, stride = np.tile(substeps[:like], points), np.tile(stride[:like], points)
+            blocks = np.tile(blocks.reshape(points, like).max(axis=0), points)
         at, law, step = column_places(), physics.law.copy(), stride * interval / substeps
         law[:, at["frontal_area"]], law[:, at["width"]] = rig.body.frontal_area, rig.body.width
         law[:, at["reference_length"]] = rig.body.length
@@ -148,6 +159,11 @@ class Motions:
             found.setdefault((row.tobytes(), *(array.tobytes() for array in kept)), []).append(place)
         return list(found.values())
 
+    def steps(self, place: int) -> tuple[float, ...]:
+        """What the motions that are integrated side by side have in common: samples, and steps between them."""
+        row = self.rows[place]
+        return float(self.blocks[place]), float(row["steps"]), float(row["stride"])
+
     def integrated(self, places: Sequence[int]) -> tuple[Array, Array]:
         """Angle and rate at the blocks' ends of runs of equal length and steps, without a rod's ringing.
 
@@ -171,9 +187,7 @@ def readings(asked: Asked) -> list[Array]:
     motions = Motions.of(asked)
     equal: dict[tuple[float, ...], list[list[int]]] = {}
     for places in motions.alike():
-        row = motions.rows[places[0]]
-        key = (float(motions.blocks[places[0]]), float(row["steps"]), float(row["stride"]))
-        equal.setdefault(key, []).append(places)
+        equal.setdefault(motions.steps(places[0]), []).append(places)
     parts = [
         group[first : first + _TOGETHER]
         for group in equal.values()
@@ -184,13 +198,21 @@ def readings(asked: Asked) -> list[Array]:
     def read(part: list[list[int]]) -> None:
         angle, rate = motions.integrated([places[0] for places in part])
         members = [(number, place) for number, places in enumerate(part) for place in places]
-        values = _read(asked, motions, members, angle, rate)
+        values = read_together(asked, motions, members, angle, rate)
         for (_, place), one in zip(members, values, strict=True):
             found[place] = one
 
-    threads = asked.data.settings.work.threads if len(parts) > 1 else 1
-    list(_pool(threads).map(read, parts) if threads > 1 else map(read, parts))
+    side_by_side(read, parts, asked.data.settings.work.threads)
     return found
+
+
+def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], threads: int) -> None:
+    """Do some work on parts, in several threads where there are several parts.
+
+    Args:
+        threads: at most.
+    """
+    list(_pool(threads).map(work, parts) if threads > 1 and len(parts) > 1 else map(work, parts))
 
 
 @lru_cache(maxsize=4)
@@ -198,7 +220,7 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads)
 
 
-def _read(
+def read_together(
     asked: Asked, motions: Motions, members: list[tuple[int, int]], angle: Array, rate: Array
 ) -> list[Array]:
     """Block means of the reading of runs whose motions were integrated together.
@@ -233,13 +255,19 @@ def _read(
     return found
 
 
+def end_weights(runs: Sequence[RunData], blocks: int) -> Array:
+    """Weights of a block's first and last angle, and first and last rate per interval, in its mean.
+
+    Shape (runs, 4, 1), or (runs, 4, blocks) where samples are not evenly spaced.
+    """
+    if all(run.samples is None for run in runs):
+        return np.stack([run.weights for run in runs])[:, :, None]
+    return np.stack([np.broadcast_to(run.weights.reshape(4, -1), (4, blocks)) for run in runs])
+
+
 def _means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
     """Block means of the angle, or its derivative that is read, from the blocks' ends, shape (runs, blocks)."""
-    blocks = angle.shape[1] - 1
-    if all(run.samples is None for run in runs):
-        weights = np.stack([run.weights for run in runs])[:, :, None]
-    else:
-        weights = np.stack([np.broadcast_to(run.weights.reshape(4, -1), (4, blocks)) for run in runs])
+    weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound
         found: Array = (

@@ -1,4 +1,4 @@
-"""Sensitivities of the scaled prediction, by finite differences."""
+"""Sensitivities of the scaled prediction: exact in the motion, by finite differences where it has no derivative."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.slopes import changes
 from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 def sensitivities(
     problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
 ) -> list[tuple[Array, Array]]:
-    """Derivatives of the scaled prediction by finite differences.
+    """Derivatives of the scaled prediction.
 
     Args:
         base: a fit of the same runs; its derivatives are reused for the parameters it has.
@@ -28,32 +29,77 @@ def sensitivities(
     """
     known = 0 if base is None else len(base.problem.names)
     known_own = 0 if base is None else base.point.release.shape[1]
-    steps = problem.parameters.steps(point.common)
-    points = []
+    points, steps = moves(problem, point, known, known_own)
+    found = motion_changes(problem, point, points)
+    lost = np.flatnonzero([any(np.isnan(change[i, 0]) for change in found) for i in range(len(points))])
+    if lost.size:
+        moved = [points[i] for i in lost]
+        if prediction is None:
+            prediction, *predictions = problem.predict([point, *moved])
+        else:
+            predictions = problem.predict(moved)
+        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+            for place, values in zip(lost, predictions, strict=True):
+                for change, here, there in zip(found, prediction, values, strict=True):
+                    change[place] = there - here
+    common = len(problem.names) - known
+    result = []
+    for r, run in enumerate(problem.data.runs):
+        with np.errstate(invalid="ignore"):  # as above
+            scaled = run.scaled((found[r] / steps[:, r, None]).T)
+        by_common, by_own = scaled[:, :common], scaled[:, common:]
+        if base is not None:
+            known_common, known_ends = base.jacobian[r]
+            by_common, by_own = (
+                np.column_stack([known_common, by_common]),
+                np.column_stack([known_ends, by_own]),
+            )
+        result.append((by_common, by_own))
+    return result
+
+
+def moves(problem: Problem, point: Point, known: int = 0, known_own: int = 0) -> tuple[list[Point], Array]:
+    """Points a small step away, one for each parameter: the common ones first, then every run's own.
+
+    Args:
+        known: the first so many common parameters are left out.
+        known_own: of every run's own, likewise.
+
+    Returns:
+        The points, and their steps by run, in the parameters' units, shape (points, runs).
+    """
+    count = len(point.release)
+    steps, points = problem.parameters.steps(point.common), []
     for i in range(known, steps.size):
         moved = point.common.copy()
         moved[i] += steps[i]
         points.append(Point(moved, point.release))
     amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
-    own = point.release.shape[1]
-    release_steps = problem.parameters.own_steps(amplitude)
-    for j in range(known_own, own):
+    own_steps = problem.parameters.own_steps(amplitude)
+    for j in range(known_own, point.release.shape[1]):
         release = point.release.copy()
-        release[:, j] += release_steps[j]
+        release[:, j] += own_steps[j]
         points.append(Point(point.common, release))
-    if prediction is None:
-        prediction, *predictions = problem.predict([point, *points])
-    else:
-        predictions = problem.predict(points)
-    result = []
-    for r, run in enumerate(problem.data.runs):
-        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
-            changes = [run.scaled(moved[r] - prediction[r]) for moved in predictions]
-        common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
-        ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
-        if base is None:
-            result.append((np.stack(common, axis=1), np.stack(ends, axis=1)))
-        else:
-            known_common, known_ends = base.jacobian[r]
-            result.append((np.column_stack([known_common, *common]), np.column_stack([known_ends, *ends])))
-    return result
+    sizes = [np.full(count, step) for step in steps[known:]] + own_steps[known_own:]
+    return points, np.array(sizes).reshape(len(points), count)
+
+
+def motion_changes(problem: Problem, point: Point, points: list[Point]) -> list[Array]:
+    """Changes of the predicted block means from a point to others near it, to first order.
+
+    Returns:
+        By run, in the unit of the reading, shape (points, n); NaN throughout where the motion has no derivative.
+    """
+    runs = problem.data.runs
+    if not points:
+        return [np.zeros((0, run.reading.size)) for run in runs]
+    asked = problem.asked(
+        [point, *points], [(i, r) for i in range(len(points) + 1) for r in range(len(runs))]
+    )
+    found = changes(asked, len(runs))
+    return [
+        change
+        if change.shape[1] == run.reading.size
+        else change.reshape(len(points), run.reading.size, -1).mean(axis=2)
+        for change, run in zip(found, runs, strict=True)
+    ]

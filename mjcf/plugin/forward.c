@@ -175,34 +175,57 @@ static double reversal(const Step* s, double h, double end_rate) {
   return high;
 }
 
+// As `move`, with a note of the stretch.
+static void slide(Step* s, double h, const Motion* to) {
+  if (s->passage) {
+    const Stretch stretch = {s->start, h, s->from.angle, s->from.rate, s->lagged, s->slip, 1};
+    s->passage->stretch[s->passage->count++] = stretch;
+  }
+  move(s, h, to);
+}
+
+// Notes of a reversal how much of a small change of the rate is left after it. The change moves the reversal in time,
+// and the acceleration is another before it than after it.
+static void note_reversal(Step* s, double before) {
+  Stretch* ended = &s->passage->stretch[s->passage->count - 1];
+  ended->kept = s->slip == 0 ? 0 : derivative(s, 0, &s->from).rate / before;
+}
+
 void vwt_step_with_friction(Step* s, double h) {
-  double left = h;
+  double left = h, before = 0;  // the acceleration before a reversal, where it is noted
+  if (s->passage) {
+    s->passage->count = 0;
+  }
   for (int i = 0; i < 8 && left > 0; i++) {
     if (s->from.rate == 0) {
       s->slip = slip_from_rest(s);
+      if (s->passage && i > 0) {
+        note_reversal(s, before);
+      }
     }
     const Motion y = runge_kutta(s, left);
     if (s->slip == 0 || y.rate * s->slip > 0) {
-      move(s, left, &y);
+      slide(s, left, &y);
       return;
     }
     if (s->from.rate * s->slip <= 0) {  // a slip that has just started from rest stops at once: stick
       s->slip = 0;
       const Motion held = runge_kutta(s, left);
-      move(s, left, &held);
+      slide(s, left, &held);
       return;
     }
     const double part = reversal(s, left, y.rate);
     Motion at = runge_kutta(s, part);
     at.rate = 0;
-    move(s, part, &at);
+    before = s->passage ? derivative(s, part, &at).rate : 0;
+    slide(s, part, &at);
     left -= part;
   }
   if (left > 0) {  // chattering: friction sticks for the rest of the step
     s->slip = 0;
     s->from.rate = 0;
     const Motion held = runge_kutta(s, left);
-    move(s, left, &held);
+    slide(s, left, &held);
   }
 }
 

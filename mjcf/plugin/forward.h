@@ -60,6 +60,61 @@ typedef struct {
 VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
                         double* const* rate);
 
+// The terms of a plain run's acceleration, each a factor times a function of the motion, the parameters that such a
+// function has, and the run's start. A term's factor is per unit inertia. The derivatives of a motion are by these;
+// those by anything else follow from the derivatives of these by it (`vwt_terms`).
+#define VWT_TERMS(X)                                                                   \
+  X(angle)                 /* 1/s2, of -angle: springs, and the air without lag */    \
+  X(rate)                  /* 1/s, of -rate */                                         \
+  X(seen)                  /* 1/s2, of the angle that air with a lag sees */           \
+  X(steepening)            /* of that angle's power */                                 \
+  X(thickening)            /* of the rate times the angle's power */                   \
+  X(rate_power)                                                                       \
+  X(cube)                                                                             \
+  X(square)                                                                           \
+  X(play)                  /* 1/s2, of the part of the angle within the free play */   \
+  X(constant)              /* 1/s2 */                                                  \
+  X(gravity_sine)                                                                     \
+  X(gravity_cosine)                                                                   \
+  X(friction)                                                                         \
+  X(shedding_sine)                                                                    \
+  X(shedding_cosine)                                                                  \
+  X(steepening_exponent)                                                              \
+  X(thickening_exponent)                                                              \
+  X(rate_exponent)                                                                    \
+  X(cube_exponent)                                                                    \
+  X(square_exponent)                                                                  \
+  X(gap)                   /* rad, of the free play */                                 \
+  X(friction_exponent)                                                                \
+  X(friction_saturation)   /* rad/s, that acts */                                      \
+  X(friction_peak_rate)    /* rad/s, that acts */                                      \
+  X(friction_peak)                                                                    \
+  X(lag)                   /* s */                                                     \
+  X(turn)                  /* rad/s, of the shedding */                                \
+  X(pace)                  /* ln of the step in s; by it the motion of the law itself */ \
+  X(start_angle)           /* rad */                                                   \
+  X(start_rate)            /* rad/s */                                                 \
+  X(start_lagged)          /* rad */
+
+enum {
+#define X(name) VWT_TERM_##name,
+  VWT_TERMS(X)
+#undef X
+  VWT_TERM_COUNT
+};
+
+// Values of all terms of `count` plain runs, shape (count, VWT_TERM_COUNT).
+VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values);
+
+// As `vwt_forward`, for plain runs: also the derivatives of angle and rate by the terms in `columns`, `width` of them,
+// shape (width, samples) by run. With weights of the ends of an interval between samples, by run, shape (4, weighed)
+// for its first and last angle and its first and last rate, the derivatives are those of the weighted sums instead,
+// shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all intervals. A derivative that does
+// not exist is NaN throughout. Returns -1 where a run is not plain, or its friction is a root of the rate.
+VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
+                       const double* const* weights, int weighed, double* const* angle, double* const* rate,
+                       double* const* angle_slopes, double* const* rate_slopes);
+
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
 
@@ -78,6 +133,8 @@ VWT_API int vwt_state_count(void);
 VWT_API const char* vwt_state_name(int index);
 VWT_API int vwt_operation_count(void);
 VWT_API const char* vwt_operation_name(int index);
+VWT_API int vwt_term_count(void);
+VWT_API const char* vwt_term_name(int index);
 VWT_API int vwt_run_size(void);  // bytes
 VWT_API int vwt_run_count(void);
 VWT_API const char* vwt_run_name(int index);

@@ -26,14 +26,11 @@ static double power(double x, double textbook, double exponent, double reference
   return pow(reference, textbook) * pow(x / reference, exponent);
 }
 
-static const double kAngleReference = 0.2;  // rad
-static const double kRateReference = 2.0;   // rad/s
-
 double vwt_power_of_angle(double x, double textbook, double exponent) {
-  return power(x, textbook, exponent, kAngleReference);
+  return power(x, textbook, exponent, VWT_ANGLE_REFERENCE);
 }
 
-double vwt_power_of_rate(double x, double exponent) { return power(x, 2, exponent, kRateReference); }
+double vwt_power_of_rate(double x, double exponent) { return power(x, 2, exponent, VWT_RATE_REFERENCE); }
 
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   const double speed = s->wind_speed;
@@ -94,7 +91,7 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflec
 double vwt_friction_level(const vwt_parameters* p, double least, double along) {
   double level = p->friction_moment;
   if (p->friction_exponent != 0) {
-    level *= pow(fabs(along) / kRateReference, p->friction_exponent);
+    level *= pow(fabs(along) / VWT_RATE_REFERENCE, p->friction_exponent);
   }
   if (p->friction_saturation != 0) {
     level *= tanh(along / fmax(p->friction_saturation, least));
@@ -104,6 +101,33 @@ double vwt_friction_level(const vwt_parameters* p, double least, double along) {
     level *= 1 + p->friction_peak * exp(-share * share);
   }
   return level;
+}
+
+void vwt_friction_slopes(const vwt_parameters* p, double least, double along, double slopes[5]) {
+  const double size = fabs(along), n = p->friction_exponent;
+  const double power = n != 0 ? pow(size / VWT_RATE_REFERENCE, n) : 1;
+  double turn = 1, steepness = 0, by_saturation = 0;  // the factor tanh, and its derivatives
+  if (p->friction_saturation != 0) {
+    const double range = fmax(p->friction_saturation, least);
+    turn = tanh(along / range);
+    steepness = (1 - turn * turn) / range;
+    by_saturation = -steepness * along / range;
+  }
+  double peak = 1, shape = 0, falling = 0, by_peak_rate = 0;  // the factor of the peak, and its derivatives
+  if (p->friction_peak_rate != 0) {
+    const double range = fmax(p->friction_peak_rate, least), share = along / range;
+    shape = exp(-share * share);
+    peak = 1 + p->friction_peak * shape;
+    falling = -2 * p->friction_peak * shape * share / range;
+    by_peak_rate = -falling * share;
+  }
+  const double level = p->friction_moment;
+  const double by_power = n != 0 && size > 0 ? n * power / along : 0;
+  slopes[0] = level * (by_power * turn * peak + power * (steepness * peak + turn * falling));
+  slopes[1] = size > 0 ? level * power * turn * peak * log(size / VWT_RATE_REFERENCE) : 0;
+  slopes[2] = level * power * by_saturation * peak;
+  slopes[3] = level * power * turn * by_peak_rate;
+  slopes[4] = level * power * turn * shape;
 }
 
 double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
@@ -181,6 +205,26 @@ void vwt_lag_weights(double z, double w[4]) {
   w[3] = sum;
   for (int n = 3; n > 0; n--) {
     w[n - 1] = z * (1 - w[n]) / n;
+  }
+}
+
+// dw[n]/dz, from the same series and recursions.
+void vwt_lag_weight_slopes(double z, const double w[4], double slopes[4]) {
+  if (z > 1) {
+    slopes[0] = exp(-z);
+    for (int n = 1; n < 4; n++) {
+      slopes[n] = n * (w[n - 1] / z - slopes[n - 1]) / z;
+    }
+    return;
+  }
+  double term = 0.25, sum = term;
+  for (int k = 2; k < 18; k++) {
+    term *= -z / (3 + k);
+    sum += k * term;
+  }
+  slopes[3] = sum;
+  for (int n = 3; n > 0; n--) {
+    slopes[n - 1] = (1 - w[n] - z * slopes[n]) / n;
   }
 }
 

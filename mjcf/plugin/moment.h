@@ -87,6 +87,8 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 
 // x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at 0.2 rad; x^2, or another power that
 // equals it at 2 rad/s. An exponent of 0 selects the textbook power.
+#define VWT_ANGLE_REFERENCE 0.2  // rad
+#define VWT_RATE_REFERENCE 2.0   // rad/s
 double vwt_power_of_angle(double x, double textbook, double exponent);
 double vwt_power_of_rate(double x, double exponent);
 
@@ -102,6 +104,9 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflec
 // b and the peak_rate vs; a factor whose parameter is zero is one. v0 and vs are at least `least`, from
 // `vwt_friction_least_rate`, so that friction does not change by more than the integration with steps of `duration` s follows.
 double vwt_friction_level(const vwt_parameters* p, double least, double along);
+// Its derivatives by `along`, by its exponent, and by the saturation and the peak rate that act, which are those above
+// `least`, and by the peak, in this order.
+void vwt_friction_slopes(const vwt_parameters* p, double least, double along, double slopes[5]);
 double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration);
 
 // Coulomb friction in a step of `duration` s, N m. It opposes the rate. Where the rate would pass zero within the step, it
@@ -128,6 +133,7 @@ double vwt_lag_advance(double lag_time, double lagged, double duration, double a
 
 // The same in two parts, for steps of equal length: weights from duration/|lag_time| > 0, and the state with them.
 void vwt_lag_weights(double z, double w[4]);
+void vwt_lag_weight_slopes(double z, const double w[4], double slopes[4]);  // by z
 double vwt_lag_weighted(const double w[4], double lagged, double duration, double angle0, double rate0,
                         double angle1, double rate1);
 

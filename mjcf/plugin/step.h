@@ -15,6 +15,21 @@ typedef struct {
   int last;
 } LagWeights;
 
+// A stretch of a step with Coulomb friction in which the slip keeps its sign, from its start on.
+typedef struct {
+  double start, duration, angle, rate, lagged;
+  int slip;
+  double kept;  // of a small change of the rate, after the reversal that ends the stretch; 1 where none does
+} Stretch;
+
+enum { VWT_MOST_STRETCHES = 10 };
+
+// How a step with Coulomb friction went.
+typedef struct {
+  int count;
+  Stretch stretch[VWT_MOST_STRETCHES];
+} Passage;
+
 // The quantities that are constant during a step: the law, the run, and the step's start for lag and friction.
 typedef struct {
   const vwt_parameters* p;
@@ -29,6 +44,7 @@ typedef struct {
   LagWeights* weights;
   int sample;          // of the drive, at the step's start; -1 before the first
   double moment, moment_slope, moment_from;  // of the drive, N m and N m/s, linear in time from there on
+  Passage* passage;    // where the stretches of a step with friction are noted; NULL: nowhere
 } Step;
 
 // The run at its start.

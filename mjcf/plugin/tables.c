@@ -21,6 +21,13 @@ const char* vwt_state_name(int index) { return state_names[index]; }
 int vwt_operation_count(void) { return VWT_OPERATION_COUNT; }
 const char* vwt_operation_name(int index) { return vwt_operation_names[index]; }
 
+#define X(name) #name,
+static const char* const term_names[] = {VWT_TERMS(X)};
+#undef X
+
+int vwt_term_count(void) { return VWT_TERM_COUNT; }
+const char* vwt_term_name(int index) { return term_names[index]; }
+
 typedef struct {
   const char* name;
   int offset, is_pointer;

@@ -1,0 +1,303 @@
+// The terms of a plain run's acceleration, and its derivatives by them and by the motion at a stage of a step.
+
+#ifndef VWT_STAGES_H_
+#define VWT_STAGES_H_
+
+#include <math.h>
+
+#include "lanes.h"
+
+// Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law.
+typedef struct {
+  const Coefficients* c;
+  int features;
+  Lane inverse;
+  Lane steepening, thickening, rate, cube, square;
+  Lane seen, steep, thick;
+} Law;
+
+// The derivatives of the lag's state at a step's end or middle, by the state, angle and rate at its start, by angle and
+// rate there, and of its weights by the lag.
+typedef struct {
+  Lane lagged, angle0, rate0, angle1, rate1, weights[4];
+  double w[VWT_LANES][4];
+} LagSlopes;
+
+// A stage of a step, and the derivatives of the acceleration there.
+typedef struct {
+  Lane angle, rate, time, seen;
+  Powers powers;
+  Lane by_angle, by_rate, by_lagged, by_lag;
+  Lane level;              // of the friction per unit of its moment
+  Lane by_friction[4];     // of the acceleration by exponent, saturation, peak rate and peak
+} Stage;
+
+// A small change of the motion by column, per unit of the column's term.
+typedef struct {
+  Lane angle[VWT_TERM_COUNT], rate[VWT_TERM_COUNT], lagged[VWT_TERM_COUNT];
+} Change;
+
+static double acting(double exponent, double textbook) { return exponent != 0 ? exponent : textbook; }
+
+static Law law_of(const Coefficients* c) {
+  Law law = {.c = c, .features = c->features, .inverse = 1 / c->inertia};
+  for (int k = 0; k < VWT_LANES; k++) {
+    const vwt_parameters* p = c->p[k];
+    const double body = c->body[k];
+    law.steepening[k] = acting(p->moment_cubic_exponent, 2);
+    law.thickening[k] = acting(p->damping_quadratic_exponent, 2);
+    law.rate[k] = acting(p->quadratic_damping_exponent, 2);
+    law.cube[k] = acting(p->stiffness_cubic_exponent, 3);
+    law.square[k] = acting(p->stiffness_quadratic_exponent, 2);
+    law.seen[k] = 1 / body;
+    law.steep[k] = body != 1 ? pow(body, -1 - law.steepening[k]) : 1;
+    law.thick[k] = body != 1 ? pow(body, -law.thickening[k]) : 1;
+    if (law.steepening[k] != 2 || law.thickening[k] != 2 || law.rate[k] != 2 || law.cube[k] != 3 ||
+        law.square[k] != 2) {
+      law.features |= POWERS;  // also where the coefficient is zero, by which there is a derivative
+    }
+  }
+  return law;
+}
+
+INLINE LagSlopes lag_slopes(const Coefficients* c, Lane duration) {
+  LagSlopes out = {0};
+  for (int k = 0; k < VWT_LANES; k++) {
+    if (c->lag[k] == 0) {
+      continue;
+    }
+    const double time = fabs(c->lag[k]), h = duration[k], z = h / time;
+    double* w = out.w[k];
+    double slopes[4];
+    vwt_lag_weights(z, w);
+    vwt_lag_weight_slopes(z, w, slopes);
+    out.lagged[k] = 1 - w[0];
+    out.angle0[k] = c->body[k] * (w[0] - 3 * w[2] + 2 * w[3]);
+    out.rate0[k] = c->body[k] * h * (w[1] - 2 * w[2] + w[3]);
+    out.angle1[k] = c->body[k] * (3 * w[2] - 2 * w[3]);
+    out.rate1[k] = c->body[k] * h * (w[3] - w[2]);
+    for (int n = 0; n < 4; n++) {
+      out.weights[n][k] = -slopes[n] * z / c->lag[k];  // dz/dlag, whose sign is that of a lead too
+    }
+  }
+  return out;
+}
+
+// The derivative of the lag's state by the lag, over a path from the step's start.
+INLINE Lane by_lag(const Coefficients* c, const State* s, const LagSlopes* l, Lane h, Lane angle, Lane rate) {
+  const Lane change = c->body * (angle - s->angle), rate0 = c->body * s->rate, rate1 = c->body * rate;
+  return l->weights[0] * (c->body * s->angle - s->lagged) + l->weights[1] * h * rate0 +
+         l->weights[2] * (3 * change - h * (2 * rate0 + rate1)) +
+         l->weights[3] * (h * (rate0 + rate1) - 2 * change);
+}
+
+// Derivative of a power of x >= 0 by x.
+INLINE Lane steepness(Lane power, Lane x, Lane exponent) {
+  return choose(x > 0, exponent * power / x, (Lane){0});
+}
+
+// The derivative of the friction's level by the rate in its own direction, and what belongs to its form.
+INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
+  const Coefficients* c = law->c;
+  Lane by_rate = {0};
+  if (!(law->features & RATE)) {
+    at->level = (Lane){0} + 1;
+    return by_rate;
+  }
+  for (int k = 0; k < VWT_LANES; k++) {
+    const double along = slip[k] * at->rate[k], moment = c->friction[k];
+    double slopes[5] = {0};
+    if (moment > 0 && slip[k] != 0) {
+      vwt_friction_slopes(c->p[k], c->least_rate[k], along, slopes);
+    }
+    at->level[k] = moment > 0 ? vwt_friction_level(c->p[k], c->least_rate[k], along) / moment : 1;
+    by_rate[k] = slopes[0];
+    for (int n = 0; n < 4; n++) {
+      at->by_friction[n][k] = -slip[k] * slopes[n + 1] * law->inverse[k];
+    }
+  }
+  return by_rate;
+}
+
+// The acceleration at a stage, and its derivatives by the motion there.
+INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged,
+                     Stage* at) {
+  const Coefficients* c = law->c;
+  const Lane none = {0}, body = c->body * angle, size = size_of(body);
+  at->angle = angle;
+  at->rate = rate;
+  at->time = time;
+  at->seen = seen_at(c, features, body, lagged);
+  set_powers(c, size, size_of(angle), size_of(rate), features & POWERS, &at->powers);
+  const Powers* p = &at->powers;
+  Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
+       square = 2 * size_of(angle);
+  if (features & POWERS) {
+    steepening = steepness(p->steepening, size, law->steepening);
+    thickening = steepness(p->thickening, size, law->thickening);
+    turning_rate = steepness(p->rate, size_of(rate), law->rate);
+    cube = steepness(p->cube, size_of(angle), law->cube);
+    square = steepness(p->square, size_of(angle), law->square);
+  }
+  const Lane leads = choose(c->lag < 0, 2 * c->body, c->body);
+  const Lane seen_by_angle = features & LAG ? choose(c->lag > 0, none, leads) : c->body;
+  const Lane steep = c->air_stiffness * (1 + c->moment_cubic * p->steepening);
+  Lane by_angle = c->body * (steep * seen_by_angle +
+                             c->air_stiffness * at->seen * c->moment_cubic * with_sign(steepening, body) * c->body +
+                             c->air_damping * c->damping_quadratic * with_sign(thickening, body) * c->body *
+                                 (c->body * rate));
+  by_angle -= c->cubic * cube + c->quadratic * with_sign(square, angle) + c->rod;
+  by_angle -= choose(size_of(angle) < c->free_play, none, c->spring);
+  if (features & GRAVITY) {
+    for (int k = 0; k < VWT_LANES; k++) {
+      by_angle[k] -= c->gravity[k] != 0 ? c->gravity[k] * cos(angle[k] - c->gravity_angle[k]) : 0;
+    }
+  }
+  Lane by_rate = c->body * c->air_damping * (1 + c->damping_quadratic * p->thickening) * c->body;
+  by_rate -= c->quadratic_damping * turning_rate + c->loss + c->damping + slip * slip * rub(law, slip, at);
+  at->by_angle = by_angle * law->inverse;
+  at->by_rate = by_rate * law->inverse;
+  if (features & LAG) {
+    const Lane side = choose(c->lag > 0, none + 1, choose(c->lag < 0, none - 1, none));
+    at->by_lagged = side * c->body * steep * law->inverse;
+  }
+  const Lane shed = features & SHEDDING ? shed_at(c, time) : none;
+  return acceleration(c, p, slip, features, angle, rate, shed, lagged);
+}
+
+INLINE Lane logarithm(Lane x, double reference) {
+  Lane out = {0};
+  for (int k = 0; k < VWT_LANES; k++) {
+    out[k] = x[k] > 0 ? log(x[k] / reference) : 0;
+  }
+  return out;
+}
+
+INLINE Lane sine(const Stage* at, Lane turn, Lane phase, double shift) {
+  Lane out;
+  for (int k = 0; k < VWT_LANES; k++) {
+    out[k] = sin(turn[k] * at->time[k] + phase[k] + shift);
+  }
+  return out;
+}
+
+// The derivative of the acceleration at a stage by a term.
+INLINE Lane by_term(const Law* law, int term, Lane slip, const Stage* at) {
+  const Coefficients* c = law->c;
+  const Lane none = {0}, angle = at->angle, rate = at->rate;
+  const Powers* p = &at->powers;
+  const double quarter = 1.5707963267948966192313216916398;
+  switch (term) {
+    case VWT_TERM_angle:
+      return -angle;
+    case VWT_TERM_rate:
+      return -rate;
+    case VWT_TERM_seen:
+      return at->seen * law->seen;
+    case VWT_TERM_steepening:
+      return at->seen * p->steepening * law->steep;
+    case VWT_TERM_thickening:
+      return rate * p->thickening * law->thick;
+    case VWT_TERM_rate_power:
+      return -with_sign(p->rate, rate);
+    case VWT_TERM_cube:
+      return -with_sign(p->cube, angle);
+    case VWT_TERM_square:
+      return -p->square;
+    case VWT_TERM_play:
+      return taken_up(c, angle);
+    case VWT_TERM_constant:
+      return none + 1;
+    case VWT_TERM_gravity_sine: {
+      Lane out;
+      for (int k = 0; k < VWT_LANES; k++) {
+        out[k] = -sin(angle[k]);
+      }
+      return out;
+    }
+    case VWT_TERM_gravity_cosine: {
+      Lane out;
+      for (int k = 0; k < VWT_LANES; k++) {
+        out[k] = cos(angle[k]);
+      }
+      return out;
+    }
+    case VWT_TERM_friction:
+      return -slip * at->level;
+    case VWT_TERM_shedding_sine:
+      return sine(at, c->shedding_turn, none, 0);
+    case VWT_TERM_shedding_cosine:
+      return sine(at, c->shedding_turn, none, quarter);
+    case VWT_TERM_steepening_exponent:
+      return law->inverse * c->body * c->air_stiffness * c->moment_cubic * at->seen * p->steepening *
+             logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+    case VWT_TERM_thickening_exponent:
+      return law->inverse * c->body * c->body * c->air_damping * c->damping_quadratic * rate * p->thickening *
+             logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+    case VWT_TERM_rate_exponent:
+      return -law->inverse * c->quadratic_damping * with_sign(p->rate, rate) *
+             logarithm(size_of(rate), VWT_RATE_REFERENCE);
+    case VWT_TERM_cube_exponent:
+      return -law->inverse * c->cubic * with_sign(p->cube, angle) * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+    case VWT_TERM_square_exponent:
+      return -law->inverse * c->quadratic * p->square * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+    case VWT_TERM_gap:
+      return choose(size_of(angle) > c->free_play, with_sign(law->inverse * c->spring, angle), none);
+    case VWT_TERM_friction_exponent:
+      return law->features & RATE ? at->by_friction[0]
+                                  : -slip * law->inverse * c->friction * logarithm(size_of(rate), VWT_RATE_REFERENCE);
+    case VWT_TERM_friction_saturation:
+      return law->features & RATE ? at->by_friction[1] : none;
+    case VWT_TERM_friction_peak_rate:
+      return law->features & RATE ? at->by_friction[2] : none;
+    case VWT_TERM_friction_peak:
+      return law->features & RATE ? at->by_friction[3] : none;
+    case VWT_TERM_lag:
+      return at->by_lag;
+    case VWT_TERM_turn:
+      return law->inverse * c->body * c->shedding * at->time * sine(at, c->shedding_turn, c->shedding_phase, quarter);
+    default:  // of the start
+      return none;
+  }
+}
+
+// The values of the terms of one lane.
+static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
+  const Coefficients* c = law->c;
+  const vwt_parameters* p = c->p[k];
+  const double inverse = law->inverse[k], body = c->body[k], air = body * c->air_stiffness[k] * inverse;
+  const int lags = c->lag[k] != 0;
+  out[VWT_TERM_angle] = (c->spring[k] + c->rod[k]) * inverse - (lags ? 0 : air * body);
+  out[VWT_TERM_rate] = (c->damping[k] + c->loss[k] - body * body * c->air_damping[k]) * inverse;
+  out[VWT_TERM_seen] = lags ? air * body : 0;
+  out[VWT_TERM_steepening] = air * c->moment_cubic[k] / law->steep[k];
+  out[VWT_TERM_thickening] = body * body * c->air_damping[k] * c->damping_quadratic[k] * inverse / law->thick[k];
+  out[VWT_TERM_rate_power] = c->quadratic_damping[k] * inverse;
+  out[VWT_TERM_cube] = c->cubic[k] * inverse;
+  out[VWT_TERM_square] = c->quadratic[k] * inverse;
+  out[VWT_TERM_play] = c->free_play[k] > 0 ? c->spring[k] * inverse : 0;
+  out[VWT_TERM_constant] = air * c->flow_angle[k];
+  out[VWT_TERM_gravity_sine] = c->gravity[k] * inverse * cos(c->gravity_angle[k]);
+  out[VWT_TERM_gravity_cosine] = c->gravity[k] * inverse * sin(c->gravity_angle[k]);
+  out[VWT_TERM_friction] = c->friction[k] * inverse;
+  out[VWT_TERM_shedding_sine] = body * c->shedding[k] * inverse * cos(c->shedding_phase[k]);
+  out[VWT_TERM_shedding_cosine] = body * c->shedding[k] * inverse * sin(c->shedding_phase[k]);
+  out[VWT_TERM_steepening_exponent] = law->steepening[k];
+  out[VWT_TERM_thickening_exponent] = law->thickening[k];
+  out[VWT_TERM_rate_exponent] = law->rate[k];
+  out[VWT_TERM_cube_exponent] = law->cube[k];
+  out[VWT_TERM_square_exponent] = law->square[k];
+  out[VWT_TERM_gap] = c->free_play[k];
+  out[VWT_TERM_friction_exponent] = p->friction_exponent;
+  out[VWT_TERM_friction_saturation] = p->friction_saturation != 0 ? fmax(p->friction_saturation, c->least_rate[k]) : 0;
+  out[VWT_TERM_friction_peak_rate] = p->friction_peak_rate != 0 ? fmax(p->friction_peak_rate, c->least_rate[k]) : 0;
+  out[VWT_TERM_friction_peak] = p->friction_peak;
+  out[VWT_TERM_lag] = c->lag[k];
+  out[VWT_TERM_turn] = c->shedding_turn[k];
+  out[VWT_TERM_pace] = log(run->step);
+  out[VWT_TERM_start_angle] = run->angle;
+  out[VWT_TERM_start_rate] = run->rate;
+  out[VWT_TERM_start_lagged] = lags ? run->lagged / body : 0;
+}
+
+#endif  // VWT_STAGES_H_

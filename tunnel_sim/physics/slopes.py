@@ -1,0 +1,96 @@
+"""Derivatives of motions from the compiled integrator, by the terms of the law (``mjcf/plugin/forward.h``)."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.physics.moment_law import forward_library
+from tunnel_sim.vocabulary.record import Array
+
+
+@functools.cache
+def term_places() -> Mapping[str, int]:
+    """The place of every term by its name."""
+    library = forward_library()
+    return {library.vwt_term_name(i).decode(): i for i in range(library.vwt_term_count())}
+
+
+def terms(law: Array, runs: NDArray[np.void]) -> Array:
+    """Values of the terms of plain runs, in units of kg, m, s and rad, shape (n, terms).
+
+    Args:
+        law: the moment law's parameters, shape (n, number of parameters), in the law's order.
+        runs: shape (n,), of `run_dtype`; the arrays that its pointers name must stay alive.
+    """
+    law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
+    values = np.zeros((len(runs), len(term_places())))
+    forward_library().vwt_terms(len(runs), law.ctypes.data, runs.ctypes.data, values.ctypes.data)
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Motions and their derivatives by some terms of their law.
+
+    Args:
+        angle: of the rod's upper end, rad, shape (n, samples).
+        rate: of it, rad/s, shape (n, samples).
+        by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where there is
+            none; or of the weighted sums, shape (n, columns, samples − 1).
+        by_rate: derivatives of the rate, of that shape; of weighted sums none.
+        status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
+    """
+
+    angle: Array
+    rate: Array
+    by_angle: Array
+    by_rate: Array | None
+    status: int
+
+
+def slopes(
+    law: Array,
+    runs: NDArray[np.void],
+    samples: int,
+    columns: Sequence[int],
+    weights: Array | None = None,
+) -> Slopes:
+    """Integrate plain runs of equal length, and their derivatives by some terms.
+
+    Args:
+        law: as in `terms`, shape (n, number of parameters).
+        runs: as in `terms`, shape (n,).
+        samples: samples per run, the first at time 0.
+        columns: places of the terms.
+        weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
+            between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
+    """
+    law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
+    runs["samples"] = samples
+    chosen = np.ascontiguousarray(columns, dtype=np.intc)
+    angle, rate = np.empty((len(runs), samples)), np.empty((len(runs), samples))
+    weights = None if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
+    by_angle = np.empty((len(runs), chosen.size, samples - (weights is not None)))
+    by_rate = None if weights is not None else np.empty_like(by_angle)
+    given = [_rows(array) for array in (weights, angle, rate, by_angle, by_rate)]
+    status = forward_library().vwt_slopes(
+        len(runs), law.ctypes.data, runs.ctypes.data, chosen.size, chosen.ctypes.data,
+        _address(given[0]), 1 if weights is None else weights.shape[2], *map(_address, given[1:]),
+    )  # fmt: skip
+    return Slopes(angle, rate, by_angle, by_rate, int(status))
+
+
+def _rows(array: Array | None) -> NDArray[np.uintp] | None:
+    """The addresses of an array's rows."""
+    if array is None:
+        return None
+    return (array.ctypes.data + np.arange(len(array)) * array.strides[0]).astype(np.uintp)
+
+
+def _address(array: NDArray[np.uintp] | None) -> int | None:
+    return None if array is None else array.ctypes.data
