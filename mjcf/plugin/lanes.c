@@ -1,13 +1,14 @@
 // Plain runs integrated side by side, which keeps a processor's arithmetic units busy: the steps of one run wait for
 // each other, those of several do not. Every operation is that of forward.c and moment.c in the same order, so that
-// a run has the same bits in any company, and as an only run with its wind given as samples.
+// a run has the same bits in any company, and as an only run of forward.c.
 
 #include <math.h>
 
 #include "lanes.h"
 
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
-  return run->wind_count == 1 && run->forcing_count == 0 && run->moment_count == 0 && run->program_count == 0 &&
+  const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
+  return steady && run->forcing_count == 0 && run->moment_count == 0 && run->program_count == 0 &&
          run->twist_stiffness == 0 && run->twist == 0 && run->twist_rate == 0 && !(p->presliding > 0);
 }
 
@@ -20,18 +21,21 @@ INLINE void runge_kutta(const Coefficients* c, const State* s, int features, Lan
   const Lane h = c->whole_step, half = c->half_step, none = {0};
   const int sheds = features & SHEDDING, lags = features & LAG;
   Lane shed = sheds ? shed_at(c, s->start) : none;
-  const Lane a1 = acceleration_at(c, s->slip, features, s->angle, s->rate, shed, s->lagged);
+  Air air = air_at(c, features, s->start);
+  const Lane a1 = acceleration_at(c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
   const Lane y2 = s->angle + half * s->rate, r2 = s->rate + half * a1;
   shed = sheds ? shed_at(c, s->start + half) : none;
+  air = air_at(c, features, s->start + half);
   Lane lagged = lags ? lagged_at(c, s, c->half, half, y2, r2) : none;
-  const Lane a2 = acceleration_at(c, s->slip, features, y2, r2, shed, lagged);
+  const Lane a2 = acceleration_at(c, &air, s->slip, features, y2, r2, shed, lagged);
   const Lane y3 = s->angle + half * r2, r3 = s->rate + half * a2;
   lagged = lags ? lagged_at(c, s, c->half, half, y3, r3) : none;
-  const Lane a3 = acceleration_at(c, s->slip, features, y3, r3, shed, lagged);
+  const Lane a3 = acceleration_at(c, &air, s->slip, features, y3, r3, shed, lagged);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
   shed = sheds ? shed_at(c, s->start + h) : none;
+  air = air_at(c, features, s->start + h);
   lagged = lags ? lagged_at(c, s, c->whole, h, y4, r4) : none;
-  const Lane a4 = acceleration_at(c, s->slip, features, y4, r4, shed, lagged);
+  const Lane a4 = acceleration_at(c, &air, s->slip, features, y4, r4, shed, lagged);
   *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }

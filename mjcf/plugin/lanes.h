@@ -8,7 +8,8 @@
 
 #include "step.h"
 
-enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16 };  // RATE: friction that depends on the rate
+// RATE: friction that depends on the rate; WIND: of samples
+enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16, WIND = 32 };
 
 // Compiled for wide registers too, among which the loader chooses: no operation is fused, so the bits are the same.
 #if VWT_WIDE
@@ -22,12 +23,13 @@ enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16 };  // RATE: fr
 typedef double Lane __attribute__((vector_size(8 * VWT_LANES)));
 typedef long long Mask __attribute__((vector_size(8 * VWT_LANES)));
 
-// The coefficients of the law in a constant wind, by lane.
+// The coefficients of the law, by lane; those of the air in a constant wind.
 typedef struct {
   int features;  // of any lane
   int rubs;      // whether any lane has Coulomb friction
   int count;     // of the lanes that are runs; the others repeat the first one's start
   const vwt_parameters* p[VWT_LANES];
+  const vwt_run* run[VWT_LANES];
   Lane step, whole_step, half_step, body, inertia, spring, damping, rod, friction, least_rate;
   Lane air_stiffness, air_damping, moment_cubic, damping_quadratic, flow_angle;
   Lane quadratic_damping, loss, cubic, quadratic, free_play, gravity, gravity_angle;
@@ -64,10 +66,11 @@ static void set_lane(Coefficients* c, int k, const vwt_parameters* p, const vwt_
   const double flow = wind > 0 ? 0.5 * p->air_density * wind * p->frontal_area * p->reference_length : 0;
   const double scale = flow * wind;
   const int stride = run->stride > 1 && run->steps == 1 ? (int)run->stride : 1;
-  const int own = features_of(p, wind);
+  const int own = features_of(p, wind) | (run->wind_count > 1 ? WIND : 0);
   c->features |= own;
   c->rubs |= p->friction_moment > 0;
   c->p[k] = p;
+  c->run[k] = run;
   c->step[k] = run->step;
   c->whole_step[k] = stride * run->step;
   c->half_step[k] = c->whole_step[k] / 2;
@@ -138,6 +141,24 @@ INLINE void set_powers(const Coefficients* c, Lane body, Lane angle, Lane rate, 
   }
 }
 
+// The air's coefficients at a time.
+typedef struct {
+  Lane stiffness, damping;
+} Air;
+
+INLINE Air air_at(const Coefficients* c, int features, Lane time) {
+  Air out = {c->air_stiffness, c->air_damping};
+  for (int k = 0; features & WIND && k < VWT_LANES; k++) {
+    const vwt_run* run = c->run[k];
+    const vwt_parameters* p = c->p[k];
+    const double wind = fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time[k]));
+    const double flow = 0.5 * p->air_density * wind * p->frontal_area * p->reference_length;
+    out.stiffness[k] = flow * wind * p->cn_beta;
+    out.damping[k] = flow * p->reference_length * p->cn_r;
+  }
+  return out;
+}
+
 // What the air sees as the body's angle: the lag's state, its mirror image about the angle, or the angle itself.
 INLINE Lane seen_at(const Coefficients* c, int features, Lane body, Lane lagged) {
   return features & LAG ? choose(c->lag > 0, lagged, choose(c->lag < 0, 2 * body - lagged, body)) : body;
@@ -150,14 +171,14 @@ INLINE Lane taken_up(const Coefficients* c, Lane angle) {
 }
 
 // Angular acceleration at a motion; `shed` and `lagged` are read only with the features they belong to.
-INLINE Lane acceleration(const Coefficients* c, const Powers* powers, Lane slip, int features, Lane angle, Lane rate,
-                         Lane shed, Lane lagged) {
+INLINE Lane acceleration(const Coefficients* c, const Air* flow, const Powers* powers, Lane slip, int features,
+                         Lane angle, Lane rate, Lane shed, Lane lagged) {
   const Lane body = c->body * angle;
   const Lane seen = seen_at(c, features, body, lagged);
   const Lane steepening = 1 + c->moment_cubic * powers->steepening;
   const Lane thickening = 1 + c->damping_quadratic * powers->thickening;
-  Lane air = c->air_stiffness * (seen * steepening + c->flow_angle) +
-             c->air_damping * thickening * (c->body * rate);
+  Lane air = flow->stiffness * (seen * steepening + c->flow_angle) +
+             flow->damping * thickening * (c->body * rate);
   if (features & SHEDDING) {
     air += shed;
   }
@@ -182,11 +203,11 @@ INLINE Lane acceleration(const Coefficients* c, const Powers* powers, Lane slip,
   return (moment - slip * friction) / c->inertia;
 }
 
-INLINE Lane acceleration_at(const Coefficients* c, Lane slip, int features, Lane angle, Lane rate, Lane shed,
-                            Lane lagged) {
+INLINE Lane acceleration_at(const Coefficients* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate,
+                            Lane shed, Lane lagged) {
   Powers powers;
   set_powers(c, size_of(c->body * angle), size_of(angle), size_of(rate), features & POWERS, &powers);
-  return acceleration(c, &powers, slip, features, angle, rate, shed, lagged);
+  return acceleration(c, flow, &powers, slip, features, angle, rate, shed, lagged);
 }
 
 INLINE Lane shed_at(const Coefficients* c, Lane time) {

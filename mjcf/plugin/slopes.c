@@ -221,7 +221,8 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
   }
   if (asked->pace >= 0) {
     const Lane none = {0}, shed = features & SHEDDING ? shed_at(law->c, s->start) : none;
-    const Lane a = acceleration_at(law->c, s->slip, features, s->angle, s->rate, shed, s->lagged);
+    const Air air = {law->c->air_stiffness, law->c->air_damping};
+    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
     const Mask rests = (law->c->friction > 0) & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);
@@ -392,7 +393,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
                const double* const* weights, int weighed, double* const* angle, double* const* rate,
                double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
-    if (!vwt_is_plain(&parameters[i], &runs[i]) || !is_smooth(&parameters[i])) {
+    if (!vwt_is_plain(&parameters[i], &runs[i]) || runs[i].wind_count != 1 || !is_smooth(&parameters[i])) {
       return -1;
     }
   }

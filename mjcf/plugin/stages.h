@@ -162,7 +162,8 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     at->by_lagged = side * c->body * steep * law->inverse;
   }
   const Lane shed = features & SHEDDING ? shed_at(c, time) : none;
-  return acceleration(c, p, slip, features, angle, rate, shed, lagged);
+  const Air air = {c->air_stiffness, c->air_damping};
+  return acceleration(c, &air, p, slip, features, angle, rate, shed, lagged);
 }
 
 INLINE Lane logarithm(Lane x, double reference) {

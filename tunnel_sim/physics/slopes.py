@@ -43,7 +43,8 @@ class Slopes:
         by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where there is
             none; or of the weighted sums, shape (n, columns, samples − 1).
         by_rate: derivatives of the rate, of that shape; of weighted sums none.
-        status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
+        status: as of `integrate`, or −1 where a run is not plain, its wind is sampled, or its friction is a root of
+            the rate.
     """
 
     angle: Array
