@@ -112,9 +112,14 @@ class Motions:
         rows["rate"], rows["wind_count"] = physics["release_rate"], 1.0
         rows["wind"] = winds.ctypes.data + winds.itemsize * np.arange(count)
         kept: list[Sequence[Array]] = [()] * count
-        objects = zip(physics.series, physics.rod_twist, physics.program, physics.drive, strict=True)
-        for place, given in enumerate(objects):
-            if any(given):
+        objects = zip(physics.rod_twist, physics.program, physics.drive, strict=True)
+        for place, (series, given) in enumerate(zip(physics.series, objects, strict=True)):
+            if series.keys() == {"wind_speed"} and not any(given):
+                sampled = series["wind_speed"]
+                speeds = np.array(sampled.values)
+                kept[place], rows["wind"][place] = (speeds,), speeds.ctypes.data
+                rows["wind_count"][place], rows["wind_interval"][place] = speeds.size, sampled.interval
+            elif series or any(given):
                 row, kept[place] = forward_run(physics.row(place))
                 rows[place] = row[0]
         for place, (lead, stiffness, body, _) in slow.items():

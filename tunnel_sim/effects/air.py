@@ -263,6 +263,26 @@ class WindSpeedDrift(Effect):
         drifting = Series(tuple(speeds.tolist()), stated.duration / (part.size - 1))
         return dataclasses.replace(run, series={**run.series, "wind_speed": drifting})
 
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Replace the constant wind speeds by sampled drifts."""
+        del drawn
+        acts, duration = (stated.wind_speed > 0.0) & (cls.column(effects, "drift") != 0.0), stated["duration"]
+        shapes: dict[float, Array] = {}
+        for place in np.flatnonzero(acts).tolist():
+            effect = effects[place]
+            assert isinstance(effect, WindSpeedDrift)
+            settling = effect.settling
+            if settling not in shapes:
+                count = 2 if settling == 0.0 else _SAMPLES
+                shapes[settling] = ramp(np.linspace(0.0, 1.0, count), settling)
+            part = shapes[settling]
+            speeds = runs.wind_speed[place] * (1.0 + effect.drift * part)
+            drifting = Series(tuple(speeds.tolist()), float(duration[place]) / (part.size - 1))
+            runs.series[place] = {**runs.series[place], "wind_speed": drifting}
+
 
 _INTERVAL = 1e-3  # s between samples of the random moment
 
