@@ -23,8 +23,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.speed import TIMED
-from tunnel_reference.catalogue import forms
 from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
+from tunnel_reference.forms import FORMS
 from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.files.campaign_folder import write_campaign
@@ -34,7 +34,9 @@ FRICTION = 0.004  # N m
 #: The start of what a process of a tree does.
 HERE = "import json, os, sys, time; sys.path.insert(0, os.getcwd())\n"
 #: It prints the modules that a diagnosis of a folder without a gap has imported.
-MODULES = HERE + """
+MODULES = (
+    HERE
+    + """
 from diagnosis import diagnose
 from tunnel_sim.files.campaign_folder import read_campaign
 import tunnel_lab.cli, tunnel_lab.commands.diagnose
@@ -42,8 +44,11 @@ diagnose(read_campaign(sys.argv[1]))
 ours = ("diagnosis", "tunnel_sim", "tunnel_lab", "identification", "numpy", "scipy", "rich", "typer")
 print(json.dumps([name for name in list(sys.modules) if name.partition(".")[0] in ours]))
 """
+)
 #: It imports modules named in a list.
-IMPORTS = HERE + """
+IMPORTS = (
+    HERE
+    + """
 import importlib
 for name in json.loads(sys.argv[1]):
     try:
@@ -51,9 +56,12 @@ for name in json.loads(sys.argv[1]):
     except ImportError:
         pass
 """
-#: It repeats the linearisations of a diagnosis, and as many predictions. It prints, by number of parameters, how many
-#: predictions a linearisation takes, and counts of the diagnosis.
-STEPS = HERE + """
+)
+#: It repeats linearisations of a diagnosis, and as many predictions. It prints how many predictions a step of
+#: Gauss and Newton takes, by number of parameters, and counts of the diagnosis.
+STEPS = (
+    HERE
+    + """
 import collections, statistics
 import numpy as np
 import diagnosis.likelihood.least_squares as least_squares
@@ -92,8 +100,11 @@ for problem, point, prediction in calls[::2]:
     ratios[len(problem.names) + point.release.shape[1]].append(1.0 + taken[1] / taken[0])
 print(json.dumps({"counts": counts, "ratios": {p: statistics.median(r) for p, r in sorted(ratios.items())}}))
 """
+)
 #: It prints the nanoseconds that the bare integrator takes for a step of one of eight smooth runs side by side.
-RATE = HERE + """
+RATE = (
+    HERE
+    + """
 import numpy as np
 from tunnel_sim.physics.forward import integrate
 from tunnel_sim.physics.moment_law import parameter_names, run_dtype
@@ -108,6 +119,7 @@ for _ in range(30):
     taken.append(time.thread_time() - begun)
 print(json.dumps({"value": min(taken) / 160000 * 1e9}))
 """
+)
 
 
 @dataclass(frozen=True)
@@ -155,7 +167,7 @@ def friction(runs: int, folder: Path) -> Path:
     }
     spread = 1.0 + 0.03 * np.random.default_rng(2).standard_normal(runs)
     conditions = dataclasses.replace(once, **{**fields, "start_angle": once.release_angle[places] * spread})
-    form = next(form for form in forms() if form.family == "coulomb_friction")
+    form = next(form for form in FORMS if form.family == "coulomb_friction")
     draw = CampaignDraw("single", conditions, (EffectDraw(form, {}, 1, 1.0, FRICTION),), seed=3)
     simulated = read_and_fit(draw, simulate_motions([draw])[0])
     return write_campaign(as_campaign(simulated, f"friction-{runs}"), folder)
@@ -216,15 +228,19 @@ def compared(measurement: Measurement, trees: list[Path], turns: int) -> list[st
 
 
 def on_paper(tree: Path, folder: Path, rate: float) -> list[str]:
-    """What a diagnosis must integrate at least, beside what it takes.
+    """What a diagnosis must integrate at least, one pass through all runs for each step of its fits.
 
     Args:
         rate: of the bare integrator, ns a step.
     """
     found: Mapping[str, Mapping[str, float]] = json.loads(printed(tree, STEPS, str(folder)))
     counts = found["counts"]
-    points = counts["predictions"] + counts["linearisations"]
-    steps = points * counts["steps"] / max(counts["runs"], 1) * len(list((folder / "runs").iterdir()))
+    steps = (
+        counts["linearisations"]
+        * counts["steps"]
+        / max(counts["runs"], 1)
+        * len(list((folder / "runs").iterdir()))
+    )
     least = steps * rate * 1e-9
     ratios = ", ".join(f"{number}: {ratio:.1f}" for number, ratio in found["ratios"].items())
     return [
@@ -242,13 +258,19 @@ def main() -> None:
     )
     parser.add_argument("old", type=Path, metavar="OLD", help="a tree of the code before")
     parser.add_argument("new", type=Path, metavar="NEW", help="a tree of the code after")
-    parser.add_argument("--campaign", type=Path, action="append", default=[], help="a folder to diagnose; repeat")
-    parser.add_argument("--still", type=Path, help="a folder without a gap, for `tunnel diagnose` by the clock")
+    parser.add_argument(
+        "--campaign", type=Path, action="append", default=[], help="a folder to diagnose; repeat"
+    )
+    parser.add_argument(
+        "--still", type=Path, help="a folder without a gap, for `tunnel diagnose` by the clock"
+    )
     parser.add_argument("--set", type=Path, help="a folder of campaign folders, for the 90th percentile")
     parser.add_argument("--set-turns", type=int, default=1, help="turns of the set (default: 1)")
     parser.add_argument("--growth", action="store_true", help="campaigns of 12, 48 and 144 runs")
     parser.add_argument("--demo", action="store_true", help="the demo")
-    parser.add_argument("--paper", type=Path, action="append", default=[], help="a folder for the limit; repeat")
+    parser.add_argument(
+        "--paper", type=Path, action="append", default=[], help="a folder for the limit; repeat"
+    )
     parser.add_argument("--turns", type=int, default=5, help="turns of every job (default: 5)")
     asked = parser.parse_args()
     trees = [asked.old.resolve(), asked.new.resolve()]
@@ -256,7 +278,11 @@ def main() -> None:
     for head in ("job", "unit", "old", "new", "new/old"):
         table.add_column(head, justify="left" if head in ("job", "unit") else "right")
     with tempfile.TemporaryDirectory() as written:
-        jobs = [(one, asked.turns) for folder in asked.campaign for one in diagnosed(folder.name, folder.resolve())]
+        jobs = [
+            (one, asked.turns)
+            for folder in asked.campaign
+            for one in diagnosed(folder.name, folder.resolve())
+        ]
         for runs in GROWTH if asked.growth else ():
             folder = friction(runs, Path(written) / f"runs{runs}")
             jobs += [(one, asked.turns) for one in diagnosed(f"{runs} runs of dry friction", folder)]
@@ -274,10 +300,12 @@ def main() -> None:
         rate = json.loads(printed(trees[1], RATE))["value"]
         limits = Table(title=f"The limit on paper, with {rate:.1f} ns a step of one of eight smooth runs")
         for head in (
-            "campaign", "linearisations", "predictions", "10⁶ steps", "least, s", "taken, CPU s", "taken/least",
-            "predictions in a Gauss–Newton step, by parameters",
+            "campaign", "steps of fits", "predictions", "10⁶ steps at least", "least, s", "taken, CPU s",
+            "taken/least", "predictions in a step of a fit, by parameters",
         ):  # fmt: skip
-            limits.add_column(head, justify="left" if head.startswith(("campaign", "pred")) else "right")
+            limits.add_column(
+                head, justify="left" if head.startswith(("campaign", "predictions in")) else "right"
+            )
         for folder in asked.paper:
             for tree in trees:
                 limits.add_row(*on_paper(tree, folder.resolve(), rate))
