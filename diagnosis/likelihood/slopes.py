@@ -27,8 +27,13 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative.
+        no derivative, or the reading is not linear in the angle.
     """
+    if (
+        not reads_linearly(asked.effects[0]) or asked.chain(0).skips
+    ):  # reading it takes longer than the motion
+        points = len(asked.runs) // count - 1
+        return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
     points = len(asked.runs) // count - 1
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
@@ -63,8 +68,7 @@ def _part(asked: Asked, motions: Motions, part: list[int], moved: Array) -> Sequ
     runs, blocks = [asked.runs[place] for place in part], int(motions.blocks[part[0]])
     ringing = any(motions.ringing[i * count + place] is not None for i in range(points + 1) for place in part)
     effects = asked.effects[part[0]]
-    in_blocks = reads_linearly(effects) and not (ringing or asked.chain(part[0]).skips)
-    weights = end_weights(runs, blocks) if in_blocks else None
+    weights = None if ringing else end_weights(runs, blocks)
     if weights is not None:
         weights = weights * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
     found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights)
