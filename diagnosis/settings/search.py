@@ -322,8 +322,8 @@ class WeighingSettings:
         "−2 ln of that evidence by which a needless effect that no run shows by itself may lower it.",
         "estimated",
         "With the price of an effect it is 10. In 72 campaigns whose runs differ by chance alone, the best of all "
-        "effects lowered it by more than 10 in two (11.9 and 13.7), by 8.9 and 6.4 in two, and by 3.1 at most in the rest: two "
-        "or three in 100 exceed 10.",
+        "effects lowered it by more than 10 in two (11.9 and 13.7), by 8.9 and 6.4 in two, and by 3.1 at most in "
+        "the rest: two or three in 100 exceed 10.",
         unit="χ²",
         decision="0036",
     )

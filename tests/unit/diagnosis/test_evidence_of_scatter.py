@@ -51,7 +51,9 @@ def test_runs_that_repeat_better_cost_less() -> None:
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
 
-@pytest.mark.parametrize(("within", "size", "shown"), [(True, 0.1, True), (False, 0.1, False), (False, 140.0, True)])
+@pytest.mark.parametrize(
+    ("within", "size", "shown"), [(True, 0.1, True), (False, 0.1, False), (False, 140.0, True)]
+)
 def test_runs_show_by_themselves_what_greatest_differences_cannot_hide(
     within: bool, size: float, shown: bool
 ) -> None:
