@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.likelihood.motions import Asked, Motions, end_weights, read_together, side_by_side
+from diagnosis.likelihood.motions import Asked, Motions, end_weights, side_by_side
 from tunnel_sim.effects.chain import reads_linearly, reads_plainly
 from tunnel_sim.physics.slopes import slopes, terms
 from tunnel_sim.vocabulary.record import Array
@@ -27,11 +27,10 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, or the reading is not linear in the angle.
+        no derivative, its rod twists, or the reading is not linear in the angle.
     """
-    if (
-        not reads_linearly(asked.effects[0]) or asked.chain(0).skips
-    ):  # reading it takes longer than the motion
+    sampled = not reads_linearly(asked.effects[0]) or asked.chain(0).skips
+    if sampled or any(asked.physics.rod_twist):  # reading a motion takes longer than the motion
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
@@ -66,30 +65,23 @@ def _part(asked: Asked, motions: Motions, part: list[int], moved: Array) -> Sequ
     count, points = len(asked.runs) // (moved.shape[1] + 1), moved.shape[1]
     columns = np.flatnonzero(moved.any(axis=(0, 1)))
     runs, blocks = [asked.runs[place] for place in part], int(motions.blocks[part[0]])
-    ringing = any(motions.ringing[i * count + place] is not None for i in range(points + 1) for place in part)
     effects = asked.effects[part[0]]
-    weights = None if ringing else end_weights(runs, blocks)
-    if weights is not None:
-        weights = weights * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
+    weights = (
+        end_weights(runs, blocks)
+        * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
+    )
     found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights)
     if found.status:
         return [np.full((points, run.reading.size), np.nan) for run in runs]
     steps = moved[:, :, columns]
     unknown = np.isnan(found.by_angle[:, :, 0])
     lost = np.any((steps != 0.0) & unknown[:, None], axis=2)
-    by_angle, by_rate = found.by_angle, found.by_rate
-    if unknown.any():
-        by_angle[unknown] = 0.0
-        if by_rate is not None:
-            by_rate[unknown] = 0.0
-    if by_rate is None:
-        zeros = asked.zero.reshape(points + 1, count)[:, part]
-        result = list(steps @ by_angle + (zeros[1:] - zeros[0]).T[:, :, None])
-        if not reads_plainly(effects):
-            for place, change in zip(part, result, strict=True):
-                change += _beside(asked, place, count)
-    else:
-        result = _read(asked, motions, part, (found.angle, found.rate), (steps @ by_angle, steps @ by_rate))
+    found.by_angle[unknown] = 0.0
+    zeros = asked.zero.reshape(points + 1, count)[:, part]
+    result = list(steps @ found.by_angle + (zeros[1:] - zeros[0]).T[:, :, None])
+    if not reads_plainly(effects):
+        for place, change in zip(part, result, strict=True):
+            change += _beside(asked, place, count)
     for change, without in zip(result, lost, strict=True):
         change[without] = np.nan
     return result
@@ -103,29 +95,3 @@ def _beside(asked: Asked, place: int, count: int) -> Array:
         asked.chain(at).angle(still, run.times, run.derivative) for at in range(place, len(asked.runs), count)
     ]
     return np.stack(seen[1:]) - seen[0]
-
-
-def _read(
-    asked: Asked,
-    motions: Motions,
-    part: Sequence[int],
-    motion: tuple[Array, Array],
-    change: tuple[Array, Array],
-) -> list[Array]:
-    """The changes of the readings of some runs, shape (points, blocks) each.
-
-    Args:
-        motion: angle and rate at the blocks' ends, rad and rad/s, shape (runs, blocks + 1).
-        change: of these, shape (runs, points, blocks + 1).
-    """
-    points, size = change[0].shape[1], len(part)
-    count = len(asked.runs) // (points + 1)
-    members = [
-        (i * size + number, i * count + place) for i in range(points + 1) for number, place in enumerate(part)
-    ]
-    angles, rates = (
-        np.concatenate([at, *np.swapaxes(at[:, None] + by, 0, 1)])
-        for at, by in zip(motion, change, strict=True)
-    )
-    values = read_together(asked, motions, members, angles, rates)
-    return [np.stack(values[k + size :: size]) - values[k] for k in range(size)]
