@@ -202,6 +202,14 @@ class RandomMomentSettings:
     part_stds: float = setting(
         2.0, "Scatter between the runs by which that fall must exceed its price.", "convention", unit="std"
     )
+    alike_within: float = setting(
+        20.0,
+        "Difference of −2 ln L below which two kinds of random moment explain the residuals alike.",
+        "judgement",
+        "As the fall from which one acts: a real spectrum is not first-order, and less is its form.",
+        unit="χ²",
+        decision="0046",
+    )
     effect_price: float = setting(
         20.0, "Fall of −2 ln L that an effect beside it must bring.", "judgement", BY_CHANCE, unit="χ²"
     )
