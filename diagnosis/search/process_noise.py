@@ -190,7 +190,9 @@ def _fit(
         return None
     start = grid[int(np.argmin(totals))]
     low, high = np.log([bound for form in forms for bound in form.bounds]).T
-    simplex = np.vstack([start, start + np.diag([step for form in forms for step in form.steps])])
+    steps = np.array([step for form in forms for step in form.steps])
+    inward = np.where(start + steps > high, -steps, steps)  # a simplex on a bound would never leave it
+    simplex = np.vstack([start, start + np.diag(inward)])
     found = minimize(
         cost,
         start,

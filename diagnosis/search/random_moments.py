@@ -90,10 +90,14 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
     if scale.greatest(best, repeating=False) <= scale.weight(best):
         return []
     named = [source for source in SOURCES if any(source.may_be(kind) for kind in view.prepared.kinds)]
-    tried = [_Beside.found(source, best, view) for source in named if _may_act(source, best, scale)]
-    found = sorted((one for one in tried if one is not None), key=lambda one: one.cost)
-    within = view.base.settings.moment.alike_within
-    likely = [one for one in found if one.cost - found[0].cost < within]
+    acting = [source for source in named if _may_act(source, best, scale)]
+    found: list[_Beside] = []
+    for source in sorted(acting, key=lambda one: _explained(one, best)[0]) if len(acting) > 1 else acting:
+        if all(one.may_be_beaten(source) for one in found):
+            one = _Beside.found(source, best, view)
+            found += [] if one is None else [one]
+    least = min((one.cost for one in found), default=0.0)
+    likely = [one for one in found if one.cost - least < view.base.settings.moment.alike_within]
     return [answer for one in likely if (answer := one.answer()) is not None]
 
 
@@ -130,6 +134,19 @@ class _Beside:
                 return cls(process, top, seen, view)
         return None
 
+    def may_be_beaten(self, source: Source) -> bool:
+        """Whether another source explains the runs about as well beside the same effects, or better."""
+        known, chosen = self.seen.fit, self.view.base.settings.moment
+        _, process = _explained(source, self.seen)
+        noisy = None if process is None else with_response(known, process.spectrum)
+        if noisy is None:
+            return False
+        fitted = try_fit(replace(known.problem, data=noisy), known.point)
+        if fitted is None:
+            return True
+        cost, _ = _explained(source, replace(self.seen, fit=fit_at(known.problem, fitted.point)))
+        return cost < self.cost + chosen.alike_within
+
     @property
     def cost(self) -> float:
         """−2 ln L without constants of all runs, and the prices of parts and effects, dimensionless."""
@@ -151,6 +168,12 @@ class _Beside:
         numbers, compared = seen.further_numbers, self.top.fit.compared
         left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
+
+
+def _explained(source: Source, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
+    """The likeliest random moment of a source in what a set leaves, and its cost; infinite where none acts."""
+    process = likeliest(random_moments(beside.fit, source), beside.fit.settings.moment)
+    return (np.inf, None) if process is None else (_cost(process, beside), process)
 
 
 def _cost(process: ProcessNoise, beside: Hypothesis) -> float:
@@ -181,13 +204,18 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     """The set with one more effect that is evident beside the random moment, the most evident first.
 
     The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
-    the runs says how much of a fall of χ² is chance.
+    the runs says how much of a fall of χ² is chance. An effect with an instant of its own in every run must lower
+    χ² for each of them, too.
     """
     if len(top.effects) >= top.fit.settings.search.most_causes:
         return []
     able = {kind.name: kind for kind in kinds if not kind.line}
     larger = sets_with_one_more([top], list(able.values()))
-    gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
+    gains = []
+    for h in larger:
+        kind = able[h.effects[-1]]
+        numbers = 1 + len(kind.own_numbers(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
+        gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
 
@@ -327,10 +355,6 @@ def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
     hidden = {kind.name for kind in kinds if source.condition in ("always", kind.condition)}
     reached: dict[tuple[str, ...], Hypothesis] = {}
 
-    def cost(hypothesis: Hypothesis) -> float:
-        process = likeliest(random_moments(_seen_in(hypothesis, data).fit, source), chosen)
-        return np.inf if process is None else _cost(process, hypothesis)
-
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
             process = likeliest(random_moments(known, source), chosen)
@@ -354,7 +378,7 @@ def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
         if len(reached) > 1:  # to and fro between sets
-            top = min(reached.values(), key=cost)
+            top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
     return top
 
 

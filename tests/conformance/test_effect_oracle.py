@@ -283,7 +283,11 @@ def test_a_random_moment_of_the_surroundings_does_not_depend_on_the_wind() -> No
         for speed in (0.0, 15.0, 25.0)
     )
     assert still == blown == faster
-    assert not drawn_chain(effect_from("buffeting", VALUES["buffeting"]), replace(RUN, speed=0.0)).physics().series
+    assert (
+        not drawn_chain(effect_from("buffeting", VALUES["buffeting"]), replace(RUN, speed=0.0))
+        .physics()
+        .series
+    )
 
 
 def test_both_random_moments_act_at_once() -> None:
