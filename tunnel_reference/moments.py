@@ -222,8 +222,8 @@ def shaking(kind: str, conditions: Conditions, *, seed: int, scale: float, ratio
 
     Args:
         kind: ``flat`` (up to ``scale`` Hz), ``corner`` (falling from ``scale`` Hz on, as of a draught), ``floor``
-            (the acceleration of a floor of ``scale`` Hz and damping ratio ``ratio`` under a white force), ``octave``
-            (about ``scale`` Hz), ``traffic`` (flat, swelling and fading by ``ratio`` within some seconds).
+            (the acceleration of a floor of ``scale`` Hz and damping ratio ``ratio`` under a white force),
+            ``octave`` (about ``scale`` Hz), ``traffic`` (flat, swelling and fading by ``ratio`` in some seconds).
         conditions: number of runs and duration.
         scale: Hz.
         ratio: dimensionless.

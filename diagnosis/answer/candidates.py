@@ -15,7 +15,7 @@ from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.prepared import COARSE_STEP, HUM
-from diagnosis.search.process_noise import LONGEST_BANDWIDTH
+from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings

@@ -66,7 +66,7 @@ def shaken(
 
 
 def of(conditions: Sequence[tuple[float, float]], *effects: Effect) -> Campaign:
-    """A campaign of these runs; the nominal model of the helper has wind, so that such a run is made and left out."""
+    """A campaign of these runs; the helper's nominal model has wind, so that such a run is made and left out."""
     data = campaign(*effects, conditions=(*conditions, (16.12, 15.0)))
     return replace(data, runs=data.runs[: len(conditions)])
 
