@@ -146,9 +146,14 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMom
     return bool(gains.sum() - chosen.part_stds * std > chosen.part_price)
 
 
+def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:
+    """Whether a fall of −2 ln L (dimensionless) shows a random moment."""
+    return drop > chosen.acts_from
+
+
 def likeliest(tried: Iterable[ProcessNoise], chosen: RandomMomentSettings) -> ProcessNoise | None:
     """The random moment that explains residuals best; None where white noise explains them as well."""
-    acting = [one for one in tried if one.drop > chosen.acts_from]
+    acting = [one for one in tried if acts_by(one.drop, chosen)]
     return min(acting, key=lambda one: one.cost + one.price(chosen.part_price), default=None)
 
 

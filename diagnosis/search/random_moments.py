@@ -27,6 +27,7 @@ from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (
     ProcessNoise,
+    acts_by,
     is_steady_noise,
     likeliest,
     random_moments,
@@ -91,13 +92,13 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
         return []
     named = [source for source in SOURCES if any(source.may_be(kind) for kind in view.prepared.kinds)]
     acting = [source for source in named if _may_act(source, best, scale)]
-    found: list[_Beside] = []
+    found, within = list[_Beside](), view.base.settings.moment.alike_within
     for source in sorted(acting, key=lambda one: _explained(one, best)[0]) if len(acting) > 1 else acting:
-        if all(one.may_be_beaten(source) for one in found):
+        if all(one.cost_from(source) < one.cost + within for one in found):
             one = _Beside.found(source, best, view)
             found += [] if one is None else [one]
     least = min((one.cost for one in found), default=0.0)
-    likely = [one for one in found if one.cost - least < view.base.settings.moment.alike_within]
+    likely = [one for one in found if one.cost < least + within]
     return [answer for one in likely if (answer := one.answer()) is not None]
 
 
@@ -134,18 +135,15 @@ class _Beside:
                 return cls(process, top, seen, view)
         return None
 
-    def may_be_beaten(self, source: Source) -> bool:
-        """Whether another source explains the runs about as well beside the same effects, or better."""
-        known, chosen = self.seen.fit, self.view.base.settings.moment
-        _, process = _explained(source, self.seen)
+    def cost_from(self, source: Source) -> float:
+        """The cost of a random moment of another source beside the same effects; infinite where none acts."""
+        known = self.seen.fit
+        cost, process = _explained(source, self.seen)
         noisy = None if process is None else with_response(known, process.spectrum)
-        if noisy is None:
-            return False
-        fitted = try_fit(replace(known.problem, data=noisy), known.point)
+        fitted = None if noisy is None else try_fit(replace(known.problem, data=noisy), known.point)
         if fitted is None:
-            return True
-        cost, _ = _explained(source, replace(self.seen, fit=fit_at(known.problem, fitted.point)))
-        return cost < self.cost + chosen.alike_within
+            return cost
+        return _explained(source, replace(self.seen, fit=fit_at(known.problem, fitted.point)))[0]
 
     @property
     def cost(self) -> float:
@@ -250,7 +248,7 @@ def _shown_apart(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
     others = [one for one in SOURCES if one is not source]
     apart = {run.id for run in fitted.problem.data.runs if not any(one.acts(run) for one in others)}
     drops = [drop for run, drop in zip(process.runs, process.drops.tolist(), strict=True) if run in apart]
-    return not drops or sum(drops) > fitted.settings.moment.acts_from
+    return not drops or acts_by(sum(drops), fitted.settings.moment)
 
 
 def excess_elsewhere(fit: Fit, acts: Collection[str]) -> float:

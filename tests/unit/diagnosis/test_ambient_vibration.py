@@ -92,6 +92,7 @@ def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     assert answer.process.runs == ("r2", "r3", "r5", "r6")
 
 
+@pytest.mark.slow
 def test_both_at_once_are_one_spectrum_with_a_part_of_each() -> None:
     (answer,) = answers(shaken(shaken(campaign(), moment=0.02), coefficient=0.02, seed=6))
     assert answer.effects == ("ambient_vibration", "buffeting")
@@ -104,6 +105,7 @@ def test_runs_in_one_wind_cannot_tell_them_apart() -> None:
     assert first == pytest.approx(second, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_of_two_kinds_that_the_runs_cannot_tell_apart_the_one_that_may_be_named_is() -> None:
     data = shaken(of(ONE_WIND), ONE_WIND, moment=0.03)
     for kind in (AMBIENT, BUFFETING):
