@@ -38,6 +38,7 @@ from tunnel_sim.vocabulary.record import Array
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
 _SETTLE = 1.0  # s left out at the start: the transient of the filter
 _FEWEST = 16  # residuals of a run: two in each band in which they are compared with white noise
+_OF_NOISE = (0.3, 3.0, 30.0, 300.0)  # noise of first order in the reading tried, over its white noise
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
 
@@ -247,6 +248,37 @@ def _unit(channels: Sequence[_Channel]) -> float:
     return 1.0 / float(np.sqrt(np.median(_powers(channels, one))))
 
 
+def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
+    """Whether noise of the reading explains the runs better than a random moment does.
+
+    A zero that wanders, and coloured noise of the sensor, are of first order in the reading itself. A random moment
+    shows through the motion that it drives, whose spectrum has a peak at the natural frequency.
+    """
+    from scipy.signal import lfilter  # only here: slow to load
+
+    channels = [c for c in _channels(fit) if c.run.id in process.runs]
+    kept = [c.residual[_skip(c) :] for c in channels]
+    interval, variance = (np.array([getattr(c, name) for c in channels]) for name in ("interval", "variance"))
+    white = sum(c.white_cost for c in channels)
+
+    def drop(x: Array) -> float:
+        std, bandwidth = np.exp(x)
+        stay = np.exp(-2.0 * np.pi * bandwidth * interval)[:, None, None]
+        filters = steady_filters(stay, std**2 * (1.0 - stay**2), variance)
+        return white - sum(
+            _cost(lfilter(numerator, denominator, residual), spread)
+            for residual, (numerator, denominator, spread) in zip(kept, filters, strict=True)
+        )
+
+    noise = float(np.sqrt(np.median(variance)))
+    grid = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
+    best = max(grid, key=drop)
+    found = minimize(
+        lambda x: -drop(x), best, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5}
+    )
+    return float(-found.fun) > process.drop
+
+
 def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     """The runs of a fit, with the response to a random moment in the noise of those in which it acts.
 
@@ -311,9 +343,13 @@ def _filtered(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list
             results.append((np.inf, np.zeros(0)))
             continue
         innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
-        cost = float(innovations.size * np.log(spread) + innovations @ innovations / spread)
-        results.append((cost, innovations / np.sqrt(spread)))
+        results.append((_cost(innovations, spread), innovations / np.sqrt(spread)))
     return results
+
+
+def _cost(innovations: Array, spread: float) -> float:
+    """−2 ln L of innovations of a variance, without constants."""
+    return float(innovations.size * np.log(spread) + innovations @ innovations / spread)
 
 
 def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[Array, Array, float]]:

@@ -28,6 +28,7 @@ from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restr
 from diagnosis.search.process_noise import (
     ProcessNoise,
     acts_by,
+    is_of_reading,
     is_steady_noise,
     likeliest,
     random_moments,
@@ -130,8 +131,7 @@ class _Beside:
             seen = _seen_in(top, view.base.problem.data)
             steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
             process = likeliest((one for one in steady if _shown_apart(one, source, seen.fit)), chosen)
-            follows = process is None or follows_the_motion(seen.fit, process.runs)
-            if process is not None and not follows and not obeys_a_law(seen.fit, source):
+            if process is not None and _is_random(process, source, seen.fit):
                 return cls(process, top, seen, view)
         return None
 
@@ -240,7 +240,15 @@ def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
     process = likeliest(random_moments(best.fit, source), chosen)
     if process is None or not _shown_apart(process, source, best.fit):
         return False
-    return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
+    of_reading = source.like_reading and is_of_reading(best.fit, process)
+    return not of_reading and is_steady_noise(process, chosen) and not is_no_noise(best.fit)
+
+
+def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
+    """Whether what a fit leaves is neither noise of the reading, nor follows the motion's phase or a law."""
+    if source.like_reading and is_of_reading(fitted, process):
+        return False
+    return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
 
 
 def _shown_apart(process: ProcessNoise, source: Source, fitted: Fit) -> bool:

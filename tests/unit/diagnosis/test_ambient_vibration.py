@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, lsim
 
-from diagnosis.search.process_noise import random_moments
+from diagnosis.search.process_noise import is_of_reading, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from tests.unit.gap_campaigns import (
@@ -133,6 +133,25 @@ def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, flo
         base = nominal(of(conditions, missing))
         assert obeys_a_law(base, SURROUNDINGS)
         assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
+
+
+@pytest.mark.parametrize("bandwidth", [0.05, 5.0])
+def test_noise_of_the_reading_is_no_random_moment(bandwidth: float) -> None:
+    """Truth: noise of first order added to the readings, a zero that wanders or a sensor's coloured noise."""
+    rng, runs, data = np.random.default_rng(8), [], of(STILL)
+    pole = np.exp(-2.0 * np.pi * bandwidth * INTERVAL)
+    for run in data.runs:
+        white = rng.standard_normal(run.record.yaw_rad.size)
+        wander = 2e-3 * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)
+        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + wander)))
+    base = nominal(replace(data, runs=tuple(runs)))
+    process = min(random_moments(base, SURROUNDINGS), key=lambda one: one.cost)
+    assert process.drop > 100.0  # it would take it up
+    assert is_of_reading(base, process)
+    assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
+    shaking = nominal(shaken(of(STILL), STILL, moment=0.02))
+    process = min(random_moments(shaking, SURROUNDINGS), key=lambda one: one.cost)
+    assert not is_of_reading(shaking, process)
 
 
 def test_a_moment_of_all_runs_is_not_called_buffeting_where_the_surroundings_are_excluded() -> None:
