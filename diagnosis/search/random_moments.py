@@ -29,13 +29,13 @@ from diagnosis.search.process_noise import (
     ProcessNoise,
     acts_by,
     is_of_reading,
-    is_steady_noise,
     likeliest,
     random_moments,
     with_response,
 )
 from diagnosis.search.random_spectra import SOURCES, Source
 from diagnosis.search.scatter import settled
+from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 
@@ -240,13 +240,13 @@ def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
     process = likeliest(random_moments(best.fit, source), chosen)
     if process is None or not _shown_apart(process, source, best.fit):
         return False
-    of_reading = source.like_reading and is_of_reading(best.fit, process)
+    of_reading = source.in_every_run and is_of_reading(best.fit, process)
     return not of_reading and is_steady_noise(process, chosen) and not is_no_noise(best.fit)
 
 
 def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
-    """Whether what a fit leaves is neither noise of the reading, nor follows the motion's phase or a law."""
-    if source.like_reading and is_of_reading(fitted, process):
+    """Whether what a fit leaves is neither noise of the reading nor a line, and follows no phase and no law."""
+    if source.in_every_run and (is_of_reading(fitted, process) or is_a_line(fitted, process)):
         return False
     return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
 

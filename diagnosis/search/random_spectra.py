@@ -34,14 +34,15 @@ class Source(ABC):
     Traits:
 
     - ``condition``: of the effects that are such a moment.
-    - ``like_reading``: whether noise of the reading, which is in every run, could be mistaken for it.
+    - ``in_every_run``: whether it acts in every run, as noise of the reading and a steady line do, which could be
+      mistaken for it.
     - ``laws``: kinds of law, of `diagnosis.likelihood.paths.COMMON`, that could be mistaken for it: those that act
       in the same runs.
     """
 
     condition: ClassVar[Condition]
     laws: ClassVar[tuple[str, ...]]
-    like_reading: ClassVar[bool] = False
+    in_every_run: ClassVar[bool] = False
 
     def may_be(self, kind: type[Effect]) -> bool:
         """Whether a kind of effect is such a moment."""
@@ -76,7 +77,7 @@ class _Surroundings(Source):
 
     condition = "always"
     laws = tuple(COMMON)
-    like_reading = True
+    in_every_run = True
 
     def acts(self, run: RunData) -> bool:
         """In every run."""

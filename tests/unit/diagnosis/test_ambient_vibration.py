@@ -12,6 +12,7 @@ from scipy.signal import lfilter, lsim
 from diagnosis.search.process_noise import is_of_reading, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
+from diagnosis.search.steady_noise import is_a_line
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -44,9 +45,10 @@ def shaken(
     *,
     moment: float = 0.0,
     coefficient: float = 0.0,
+    centre: float = 0.0,
     seed: int = 5,
 ) -> Campaign:
-    """Every run under a random moment of first order, in N m, or one in proportion to the pressure.
+    """Every run under a random moment of first order about a centre, in N m or in proportion to the pressure.
 
     The nominal model is linear, so that the response is added; it is that of SciPy, at eight steps a sample.
     """
@@ -58,8 +60,10 @@ def shaken(
         stiffness = spring - pressure * CN_BETA
         damping = DAMPING - (pressure * LENGTH / speed * CN_R if speed else 0.0)
         std = moment + coefficient * pressure
-        pole = np.exp(-2.0 * np.pi * BANDWIDTH * step)
-        given = std * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], rng.standard_normal(time.size))
+        bandwidth = 0.2 * BANDWIDTH if centre else BANDWIDTH
+        pole = np.exp(2.0 * np.pi * (1j * centre - bandwidth) * step)
+        white = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
+        given = std * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], white))
         response = lsim(([1.0 / INERTIA], [1.0, damping / INERTIA, stiffness / INERTIA]), given, time)[1][::8]
         runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response)))
     return replace(data, runs=tuple(runs))
@@ -152,6 +156,21 @@ def test_noise_of_the_reading_is_no_random_moment(bandwidth: float) -> None:
     shaking = nominal(shaken(of(STILL), STILL, moment=0.02))
     process = min(random_moments(shaking, SURROUNDINGS), key=lambda one: one.cost)
     assert not is_of_reading(shaking, process)
+
+
+def test_a_steady_line_is_no_random_moment() -> None:
+    """Truth: a platform that vibrates at one frequency, with a phase of its own in every run."""
+    rng, runs, data = np.random.default_rng(9), [], of(STILL)
+    for run in data.runs:
+        line = 1e-3 * np.sin(2.0 * np.pi * (7.0 * run.record.time_s + rng.uniform()))
+        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + line)))
+    base = nominal(replace(data, runs=tuple(runs)))
+    process = min(random_moments(base, SURROUNDINGS), key=lambda one: one.cost)
+    assert process.spectrum[0].centre == pytest.approx(7.0, rel=0.02)  # it would take it up
+    assert is_a_line(base, process)
+    assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
+    (answer,) = answers(shaken(of(STILL), STILL, moment=0.02, centre=7.0))
+    assert answer.effects == ("ambient_vibration",)
 
 
 def test_a_moment_of_all_runs_is_not_called_buffeting_where_the_surroundings_are_excluded() -> None:
