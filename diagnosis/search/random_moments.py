@@ -240,13 +240,14 @@ def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
     process = likeliest(random_moments(best.fit, source), chosen)
     if process is None or not _shown_apart(process, source, best.fit):
         return False
-    of_reading = source.in_every_run and is_of_reading(best.fit, process)
-    return not of_reading and is_steady_noise(process, chosen) and not is_no_noise(best.fit)
+    if source.in_every_run and (is_of_reading(best.fit, process) or is_a_line(best.fit, process)):
+        return False
+    return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
 
 
 def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
-    """Whether what a fit leaves is neither noise of the reading nor a line, and follows no phase and no law."""
-    if source.in_every_run and (is_of_reading(fitted, process) or is_a_line(fitted, process)):
+    """Whether what a fit leaves is not noise of the reading, and follows no phase and no law."""
+    if source.in_every_run and is_of_reading(fitted, process):
         return False
     return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
 

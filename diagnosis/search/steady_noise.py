@@ -75,10 +75,14 @@ def of_all_runs(result: ProcessNoise) -> float:
 
 
 def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
-    """Whether a steady line at one frequency, with a phase of its own in every run, explains the runs better.
+    """Whether a line at one frequency, with a phase of its own in every run, is nearly all that a fit leaves.
 
     The phase of a random moment about a frequency wanders. Without a centre it is no line: the rig's own response
     is narrow, and the release of every run absorbs what is steady at its frequency.
+
+    Args:
+        fit: by least squares in the sensor's noise, in which the release has absorbed its part.
+        process: the likeliest in what it leaves.
     """
     runs = fit.problem.data.runs
     spectra = [one for run, one in zip(runs, residual_spectra(fit), strict=True) if run.id in process.runs]
@@ -88,4 +92,7 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
             reach = _LINE_WIDTHS * max(part.bandwidth, 1.0 / max(one.duration for one in spectra))
             near = np.linspace(part.centre - reach, part.centre + reach, 201)
             drops.append(float(np.max(np.sum([one.power(np.abs(near)) for one in spectra], axis=0))))
-    return max(drops) > process.drop
+    left = (
+        float(r @ r) - r.size for run, r in zip(runs, fit.residuals, strict=True) if run.id in process.runs
+    )
+    return max(drops) > fit.settings.moment.steady_line_share * sum(left)

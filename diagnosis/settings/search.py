@@ -266,6 +266,13 @@ class RandomMomentSettings:
         "judgement",
         "At most a tenth of what is left is then another in every run.",
     )
+    steady_line_share: float = setting(
+        0.9,
+        "Share of what is left that a line with a phase of its own in every run closes where the moment is a line.",
+        "judgement",
+        "A random moment of half-width b leaves a tenth to such a line where b is a twentieth over the duration.",
+        decision="0046",
+    )
     law_stds: float = setting(2.0, "Scatter by which that share must be exceeded.", "convention", unit="std")
 
 
