@@ -271,7 +271,7 @@ def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
 
     noise = float(np.sqrt(np.median(variance)))
     grid = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
-    best = max(grid, key=drop)
+    best = grid[int(np.argmax([drop(x) for x in grid]))]
     found = minimize(
         lambda x: -drop(x), best, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5}
     )
