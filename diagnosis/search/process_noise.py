@@ -147,7 +147,11 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMom
 
 
 def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:
-    """Whether a fall of −2 ln L (dimensionless) shows a random moment."""
+    """Whether a fall of −2 ln L shows a random moment.
+
+    Args:
+        drop: of −2 ln L, dimensionless.
+    """
     return drop > chosen.acts_from
 
 
@@ -258,24 +262,21 @@ def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
     channels = [c for c in _channels(fit) if c.run.id in process.runs]
     kept = [c.residual[_skip(c) :] for c in channels]
     interval, variance = (np.array([getattr(c, name) for c in channels]) for name in ("interval", "variance"))
-    white = sum(c.white_cost for c in channels)
 
-    def drop(x: Array) -> float:
+    def cost(x: Array) -> float:
         std, bandwidth = np.exp(x)
         stay = np.exp(-2.0 * np.pi * bandwidth * interval)[:, None, None]
         filters = steady_filters(stay, std**2 * (1.0 - stay**2), variance)
-        return white - sum(
+        return sum(
             _cost(lfilter(numerator, denominator, residual), spread)
             for residual, (numerator, denominator, spread) in zip(kept, filters, strict=True)
         )
 
     noise = float(np.sqrt(np.median(variance)))
-    grid = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
-    best = grid[int(np.argmax([drop(x) for x in grid]))]
-    found = minimize(
-        lambda x: -drop(x), best, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5}
-    )
-    return float(-found.fun) > process.drop
+    grid: Array = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
+    start = grid[int(np.argmin([cost(x) for x in grid]))]
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5})
+    return sum(c.white_cost for c in channels) - float(found.fun) > process.drop
 
 
 def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
