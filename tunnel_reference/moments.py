@@ -199,11 +199,51 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
             power = 1.0 / (1.0 + (2.0 * np.pi * reduced) ** 2)
         else:
             power = 1.0 / (1.0 + 70.8 * reduced**2) ** (5.0 / 6.0)
-        spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
-        spectrum[0] = 0.0
-        series = np.fft.irfft(spectrum, n)
-        out[run] = series / (np.sqrt(2.0 * np.sum(power[1:]) * 2.0) / n)
+        out[run] = with_spectrum(power, rng)
     return out[:, : _length(conditions)]
+
+
+def with_spectrum(power: Array, rng: np.random.Generator) -> Array:
+    """A random series of unit variance without a mean, shape (2 (n − 1),).
+
+    Args:
+        power: relative, at the frequencies from zero to half the sample rate, shape (n,), dimensionless.
+        rng: of its phases and amplitudes.
+    """
+    n = 2 * (power.size - 1)
+    spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
+    spectrum[0] = 0.0
+    series = np.fft.irfft(spectrum, n)
+    return np.asarray(series / (np.sqrt(2.0 * np.sum(power[1:]) * 2.0) / n))
+
+
+def shaking(kind: str, conditions: Conditions, *, seed: int, scale: float, ratio: float) -> Array:
+    """Series of about unit variance for every run, whether the wind is on or off, shape (runs, n).
+
+    Args:
+        kind: ``flat`` (up to ``scale`` Hz), ``corner`` (falling from ``scale`` Hz on, as of a draught), ``floor``
+            (the acceleration of a floor of ``scale`` Hz and damping ratio ``ratio`` under a white force),
+            ``octave`` (about ``scale`` Hz), ``traffic`` (flat, swelling and fading by ``ratio`` in some seconds).
+        conditions: number of runs and duration.
+        scale: Hz.
+        ratio: dimensionless.
+    """
+    n = 2 ** int(np.ceil(np.log2(_length(conditions))))
+    frequency = np.fft.rfftfreq(n, 1.0 / RATE)
+    place = frequency / scale
+    power = {
+        "corner": 1.0 / (1.0 + place**2),
+        "floor": place**4
+        / ((1.0 - place**2) ** 2 + (2.0 * ratio * place) ** 2)
+        / (1.0 + (frequency / 50.0) ** 4),
+        "octave": ((place > 0.707) & (place < 1.414)).astype(np.float64),
+    }.get(kind, (frequency < scale).astype(np.float64))
+    rng = np.random.default_rng(seed)
+    series = np.stack([with_spectrum(power, rng) for _ in range(conditions.runs)])
+    if kind == "traffic":
+        slow = (frequency < max(0.3, 1.5 * frequency[1])).astype(np.float64)
+        series *= np.exp(ratio * np.stack([with_spectrum(slow, rng) for _ in range(conditions.runs)]))
+    return np.asarray(series[:, : _length(conditions)])
 
 
 def wandering_vortex(conditions: Conditions, *, seed: int, strouhal: float, wander: float) -> Array:

@@ -21,9 +21,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 SCHEMA = Path(__file__).parent / "answer.schema.json"
 UNKNOWN = "unknown"
-NAMES: tuple[str, ...] = tuple(
-    sorted(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
-)
+_LAST_PLACE = 32  # in the vocabulary when the sets were drawn: a later effect is in none of them
+KINDS = tuple(kind for kind in ALL_EFFECTS if kind.place <= _LAST_PLACE)
+"""The vocabulary of the sets."""
+NAMES: tuple[str, ...] = tuple(sorted(kind.name for kind in KINDS if not (kind.driven or kind.scatters)))
 """The causes of free decays, which all campaigns of the sets are; `unknown` is one more. Scatter is beside them."""
 
 Answer = Callable[[Path], dict[str, Any]]

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.causes.entry import KINDS
 from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.model.run_data import Data
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings
-from tunnel_sim.effects import known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -50,7 +50,7 @@ class Fitted:
         Args:
             name: of the cause.
         """
-        kind = {kind.name: kind for kind in known_effects()}[name]
+        kind = {kind.name: kind for kind in KINDS}[name]
         found = one_more(self.fit, kind)
         return None if found is None else _fitted((*self.names, name), found)
 
@@ -68,7 +68,7 @@ def nominal(folder: Path) -> tuple[Fitted, tuple[str, ...], bool]:
     Raises:
         TunnelError: when the records are refused.
     """
-    study = nominal_study(_campaign(folder), known_effects())
+    study = nominal_study(_campaign(folder), KINDS)
     return _fitted((), study.nominal), tuple(study.read_off), bool(study.gap.test.detected)
 
 
@@ -100,7 +100,7 @@ def grown(folder: Path) -> Grown:
     Raises:
         TunnelError: when the records are refused.
     """
-    study = investigate(_campaign(folder), known_effects())
+    study = investigate(_campaign(folder), KINDS)
     sets = [answer.stated for answer in study.answers if answer.stated is not None]
     settled = not sets or study.answers[0].probability == 1.0
     data = _most_common([h.fit.problem.data for h in sets]) or study.nominal.problem.data
@@ -136,7 +136,7 @@ def _campaign(folder: Path) -> Campaign:
 
 def candidates() -> tuple[str, ...]:
     """Causes that a fit can find."""
-    return tuple(kind.name for kind in known_effects() if kind.fitted)
+    return tuple(kind.name for kind in KINDS if kind.fitted)
 
 
 def _fitted(names: tuple[str, ...], fit: Any) -> Fitted:

@@ -15,7 +15,7 @@ from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.prepared import COARSE_STEP, HUM
-from diagnosis.search.process_noise import LONGEST_BANDWIDTH
+from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
@@ -169,7 +169,7 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
         seconds = random.process.interval * sum(i.size for i in random.process.innovations)
         data = study.nominal.problem.data
         for kind in random.kinds:
-            parts = [one for one in random.process.spectrum if one.band == kind.random]
+            parts = [one for one in random.process.spectrum if one.is_of(kind)]
             part = max(parts, key=lambda one: one.intensity)
             intensity = float(np.sqrt(sum(one.intensity**2 for one in parts)))
             severity, place = (f"{kind.name}.{info.name}" for info in kind.parameters())
@@ -187,7 +187,9 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
             else:
                 # a corner above the rig's frequencies looks white: only size over square root is known there
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-                found[severity] = ParameterEstimate(intensity, intensity * relative, "1")
+                found[severity] = ParameterEstimate(
+                    intensity, intensity * relative, kind.parameters()[0].unit
+                )
                 found[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
     own = own_parameters(found, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1

@@ -290,11 +290,12 @@ class _Models:
         return self._excess[fitted]
 
     def random_excess(self, random: RandomAnswer) -> float:
-        """What all causes and a random moment leave: the moment's innovations where the wind is on."""
+        """What all causes and a random moment leave: the moment's innovations where it acts."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)
+        acts = random.process.runs
         by_run = {
-            run.id: random.process.excess if run.wind_on else float(np.mean(still[run.id] ** 2)) - 1.0
+            run.id: random.process.excess if run.id in acts else float(np.mean(still[run.id] ** 2)) - 1.0
             for run in runs
         }
         return self._weighted(by_run) + self._left(self.causes)

@@ -205,7 +205,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     for run in study.nominal.problem.data.runs:
         before = _excess(predicted[run.id]) / run.block * ratio + base.hum + base.extra
         after = _excess(shown.after[run.id]) / run.block * ratio + explained
-        if random is not None and run.wind_on:
+        if random is not None and run.id in random.process.runs:
             after = random.process.excess / run.block * ratio + explained
         held_out = run.id in shown.held_out
         runs.append(RunGap(run.id, before, after if study.named else before, held_out=held_out))

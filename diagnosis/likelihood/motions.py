@@ -207,16 +207,13 @@ def readings(asked: Asked) -> list[Array]:
         for (_, place), one in zip(members, values, strict=True):
             found[place] = one
 
-    side_by_side(read, parts, asked.data.settings.work.threads)
+    side_by_side(read, parts, asked.data)
     return found
 
 
-def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], threads: int) -> None:
-    """Do some work on parts, in several threads where there are several parts.
-
-    Args:
-        threads: at most.
-    """
+def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], data: Data) -> None:
+    """Do some work on parts of a campaign's runs, in as many threads as its settings allow."""
+    threads = data.settings.work.threads
     list(_pool(threads).map(work, parts) if threads > 1 and len(parts) > 1 else map(work, parts))
 
 

@@ -51,7 +51,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
         for place, change in zip(part, _part(asked, motions, part, moved[part]), strict=True):
             found[place] = change
 
-    side_by_side(follow, parts, asked.data.settings.work.threads)
+    side_by_side(follow, parts, asked.data)
     return found
 
 

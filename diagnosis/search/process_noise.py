@@ -1,72 +1,44 @@
-"""A random moment on the rig: its likelihood from a steady Kalman filter, and whether it is steady noise.
+"""A random moment on the rig: its likelihood from a steady Kalman filter.
 
-There are two kinds: turbulence, broad or about one frequency, and vortex shedding with a wandering phase, about a
-frequency that follows the wind. Both at once are one spectrum with two parts. Åström, Introduction to Stochastic
-Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981), filter error.
+There are three kinds: turbulence, and vibration of the surroundings, broad or about one frequency; and vortex
+shedding with a wandering phase, about a frequency that follows the wind. Two at once are one spectrum with two
+parts. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981), filter error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.model.run_data import Data
+from diagnosis.model.run_data import Data, RunData
 from diagnosis.model.run_noise import NoiseWithMoment
+from diagnosis.search.random_spectra import (
+    BROAD,
+    CENTRED,
+    LONGEST_BANDWIDTH,
+    STREAM,
+    SURROUNDINGS,
+    Form,
+    Source,
+    Spectrum,
+    SpectrumPart,
+    of_surroundings,
+    wandering,
+)
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
 _SETTLE = 1.0  # s left out at the start: the transient of the filter
-LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
-_LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
-_LINE_SPACING = 0.3  # Hz, in the search for a line
-_WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
-_HIGHEST_LINE = 30.0  # Hz
+_FEWEST = 16  # residuals of a run: two in each band in which they are compared with white noise
+_OF_NOISE = (0.3, 3.0, 30.0, 300.0)  # noise of first order in the reading tried, over its white noise
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
-
-
-@dataclass(frozen=True)
-class SpectrumPart:
-    """A part of a random moment's spectrum: first order about a centre.
-
-    Args:
-        intensity: standard deviation of the moment coefficient, dimensionless.
-        bandwidth: corner frequency beside the centre, Hz.
-        centre: Hz; 0 for turbulence without one.
-        strouhal_number: of a centre that follows the wind on the body's width; 0 where none does.
-    """
-
-    intensity: float
-    bandwidth: float
-    centre: float = 0.0
-    strouhal_number: float = 0.0
-
-    @property
-    def states(self) -> int:
-        """Number of states of the process: the coefficient, and about a centre its quadrature."""
-        return 2 if self.centre > 0.0 or self.strouhal_number > 0.0 else 1
-
-    @property
-    def band(self) -> Literal["broad_band", "narrow_band"]:
-        """Whether it is turbulence or wandering vortices, as `tunnel_sim.effects.Effect.random` has it."""
-        return "narrow_band" if self.strouhal_number > 0.0 else "broad_band"
-
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """Intensity, bandwidth and, where there is one, the centre or its Strouhal number."""
-        return (self.intensity, self.bandwidth, *(x for x in (self.centre, self.strouhal_number) if x > 0.0))
-
-
-#: The parts of a random moment's spectrum, whose moments are independent of each other.
-Spectrum = tuple[SpectrumPart, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +47,18 @@ class ProcessNoise:
 
     Args:
         spectrum: as fitted, of one part or two.
-        drops: of −2 ln L against white measurement noise alone, by wind-on run, shape (runs,), dimensionless.
-        by_run: the drop of each wind-on run over the power that the spectrum predicts of its response, in units of
+        runs: ids of the runs in which it acts.
+        drops: of −2 ln L against white measurement noise alone, by such run, shape (runs,), dimensionless.
+        by_run: the drop of each such run over the power that the spectrum predicts of its response, in units of
             the noise's, shape (runs,), dimensionless; at least 0.
-        cost: −2 ln L without constants, wind-on runs, dimensionless.
+        cost: −2 ln L without constants, of all runs, dimensionless.
         excess: mean squared scaled innovation minus one, dimensionless.
-        innovations: scaled, by wind-on run.
+        innovations: scaled, by run in which it acts.
         interval: between innovations, s.
     """
 
     spectrum: Spectrum
+    runs: tuple[str, ...]
     drops: Array
     by_run: Array
     cost: float
@@ -97,6 +71,11 @@ class ProcessNoise:
         """Of −2 ln L of all runs, dimensionless."""
         return float(self.drops.sum())
 
+    @property
+    def sources(self) -> frozenset[Source]:
+        """Where its parts come from."""
+        return frozenset(part.source for part in self.spectrum)
+
     def price(self, of_part: float) -> float:
         """What −2 ln L has to fall by beyond one part without a centre, ``of_part`` for each; dimensionless."""
         centres = sum(part.centre > 0.0 for part in self.spectrum)
@@ -105,72 +84,50 @@ class ProcessNoise:
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """One wind-on run for the filter."""
+    """One run for the filter."""
 
+    run: RunData
+    data: Data
     residual: Array  # rad
     variance: float  # rad2, of one residual
     interval: float
     oscillator: Array  # (2, 2): angle, rate
-    moment: float  # N m per unit coefficient, over the inertia
+    per_moment: float  # over the inertia and the gain of the filter that the residual has passed, 1/(kg m²)
     reduced: float  # V/width, Hz
 
+    @property
+    def white_cost(self) -> float:
+        """−2 ln L without constants of white noise alone."""
+        kept = self.residual[_skip(self) :] / np.sqrt(self.variance)
+        return float(kept.size * np.log(self.variance) + kept @ kept)
 
-@dataclass(frozen=True, eq=False)
-class _Form:
-    """A form of a part of a spectrum: from what parameters it is made, and where they are sought."""
-
-    part: Callable[..., SpectrumPart]
-    grid: Sequence[tuple[float, ...]]
-    bounds: Sequence[tuple[float, float]]
-    steps: Sequence[float]  # of the first simplex, in logarithms
-
-
-_BROAD = _Form(
-    SpectrumPart,
-    [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)],
-    ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH)),
-    (0.5, 0.5),
-)
-_CENTRED = _Form(
-    SpectrumPart,
-    [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)],
-    ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0)),
-    (0.5, 0.5, 0.05),
-)
+    def acceleration(self, part: SpectrumPart) -> float:
+        """What a part's unit of intensity gives, rad/s²; 0 where it does not act."""
+        return (
+            self.per_moment * part.source.moment(self.run, self.data) if part.source.acts(self.run) else 0.0
+        )
 
 
-def _wandering(data: Data) -> _Form | None:
-    """Vortex shedding with a wandering phase; None without wind or body width."""
-    fastest = max(run.wind_speed for run in data.runs)
-    if data.width <= 0.0 or fastest <= 0.0:
-        return None
-    # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
-    reduced = fastest / data.width
-    numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
-    return _Form(
-        lambda s, b, n: SpectrumPart(s, b, strouhal_number=n),
-        [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers],
-        ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0)),
-        (0.5, 0.5, 2e-3),
-    )
-
-
-def random_moments(fit: Fit) -> list[ProcessNoise]:
-    """The random moments that may explain the residuals of a fit.
+def random_moments(fit: Fit, source: Source) -> list[ProcessNoise]:
+    """The random moments of a source that may explain the residuals of a fit.
 
     Returns:
-        The best fit of each form, and of the likeliest with a second part beside it where that pays; empty without
-        wind-on runs or where the model is not stable. A spectrum of another shape than first order has two parts
+        The best fit of each form, and of the likeliest with a second part beside it where that pays; empty where
+        it acts in no run, or the model is not stable. A spectrum of another shape than first order has two parts
         of one kind sooner than a part of another kind.
     """
-    channels, narrow, chosen = _channels(fit), _wandering(fit.problem.data), fit.settings.moment
-    forms = [form for form in (_BROAD, _CENTRED, narrow) if form is not None]
-    found = {form: one for form in forms if (one := _fit(channels, (form,))) is not None}
+    channels, narrow, chosen = _channels(fit), wandering(fit.problem.data), fit.settings.moment
+    if not channels:
+        return []
+    stream = (BROAD, CENTRED) if narrow is None else (BROAD, CENTRED, narrow)
+    own_forms = stream if source is STREAM else of_surroundings(_unit(channels))
+    found = {form: one for form in own_forms if (one := _fit(channels, (form,))) is not None}
     first = likeliest(found.values(), chosen)
     if first is None:
         return list(found.values())
     (own,) = (form for form in found if found[form] is first)
-    both = [_fit(channels, (own, other), first, chosen.part_price) for other in forms]
+    beside = own_forms if source is STREAM else (*own_forms, *stream)
+    both = [_fit(channels, (own, other), first, chosen.part_price) for other in beside]
     paying = (one for one in both if one is not None and _pays_in_all_runs(one, first, chosen))
     return [*found.values(), *paying]
 
@@ -181,22 +138,32 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMom
     It acts in all runs, while an error of the model is in those of one spring or speed. The scatter between the
     runs says how much of the fall may be chance.
     """
-    gains = both.drops - first.drops
+    alone = dict(zip(first.runs, first.drops.tolist(), strict=True))
+    gains = both.drops - np.array([alone.get(run, 0.0) for run in both.runs])
     if gains.size < 2:
         return False
     std = float(np.std(gains, ddof=1)) * np.sqrt(gains.size)
     return bool(gains.sum() - chosen.part_stds * std > chosen.part_price)
 
 
+def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:
+    """Whether a fall of −2 ln L shows a random moment.
+
+    Args:
+        drop: of −2 ln L, dimensionless.
+    """
+    return drop > chosen.acts_from
+
+
 def likeliest(tried: Iterable[ProcessNoise], chosen: RandomMomentSettings) -> ProcessNoise | None:
     """The random moment that explains residuals best; None where white noise explains them as well."""
-    acting = [one for one in tried if one.drop > chosen.acts_from]
+    acting = [one for one in tried if acts_by(one.drop, chosen)]
     return min(acting, key=lambda one: one.cost + one.price(chosen.part_price), default=None)
 
 
 def _fit(
     channels: Sequence[_Channel],
-    forms: Sequence[_Form],
+    forms: Sequence[Form],
     known: ProcessNoise | None = None,
     price: float = 0.0,
 ) -> ProcessNoise | None:
@@ -207,8 +174,9 @@ def _fit(
         price: what −2 ln L has to fall by for the last part to pay beside it, dimensionless.
 
     Returns:
-        None without channels, or where beside the known parts no point of the last one's grid pays.
+        None where they act in no run, or where beside the known parts no point of the last one's grid pays.
     """
+    every_run, channels = channels, [c for c in channels if any(form.source.acts(c.run) for form in forms)]
     if not channels:
         return None
     ends = np.cumsum([len(form.bounds) for form in forms])[:-1]
@@ -227,11 +195,13 @@ def _fit(
     every = [spectrum(x) for x in grid for _ in channels]
     costs = np.array([c for c, _ in _filtered(list(channels) * len(grid), every)]).reshape(len(grid), -1)
     totals = costs.sum(axis=1)
-    if known is not None and not totals.min() < known.cost - price:
+    if known is not None and not totals.min() < sum(c.white_cost for c in channels) - known.drop - price:
         return None
     start = grid[int(np.argmin(totals))]
     low, high = np.log([bound for form in forms for bound in form.bounds]).T
-    simplex = np.vstack([start, start + np.diag([step for form in forms for step in form.steps])])
+    steps = np.array([step for form in forms for step in form.steps])
+    inward = np.where(start + steps > high, -steps, steps)  # a simplex on a bound would never leave it
+    simplex = np.vstack([start, start + np.diag(inward)])
     found = minimize(
         cost,
         start,
@@ -244,26 +214,20 @@ def _fit(
             "initial_simplex": np.clip(simplex, low, high),
         },
     )
-    return _fitted(channels, spectrum(found.x), float(found.fun))
+    still = sum(c.white_cost for c in every_run if c not in channels)
+    return _fitted(channels, spectrum(found.x), float(found.fun) + still)
 
 
 def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> ProcessNoise:
     costs, innovations = zip(*_filtered(channels, [spectrum] * len(channels)), strict=True)
-    kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
     count = sum(i.size for i in innovations)
-    white = [float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True)]
-    drops = np.array(white) - np.array(costs)
-    # power of the response to a unit moment at the end of each run that began at rest, in that of the noise
-    unit = (SpectrumPart(1.0, LONGEST_BANDWIDTH),)
-    power = []
-    for channel, a, q in zip(channels, *_discrete(channels, [unit] * len(channels)), strict=True):
-        for _ in range(int(np.log2(channel.residual.size))):
-            a, q = a @ a, q + a @ q @ a.T
-        power.append(q[0, 0] / channel.variance)
+    drops = np.array([c.white_cost for c in channels]) - np.array(costs)
+    broad = tuple(SpectrumPart(part.intensity, LONGEST_BANDWIDTH, source=part.source) for part in spectrum)
     return ProcessNoise(
         spectrum,
+        tuple(c.run.id for c in channels),
         drops,
-        np.maximum(drops, 0.0) / np.array(power),
+        np.maximum(drops, 0.0) / _powers(channels, broad),
         cost,
         sum(float(i @ i) for i in innovations) / count - 1.0,
         list(innovations),
@@ -271,18 +235,63 @@ def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> Pr
     )
 
 
+def _powers(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
+    """Power of the response to a moment at the end of each run that began at rest, in that of the noise."""
+    power = []
+    for channel, a, q in zip(channels, *_discrete(channels, [spectrum] * len(channels)), strict=True):
+        for _ in range(int(np.log2(channel.residual.size))):
+            a, q = a @ a, q + a @ q @ a.T
+        power.append(q[0, 0] / channel.variance)
+    return np.array(power)
+
+
+def _unit(channels: Sequence[_Channel]) -> float:
+    """The moment of the surroundings whose response is as large as the noise in the median run, N m."""
+    one = (SpectrumPart(1.0, LONGEST_BANDWIDTH, source=SURROUNDINGS),)
+    return 1.0 / float(np.sqrt(np.median(_powers(channels, one))))
+
+
+def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
+    """Whether noise of the reading explains the runs better than a random moment does.
+
+    A zero that wanders, and coloured noise of the sensor, are of first order in the reading itself. A random moment
+    shows through the motion that it drives, whose spectrum has a peak at the natural frequency.
+    """
+    from scipy.signal import lfilter  # only here: slow to load
+
+    channels = [c for c in _channels(fit) if c.run.id in process.runs]
+    kept = [c.residual[_skip(c) :] for c in channels]
+    interval, variance = (np.array([getattr(c, name) for c in channels]) for name in ("interval", "variance"))
+
+    def cost(x: Array) -> float:
+        std, bandwidth = np.exp(x)
+        stay = np.exp(-2.0 * np.pi * bandwidth * interval)[:, None, None]
+        filters = steady_filters(stay, std**2 * (1.0 - stay**2), variance)
+        return sum(
+            _cost(lfilter(numerator, denominator, residual), spread)
+            for residual, (numerator, denominator, spread) in zip(kept, filters, strict=True)
+        )
+
+    noise = float(np.sqrt(np.median(variance)))
+    grid: Array = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
+    start = grid[int(np.argmin([cost(x) for x in grid]))]
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5})
+    return sum(c.white_cost for c in channels) - float(found.fun) > process.drop
+
+
 def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
-    """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
+    """The runs of a fit, with the response to a random moment in the noise of those in which it acts.
 
     Args:
         spectrum: of the moment.
 
     Returns:
-        The data, scaled as the innovations of the steady filter; None where no run is in the wind, or the filter
-        does not settle.
+        The data, scaled as the innovations of the steady filter; None where it acts in no run, or the filter does
+        not settle.
     """
     runs = list(fit.problem.data.runs)
-    channels = {i: c for i in range(len(runs)) if (c := _channel(fit, i, 0.0)) is not None}
+    acts = [i for i, run in enumerate(runs) if any(part.source.acts(run) for part in spectrum)]
+    channels = {i: c for i in acts if (c := _channel(fit, i, 0.0)) is not None}
     filters = _filters(list(channels.values()), [spectrum] * len(channels))
     for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
@@ -299,23 +308,25 @@ def _channels(fit: Fit) -> list[_Channel]:
 
 def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Channel | None:
     run = fit.problem.data.runs[run_index]
-    if not run.wind_on or run.derivative:  # the filter's reading is an angle
+    if run.derivative:  # the filter's reading is an angle
         return None
     inertia, damping, stiffness = linear_coefficients(fit, run_index)
     if stiffness <= 0.0 or damping <= 0.0:
         return None
     group = max(1, round(least_interval / run.interval))
     count = run.reading.size // group
+    if count < _FEWEST:
+        return None
     scale = run.noise.scale
     residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
     # residuals are white: the rig's response, a narrow band, has passed through the same filter
     passed = scale / float(run.noise_at(resonance(fit, run_index)))
     data = fit.problem.data
-    moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length / inertia
     oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
     reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
     interval = group * run.interval
-    return _Channel(residual, run.noise.variance / group, interval, oscillator, passed * moment, reduced)
+    variance = run.noise.variance / group
+    return _Channel(run, data, residual, variance, interval, oscillator, passed / inertia, reduced)
 
 
 def _skip(channel: _Channel) -> int:
@@ -332,9 +343,13 @@ def _filtered(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list
             results.append((np.inf, np.zeros(0)))
             continue
         innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
-        cost = float(innovations.size * np.log(spread) + innovations @ innovations / spread)
-        results.append((cost, innovations / np.sqrt(spread)))
+        results.append((_cost(innovations, spread), innovations / np.sqrt(spread)))
     return results
+
+
+def _cost(innovations: Array, spread: float) -> float:
+    """−2 ln L of innovations of a variance, without constants."""
+    return float(innovations.size * np.log(spread) + innovations @ innovations / spread)
 
 
 def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[Array, Array, float]]:
@@ -347,7 +362,7 @@ def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[
 def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
     """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra are of the same form.
 
-    States: angle, rate, and of each part the moment coefficient; about a centre, the coefficient's quadrature too.
+    States: angle, rate, and of each part the moment; about a centre, its quadrature too.
     """
     size = 2 + sum(part.states for part in spectra[0])
     dynamics = np.zeros((len(channels), size, size))
@@ -358,7 +373,7 @@ def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tupl
         for part in spectrum:
             places = range(first, first + part.states)
             corner = 2.0 * np.pi * part.bandwidth
-            own[1, first] = channel.moment
+            own[1, first] = channel.acceleration(part)
             own[places, places] = -corner
             if part.states == 2:
                 turn = 2.0 * np.pi * (part.centre + part.strouhal_number * channel.reduced)
@@ -368,64 +383,3 @@ def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tupl
     interval = np.array([channel.interval for channel in channels])
     transition, disturbance = discretised(dynamics, drive, interval)
     return transition, disturbance + 1e-18 * np.eye(size)
-
-
-def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
-    return (
-        departure_from_white(result) <= chosen.white_innovations
-        and bursts(result, chosen.burst_rate) <= chosen.burst_power
-        and of_all_runs(result) >= chosen.one_run_rate
-    )
-
-
-def departure_from_white(result: ProcessNoise) -> float:
-    """How far innovations are from white and steady.
-
-    Returns:
-        Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
-        its standard deviations.
-    """
-    departures = []
-    for innovations in result.innovations:
-        power = np.abs(np.fft.rfft(innovations - innovations.mean())) ** 2 / innovations.size
-        for part in np.array_split(power[1:], 8):
-            departures.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
-        for part in np.array_split(innovations, 4):
-            departures.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
-    return float(np.max(np.abs(departures)))
-
-
-def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
-    """The greatest power of innovations within a short time, divided by the greatest that chance explains.
-
-    A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run, up
-    to a quarter of it.
-
-    Args:
-        false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
-    """
-    lengths = [1 << k for k in range(20)]
-    windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
-    rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
-    highest = 0.0
-    for innovations, length in windows:
-        total = np.concatenate(([0.0], np.cumsum(innovations**2)))
-        power = float(np.max(total[length:] - total[:-length]))
-        highest = max(highest, power / float(chdtri(length, rate)))
-    return highest
-
-
-def of_all_runs(result: ProcessNoise) -> float:
-    """Probability that a random moment that acts in all runs shows in one of them as much as this one does.
-
-    A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
-    quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
-    n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
-
-    Returns:
-        The first term of Fisher's series, which is at least the probability; a fraction.
-    """
-    total = float(result.by_run.sum())
-    share = float(result.by_run.max()) / total if total > 0.0 else 0.0
-    return min(1.0, result.by_run.size * (1.0 - share) ** (result.by_run.size - 1))

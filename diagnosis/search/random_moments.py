@@ -1,14 +1,14 @@
 """Random moments: a layer of noise under every set of causes, and itself a cause.
 
-A strong random motion misleads least squares: the residuals of the wind-on runs are far from white, so that
-instants and weak effects are missed in them. Here sets are grown and fitted to rows in whose noise the rig's
+A strong random motion misleads least squares: the residuals of the runs in which it acts are far from white, so
+that instants and weak effects are missed in them. Here sets are grown and fitted to rows in whose noise the rig's
 response to the random moment is part. The random moment is estimated from what the best of them leaves, until both
 agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -27,12 +27,15 @@ from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (
     ProcessNoise,
-    is_steady_noise,
+    acts_by,
+    is_of_reading,
     likeliest,
     random_moments,
     with_response,
 )
+from diagnosis.search.random_spectra import SOURCES, Source
 from diagnosis.search.scatter import settled
+from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 
@@ -49,8 +52,8 @@ class RandomAnswer:
     Args:
         kinds: the effects that the parts of its spectrum are.
         beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
-        left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
-            one's, and the same in every channel.
+        left: what remains. The share is that of the innovations' and the other runs' excess in the nominal one's,
+            and the same in every channel.
     """
 
     kinds: tuple[type[Effect], ...]
@@ -71,52 +74,110 @@ class RandomAnswer:
 
 
 def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
-    """Try turbulence, and vortices with a wandering phase, under all sets of effects.
+    """Try turbulence, vortices with a wandering phase, and the surroundings, under all sets of effects.
 
     Args:
         view: in which they are fitted.
         hypotheses: those found without a random moment.
 
     Returns:
-        The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
-        than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes,
-        where the likeliest is of a kind that may not be named, where no random moment in the wind could leave
-        little enough of the gap, and where one law closes nearly all that the sets leave.
+        The likeliest random moment with the best set of effects beside it, and that of another source which
+        explains the runs about as well: runs in one wind cannot tell the stream from the surroundings. It must
+        lower −2 ln L beside the same set by more than a needless effect may, and be steady noise, alike in all runs
+        in which it acts. Empty where none passes, where the likeliest is of a kind that may not be named, where no
+        random moment could leave little enough of the gap, and where one law closes nearly all that the sets leave.
     """
-    nominal, able = view.base, view.able
-    allowed = {kind.random: kind for kind in view.prepared.kinds if kind.random}
-    chosen = nominal.settings.moment
-    scale = Scale.of(hypotheses, view.gap, nominal.settings.weighing)
-    best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
-    if not allowed or not _may_act(best, scale) or is_no_noise(best.fit):
+    scale = Scale.of(hypotheses, view.gap, view.base.settings.weighing)
+    best = max([Hypothesis((), view.base), *hypotheses], key=scale.weight)
+    if scale.greatest(best, repeating=False) <= scale.weight(best):
         return []
-    top = _settled(best, view)
-    for number in range(chosen.further_effects + 1):
-        if number > 0:  # a small effect that no gap shows may keep the innovations from being white
-            further = _evident(top, able)
-            if not further:
-                break
-            top = further[0]
-        seen = _seen_in(top, nominal.problem.data)
-        steady = [one for one in random_moments(seen.fit) if is_steady_noise(one, chosen)]
-        process = likeliest(steady, chosen)
-        if process is not None and not follows_the_motion(seen.fit) and not obeys_a_law(seen.fit):
-            bands = dict.fromkeys(part.band for part in process.spectrum)
-            if not bands.keys() <= allowed.keys():
-                return []
-            kinds = tuple(allowed[band] for band in bands)
-            excess = abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)
-            names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
-            share, by_channel = excess / view.repeating.gap, excess / nominal.gap * view.gap.excess
-            # of a random motion, taken for the sensor's noise, the runs would seem to differ
-            cost, numbers, compared = (
-                top.fit.scatter_cost(scale.known),
-                seen.further_numbers,
-                top.fit.compared,
-            )
-            left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
-            return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
-    return []
+    named = [source for source in SOURCES if any(source.may_be(kind) for kind in view.prepared.kinds)]
+    acting = [source for source in named if _may_act(source, best, scale)]
+    found, within = list[_Beside](), view.base.settings.moment.alike_within
+    for source in sorted(acting, key=lambda one: _explained(one, best)[0]) if len(acting) > 1 else acting:
+        if all(one.cost_from(source) < one.cost + within for one in found):
+            one = _Beside.found(source, best, view)
+            found += [] if one is None else [one]
+    least = min((one.cost for one in found), default=0.0)
+    likely = [one for one in found if one.cost < least + within]
+    return [answer for one in likely if (answer := one.answer()) is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A random moment of a source, and the best set of effects beside it.
+
+    Args:
+        top: the set with the response to the random moment in the noise.
+        seen: the same with the sensor's noise alone.
+    """
+
+    process: ProcessNoise
+    top: Hypothesis
+    seen: Hypothesis
+    view: View
+
+    @classmethod
+    def found(cls, source: Source, best: Hypothesis, view: View) -> _Beside | None:
+        """The steady noise of a source beside the effects that it leaves to be found; None where it is none."""
+        chosen = view.base.settings.moment
+        top = _settled(best, view, source)
+        for number in range(chosen.further_effects + 1):
+            if number > 0:  # a small effect that no gap shows may keep the innovations from being white
+                further = _evident(top, view.able)
+                if not further:
+                    break
+                top = further[0]
+            seen = _seen_in(top, view.base.problem.data)
+            steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
+            process = likeliest((one for one in steady if _shown_apart(one, source, seen.fit)), chosen)
+            if process is not None and _is_random(process, source, seen.fit):
+                return cls(process, top, seen, view)
+        return None
+
+    def cost_from(self, source: Source) -> float:
+        """The cost of a random moment of another source beside the same effects; infinite where none acts."""
+        known = self.seen.fit
+        cost, process = _explained(source, self.seen)
+        noisy = None if process is None else with_response(known, process.spectrum)
+        fitted = None if noisy is None else try_fit(replace(known.problem, data=noisy), known.point)
+        if fitted is None:
+            return cost
+        return _explained(source, replace(self.seen, fit=fit_at(known.problem, fitted.point)))[0]
+
+    @property
+    def cost(self) -> float:
+        """−2 ln L without constants of all runs, and the prices of parts and effects, dimensionless."""
+        return _cost(self.process, self.top)
+
+    def answer(self) -> RandomAnswer | None:
+        """What is weighed beside the sets; None where a part of the moment is of a kind that may not be named."""
+        view, seen, process = self.view, self.seen, self.process
+        allowed = [kind for kind in view.prepared.kinds if kind.random]
+        of_parts = [[kind for kind in allowed if part.is_of(kind)] for part in process.spectrum]
+        if not all(of_parts):
+            return None
+        kinds = tuple(dict.fromkeys(kinds[0] for kinds in of_parts))
+        excess = abs(process.excess) + max(excess_elsewhere(seen.fit, process.runs), 0.0)
+        names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
+        share, by_channel = excess / view.repeating.gap, excess / view.base.gap * view.gap.excess
+        # of a random motion, taken for the sensor's noise, the runs would seem to differ
+        cost = self.top.fit.scatter_cost(view.gap.known)
+        numbers, compared = seen.further_numbers, self.top.fit.compared
+        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
+        return RandomAnswer(kinds, process, seen if seen.effects else None, left)
+
+
+def _explained(source: Source, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
+    """The likeliest random moment of a source in what a set leaves, and its cost; infinite where none acts."""
+    process = likeliest(random_moments(beside.fit, source), beside.fit.settings.moment)
+    return (np.inf, None) if process is None else (_cost(process, beside), process)
+
+
+def _cost(process: ProcessNoise, beside: Hypothesis) -> float:
+    """−2 ln L without constants of all runs, with the prices of a moment's parts and of the effects beside it."""
+    chosen = beside.fit.settings.moment
+    return process.cost + process.price(chosen.part_price) + chosen.effect_price * len(beside.effects)
 
 
 def without_the_random_moment(
@@ -141,79 +202,117 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     """The set with one more effect that is evident beside the random moment, the most evident first.
 
     The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
-    the runs says how much of a fall of χ² is chance.
+    the runs says how much of a fall of χ² is chance. An effect with an instant of its own in every run must lower
+    χ² for each of them, too.
     """
     if len(top.effects) >= top.fit.settings.search.most_causes:
         return []
     able = {kind.name: kind for kind in kinds if not kind.line}
     larger = sets_with_one_more([top], list(able.values()))
-    gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
+    gains = []
+    for h in larger:
+        kind = able[h.effects[-1]]
+        numbers = 1 + len(kind.own_numbers(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
+        gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
 
 
-def _may_act(best: Hypothesis, scale: Scale) -> bool:
-    """Whether a random moment may be what the best set leaves.
+def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
+    """Whether a random moment of a source may be what the best set leaves.
 
-    With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong
-    random motion misleads the fit of the wind-off runs too.
+    With one in the wind that left nothing there the set would weigh more, or what is left is steady noise: a strong
+    random motion misleads the fit of the other runs too. One that acts in every run could leave nothing of any gap,
+    so that it must be steady noise.
     """
     runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
-    if not any(run.wind_on for run, _ in runs) or scale.greatest(best, repeating=False) <= scale.weight(best):
+    still = [run for run, _ in runs if not source.acts(run)]
+    if len(still) == len(runs):
         return False
-    still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
-    count, chosen = len(best.effects) + 1, best.fit.settings.moment
-    costs = best.fit.scatter_cost(scale.known), scale.scatter_cost
-    numbers, compared = best.further_numbers, best.fit.compared
-    if log_weight(still, scale.misfit, count, numbers, scale.chosen, costs, compared) > scale.weight(best):
-        return True
-    process = likeliest(random_moments(best.fit), chosen)
-    return process is not None and is_steady_noise(process, chosen)
+    if still:
+        left = misfit(best.fit, [np.zeros_like(r) if source.acts(run) else r for run, r in runs]).excess
+        count, compared = len(best.effects) + 1, best.fit.compared
+        costs = best.fit.scatter_cost(scale.known), scale.scatter_cost
+        weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, compared)
+        if weight > scale.weight(best):
+            return not is_no_noise(best.fit)
+    chosen = best.fit.settings.moment
+    process = likeliest(random_moments(best.fit, source), chosen)
+    if process is None or not _shown_apart(process, source, best.fit):
+        return False
+    if source.in_every_run and (is_of_reading(best.fit, process) or is_a_line(best.fit, process)):
+        return False
+    return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
 
 
-def wind_off_excess(fit: Fit) -> float:
-    """Mean squared scaled residual minus one of the wind-off runs; 0 where there are none."""
+def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
+    """Whether what a fit leaves is not noise of the reading, and follows no phase and no law."""
+    if source.in_every_run and is_of_reading(fitted, process):
+        return False
+    return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
+
+
+def _shown_apart(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
+    """Whether the runs in which no other source acts show a random moment too; true where there are none."""
+    others = [one for one in SOURCES if one is not source]
+    apart = {run.id for run in fitted.problem.data.runs if not any(one.acts(run) for one in others)}
+    drops = [drop for run, drop in zip(process.runs, process.drops.tolist(), strict=True) if run in apart]
+    return not drops or acts_by(sum(drops), fitted.settings.moment)
+
+
+def excess_elsewhere(fit: Fit, acts: Collection[str]) -> float:
+    """Mean squared scaled residual minus one of the runs in which a random moment does not act; 0 without any.
+
+    Args:
+        acts: ids of the runs in which it acts.
+    """
     off = [
         float(np.mean(residual**2)) - 1.0
         for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True)
-        if not run.wind_on
+        if run.id not in acts
     ]
     return float(np.mean(off)) if off else 0.0
 
 
-def follows_the_motion(fitted: Fit) -> bool:
-    """Whether residuals in the wind change the amplitude of the motion otherwise than its phase.
+def follows_the_motion(fitted: Fit, acts: Collection[str]) -> bool:
+    """Whether residuals change the amplitude of the motion otherwise than its phase.
 
     A random moment does not know the phase of the motion: what it adds along the motion and along the rate has the
     same power. A missing damping adds to the first, and a missing stiffness to the second.
 
+    Args:
+        acts: ids of the runs in which the random moment acts.
+
     Returns:
-        By Fisher's test of the ratio of the two powers. Every run in the wind counts as one degree of freedom of
-        each, since a slow random motion may have no more.
+        By Fisher's test of the ratio of the two powers. Every run in which it acts counts as one degree of freedom
+        of each, since a slow random motion may have no more.
     """
     runs = list(zip(fitted.problem.data.runs, fitted.residuals, strict=True))
-    windy = sum(run.wind_on for run, _ in runs)
+    count = sum(run.id in acts for run, _ in runs)
     seen = misfit(
-        fitted, [residual if run.wind_on else np.zeros_like(residual) for run, residual in runs]
+        fitted, [residual if run.id in acts else np.zeros_like(residual) for run, residual in runs]
     ).chi2
     along = {name: float(seen[CHANNELS.index(name)]) for name in CHANNELS}
     motion = along["damping"] + along["damping of runs"]
     rate = along["frequency"] + along["frequency of runs"]
     larger = max(motion, rate) / max(min(motion, rate), 1e-300)
-    return 2.0 * float(fdtrc(windy, windy, larger)) < fitted.settings.moment.phase_rate
+    return 2.0 * float(fdtrc(count, count, larger)) < fitted.settings.moment.phase_rate
 
 
-def obeys_a_law(fitted: Fit) -> bool:
-    """Whether most of what a fit leaves would be closed by one law of the wind, the same in all runs.
+def obeys_a_law(fitted: Fit, source: Source) -> bool:
+    """Whether most of what a fit leaves would be closed by one law, the same in all runs.
 
     A random moment is another one in every run, so that no law fitted to some runs predicts the others. A missing
     law of angle, rate and wind speed does, and a slow random moment would take its place.
 
+    Args:
+        source: of the random moment, which says what laws act in the same runs.
+
     Returns:
-        Whether the law of the wind (`diagnosis.likelihood.paths.wind`) closes enough on runs held out of its fit,
-        beyond chance.
+        Whether one of these laws (`diagnosis.likelihood.paths`) closes enough on runs held out of its fit, beyond
+        chance.
     """
-    return _closed_by_a_law(fitted, ["wind"], fitted.settings.moment.law_share)
+    return _closed_by_a_law(fitted, source.laws, fitted.settings.moment.law_share)
 
 
 def is_no_noise(fitted: Fit) -> bool:
@@ -227,8 +326,6 @@ def is_no_noise(fitted: Fit) -> bool:
 def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
     """Whether a law of some kind closes more than a share of what a fit leaves, on held-out runs."""
     unexplained = Unexplained(fitted)
-    if unexplained.held_out != "runs":  # no run can be left out
-        return False
     found, stds = (unexplained.common(kind).ceiling for kind in kinds), fitted.settings.moment.law_stds
     return any(one.closed - stds * one.std > share for one in found)
 
@@ -251,7 +348,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, view: View) -> Hypothesis:
+def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
     """The best set of effects on rows in whose noise the response to the random moment is part.
 
     The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
@@ -262,30 +359,24 @@ def _settled(best: Hypothesis, view: View) -> Hypothesis:
     """
     nominal, kinds, known, top = view.base, view.able, best.fit, best
     data, chosen = nominal.problem.data, nominal.settings.moment
-    windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
+    hidden = {kind.name for kind in kinds if source.condition in ("always", kind.condition)}
     reached: dict[tuple[str, ...], Hypothesis] = {}
-
-    def cost(hypothesis: Hypothesis) -> float:
-        process = likeliest(random_moments(_seen_in(hypothesis, data).fit), chosen)
-        if process is None:
-            return np.inf
-        price = process.price(chosen.part_price) + chosen.effect_price * len(hypothesis.effects)
-        return process.cost + price
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
-            process = likeliest(random_moments(known), chosen)
+            process = likeliest(random_moments(known, source), chosen)
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
             base = settled(fit(replace(nominal.problem, data=noisy), nominal.point))
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
-            # a random moment leaves little of a gap in the wind for effects to be compared there: more are added
-            # while one of the wind is evident, the most evident of all, so that none mops up what another leaves
+            # a random moment leaves little of a gap where it acts for effects to be compared there: more are added
+            # while one that is seen there alone is evident, the most evident of all, so that none mops up what
+            # another leaves
             top = _sought_again(found)
             further = _evident(top, kinds)
-            while any(h.effects[-1] in windy for h in further):
+            while any(h.effects[-1] in hidden for h in further):
                 top = further[0]
                 further = _evident(top, kinds)
             if top.names == best.names:
@@ -294,7 +385,7 @@ def _settled(best: Hypothesis, view: View) -> Hypothesis:
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
         if len(reached) > 1:  # to and fro between sets
-            top = min(reached.values(), key=cost)
+            top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
     return top
 
 

@@ -202,6 +202,14 @@ class RandomMomentSettings:
     part_stds: float = setting(
         2.0, "Scatter between the runs by which that fall must exceed its price.", "convention", unit="std"
     )
+    alike_within: float = setting(
+        20.0,
+        "Difference of −2 ln L below which two kinds of random moment explain the residuals alike.",
+        "judgement",
+        "As the fall from which one acts: a real spectrum is not first-order, and less is its form.",
+        unit="χ²",
+        decision="0046",
+    )
     effect_price: float = setting(
         20.0, "Fall of −2 ln L that an effect beside it must bring.", "judgement", BY_CHANCE, unit="χ²"
     )
@@ -257,6 +265,13 @@ class RandomMomentSettings:
         "Share of what is left that one law must close on held-out runs for no random moment to be sought.",
         "judgement",
         "At most a tenth of what is left is then another in every run.",
+    )
+    steady_line_share: float = setting(
+        0.9,
+        "Share of what is left that a line with a phase of its own in every run closes where the moment is a line.",
+        "judgement",
+        "A random moment of half-width b leaves a tenth to such a line where b is a twentieth over the duration.",
+        decision="0046",
     )
     law_stds: float = setting(2.0, "Scatter by which that share must be exceeded.", "convention", unit="std")
 

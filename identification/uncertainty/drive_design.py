@@ -1,7 +1,7 @@
 """The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
 
 Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
-and in the random moment of the plan's buffeting. The response is linear in the input, so that the amplitude
+and in the random moments of the plan. The response is linear in the input, so that the amplitude
 follows from the limits. Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identification (1977),
 ch. 6.
 """
@@ -58,8 +58,8 @@ class Limits:
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     """The bound of a plan's coefficients at its truth, of free decays and runs driven by a moment.
 
-    Of its effects only buffeting counts; its moment is taken as white with the intensity that it has at each
-    run's natural frequency.
+    Of its effects only random moments of a broad spectrum count; each is taken as white with the intensity that it
+    has at a run's natural frequency.
 
     Raises:
         TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
@@ -85,9 +85,10 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
         if any(effect.random == "broad_band" for effect in effects):
             moments = []
             for condition in plan.conditions:
-                scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
+                reference = aerodynamic_stiffness(1.0, **_air(condition, rig))
                 rate = sqrt(_decay(plan, condition, rig)[1])
-                moments.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
+                density = sum(effect.moment_density(rate, reference) for effect in effects)
+                moments.append(density / plan.truth.yaw_inertia**2)
     try:
         bound = campaign_bound(campaign, **asdict(plan.truth), noise_std=noise, random_moments=moments)
     except np.linalg.LinAlgError:

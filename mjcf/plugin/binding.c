@@ -121,6 +121,9 @@ static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* 
   if (self->drive >= 0) {
     *(on_end ? &law.mechanism : &law.air) += drive;
   }
+  if (self->ambient >= 0) {
+    law.air += series_at(m, self->ambient, self->ambient_interval, at->time);
+  }
   return law;
 }
 

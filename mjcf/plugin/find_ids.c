@@ -44,7 +44,7 @@ static void check_series(const mjModel* m, int values, int interval, const char*
 
 // A coefficient whose name is misspelt would silently stay zero.
 static void check_names(const mjModel* m) {
-  static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval",
+  static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval", "ambient", "ambient_interval",
                                       "drive", "drive_interval", "drive_held", "drive_on_end", "moment_program"};
   const int count = sizeof(series) / sizeof(series[0]);
   for (int i = 0; i < m->nnumeric; i++) {
@@ -83,11 +83,14 @@ static void find_series(const mjModel* m, vwt_ids* self) {
   self->wind_interval = find_numeric(m, "wind_speed_interval");
   self->forcing = find_numeric(m, "forcing");
   self->forcing_interval = find_numeric(m, "forcing_interval");
+  self->ambient = find_numeric(m, "ambient");
+  self->ambient_interval = find_numeric(m, "ambient_interval");
   if (self->wind_speed < 0) {
     mju_error("vwt.yaw_moment: numeric wind_speed is missing; give it in m/s, 0 for wind-off");
   }
   check_series(m, self->wind_speed, self->wind_interval, "wind_speed");
   check_series(m, self->forcing, self->forcing_interval, "forcing");
+  check_series(m, self->ambient, self->ambient_interval, "ambient");
   find_drive(m, self);
   for (int i = 0; i < m->numeric_size[self->wind_speed]; i++) {
     if (m->numeric_data[m->numeric_adr[self->wind_speed] + i] < 0) {

@@ -53,6 +53,11 @@ static double root_at(const Step* s, double time) {
   return moment != 0 && s->p->spring_stiffness > 0 ? moment / s->p->spring_stiffness : 0;
 }
 
+// The moment of the surroundings on the body, N m.
+static double ambient_at(const vwt_run* run, double time) {
+  return run->ambient_count > 0 ? vwt_series(run->ambient, (int)run->ambient_count, run->ambient_interval, time) : 0;
+}
+
 static double air_at(const Step* s, double duration, const Motion* y) {
   const double time = s->start + duration;
   const vwt_air_state air = {
@@ -65,7 +70,7 @@ static double air_at(const Step* s, double duration, const Motion* y) {
                                                         s->run->forcing_interval, time)
                                            : 0,
   };
-  return vwt_air_moment(s->p, &air) + drive_at(s, time, 0);
+  return vwt_air_moment(s->p, &air) + drive_at(s, time, 0) + ambient_at(s->run, time);
 }
 
 // The moment stated as an expression.

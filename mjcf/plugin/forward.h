@@ -23,6 +23,9 @@
   POINTER(forcing)         /* 1, forcing_count samples at forcing_interval s */     \
   NUMBER(forcing_count)    /* 0: none */                                            \
   NUMBER(forcing_interval)                                                          \
+  POINTER(ambient)         /* N m, ambient_count samples at ambient_interval s */   \
+  NUMBER(ambient_count)    /* 0: none */                                            \
+  NUMBER(ambient_interval)                                                          \
   POINTER(moment)          /* of the drive: moment_count samples, any unit */       \
   POINTER(moment_time)     /* s, of these samples, increasing */                    \
   NUMBER(moment_count)     /* 0: none */                                            \

@@ -22,6 +22,7 @@ typedef struct {
   int joint, twist_joint;
   int wind_speed, wind_interval;          // ids of numerics; intervals -1 where constant
   int forcing, forcing_interval;          // ids of numerics, -1 where absent
+  int ambient, ambient_interval;          // ids of numerics, -1 where absent
   int drive, drive_interval;              // ids of numerics, -1 where absent
   int drive_held, drive_on_end;           // ids of numerics, -1 where absent
   int aero_lag, presliding;               // ids of numerics, -1 where absent
@@ -45,7 +46,7 @@ typedef struct {
   double time, angle, rate, twist, twist_rate;
 } vwt_motion;
 
-// The moments of the law and the drive except friction, N m: on the body, and on the rod's upper end.
+// The moments of the law, the drive and the surroundings except friction, N m: on the body, and on the rod's upper end.
 typedef struct {
   double air, mechanism;
 } vwt_moments;

@@ -8,8 +8,9 @@
 
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
   const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
-  return steady && run->forcing_count == 0 && run->moment_count == 0 && run->program_count == 0 &&
-         run->twist_stiffness == 0 && run->twist == 0 && run->twist_rate == 0 && !(p->presliding > 0);
+  return steady && run->forcing_count == 0 && run->ambient_count == 0 && run->moment_count == 0 &&
+         run->program_count == 0 && run->twist_stiffness == 0 && run->twist == 0 && run->twist_rate == 0 &&
+         !(p->presliding > 0);
 }
 
 int vwt_alike(const vwt_run* one, const vwt_run* other) {

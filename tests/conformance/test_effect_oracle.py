@@ -16,7 +16,16 @@ from _pytest.mark import ParameterSet
 
 from tests.reference import effect_oracle as oracle
 from tests.reference.effect_cases import ON_DRIVEN_RUNS, VALUES, VOCABULARY, settings
-from tests.reference.effect_oracle import NOTHING, SOLVED, Setting, buffeted, fitted_phase, reading
+from tests.reference.effect_oracle import (
+    NOTHING,
+    RANDOM,
+    SOLVED,
+    Setting,
+    fitted_phase,
+    pressure,
+    reading,
+    under_moment,
+)
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -56,7 +65,7 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     *(
         (name, values, RUN)
         for name, values in VALUES.items()
-        if name in SOLVED - {"buffeting", "sensor_quantisation"}
+        if name in SOLVED - {*RANDOM, "sensor_quantisation"}
     ),
     ("coulomb_friction", {"friction_moment": 0.4}, RUN),  # comes to rest within the run
     ("coulomb_friction", {"friction_moment": 0.02}, replace(RUN, spring=67.98, speed=0.0, release=-0.2)),
@@ -200,7 +209,7 @@ def test_a_law_that_jumps_needs_the_tolerance_that_its_class_states() -> None:
 
 
 def test_every_effect_is_compared() -> None:
-    compared = {name for name, _, _ in VARIANTS} | {"buffeting", "sensor_quantisation"}
+    compared = {name for name, _, _ in VARIANTS} | {*RANDOM, "sensor_quantisation"}
     assert compared == SOLVED
     # those of actuators in tests/unit/driven/test_actuators.py
     assert compared | set(REFERRED) | ON_DRIVEN_RUNS == set(VOCABULARY)
@@ -252,13 +261,42 @@ def test_a_resolution_finer_than_stated_changes_nothing() -> None:
     assert effect.on_sensor(SensorModel(resolution=0.0)).resolution == 0.001
 
 
-def test_buffeting_matches_the_linear_rig_under_the_same_moment() -> None:
-    effect = effect_from("buffeting", VALUES["buffeting"])
-    series = drawn_chain(effect, RUN).physics().series["forcing"]
-    expected = buffeted(np.array(series.values), series.interval, RUN)
+@pytest.mark.parametrize(
+    ("name", "speed"), [("buffeting", 20.0), ("ambient_vibration", 20.0), ("ambient_vibration", 0.0)]
+)
+def test_a_random_moment_moves_the_rig_as_the_linear_rig_under_the_same_moment(
+    name: str, speed: float
+) -> None:
+    effect, run = effect_from(name, VALUES[name]), replace(RUN, speed=speed)
+    ((source, series),) = drawn_chain(effect, run).physics().series.items()
+    of_one = pressure(speed) if source == "forcing" else 1.0  # a moment coefficient, or a moment in N m
+    expected = under_moment(of_one * np.array(series.values), series.interval, run)
     for forward in (False, True):
-        assert np.max(np.abs(simulated([effect], RUN, forward=forward) - expected)) < SMOOTH
-    assert np.max(np.abs(expected - nominal_reading(RUN))) > 1e-3
+        assert np.max(np.abs(simulated([effect], run, forward=forward) - expected)) < SMOOTH
+    assert np.max(np.abs(expected - nominal_reading(run))) > 1e-3
+
+
+def test_a_random_moment_of_the_surroundings_does_not_depend_on_the_wind() -> None:
+    effect = effect_from("ambient_vibration", VALUES["ambient_vibration"])
+    still, blown, faster = (
+        drawn_chain(effect, replace(RUN, speed=speed)).physics().series["ambient"]
+        for speed in (0.0, 15.0, 25.0)
+    )
+    assert still == blown == faster
+    assert (
+        not drawn_chain(effect_from("buffeting", VALUES["buffeting"]), replace(RUN, speed=0.0))
+        .physics()
+        .series
+    )
+
+
+def test_both_random_moments_act_at_once() -> None:
+    effects = [effect_from(name, VALUES[name]) for name in RANDOM]
+    series = EffectChain.draw(settings(RUN), effects, np.random.default_rng(3)).physics().series
+    both = pressure(RUN.speed) * np.array(series["forcing"].values) + np.array(series["ambient"].values)
+    expected = under_moment(both, series["ambient"].interval, RUN)
+    for forward in (False, True):
+        assert np.max(np.abs(simulated(effects, RUN, forward=forward) - expected)) < SMOOTH
 
 
 def random_moment(intensity: float, bandwidth: float, duration: float, seed: int) -> np.ndarray:

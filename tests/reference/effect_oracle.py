@@ -84,7 +84,7 @@ def reading(name: str, p: Parameters, run: Setting, *, own: float = 0.0) -> np.n
     """The reading without zero, noise and rounding, rad, at the run's sample times.
 
     `own` is what the run has drawn: the phase of a periodic effect, or how many standard deviations a number of the
-    run lies from what is stated. Buffeting has a function of its own.
+    run lies from what is stated. Random moments have a function of their own.
     """
     if name in SENSOR:
         return SENSOR[name](reading("", NOTHING, run), p, run, own)
@@ -101,8 +101,8 @@ def reading(name: str, p: Parameters, run: Setting, *, own: float = 0.0) -> np.n
     return _smooth(_total(name, p, run, own), run)
 
 
-def buffeted(forcing: np.ndarray, interval: float, run: Setting) -> np.ndarray:
-    """The linear rig under a sampled moment coefficient, linear between its samples."""
+def under_moment(moment: np.ndarray, interval: float, run: Setting) -> np.ndarray:
+    """The reading of the linear rig under a sampled moment in N m, linear between its samples, rad."""
     stiffness = run.spring - pressure(run.speed) * CN_BETA
     damping = DAMPING - air_damping(run.speed)
     system = StateSpace(
@@ -111,9 +111,9 @@ def buffeted(forcing: np.ndarray, interval: float, run: Setting) -> np.ndarray:
         [[1.0, 0.0]],
         [[0.0]],
     )
-    times = interval * np.arange(forcing.size)
+    times = interval * np.arange(moment.size)
     assert interval * run.sample_rate == 1.0  # its samples are the sensor's
-    states: Any = lsim(system, pressure(run.speed) * forcing, times, X0=[run.release, 0.0])  # type: ignore[call-overload]
+    states: Any = lsim(system, moment, times, X0=[run.release, 0.0])  # type: ignore[call-overload]
     return np.asarray(states[1])[: run.times.size]
 
 
@@ -351,10 +351,12 @@ SENSOR: dict[str, Callable[[np.ndarray, Parameters, Setting, float], np.ndarray]
     "sensor_clipping": lambda b, p, _run, _phase: np.minimum(np.maximum(b, -p["limit"]), p["limit"]),
 }
 
+#: Random moments, which are compared under the moment that they draw.
+RANDOM = ("buffeting", "ambient_vibration")
 #: The effects that are solved here; the others are compared with the reference simulator.
 SOLVED = {
     *SENSOR, *ADDED, *OTHER_CONDITIONS, *BETWEEN_RUNS, "coulomb_friction", "free_play", "rod_flexibility",
-    "unsteady_aero_lag", "buffeting",
+    "unsteady_aero_lag", *RANDOM,
 }  # fmt: skip
 
 

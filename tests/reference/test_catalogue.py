@@ -13,7 +13,7 @@ from tunnel_reference.catalogue import Group
 from tunnel_reference.conditions import Input
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
-from tunnel_reference.moments import turbulence
+from tunnel_reference.moments import shaking, turbulence
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
@@ -126,6 +126,16 @@ def test_turbulence_has_unit_variance_and_is_still_wind_off(kind):
     series = turbulence(kind, c, seed=1, scale=5.0 if kind in ("band", "octave") else 0.5)
     assert np.all(series[0] == 0.0)
     assert np.mean(series[1:] ** 2) == pytest.approx(1.0, rel=0.1)
+
+
+@pytest.mark.parametrize("kind", ["flat", "corner", "floor", "octave", "traffic"])
+def test_what_shakes_the_rig_has_unit_variance_in_every_run(kind):
+    c = rig(stiffness=(20.0,) * 60, speed=(0.0, 25.0) * 30, angle=(0.3,) * 60, duration=10.0)
+    series = shaking(kind, c, seed=1, scale=20.0 if kind in ("flat", "traffic") else 5.0, ratio=0.2)
+    for half in (series[::2], series[1::2]):  # with the wind off, and on
+        # lognormal swelling of 0.2 raises the mean square by e^(2 · 0.04)
+        assert np.mean(half**2) == pytest.approx(np.exp(0.08) if kind == "traffic" else 1.0, rel=0.15)
+    assert np.max(np.abs(np.corrcoef(series)[~np.eye(60, dtype=bool)])) < 0.9  # of its own in every run
 
 
 def test_pairs_with_a_calibration_effect_bind_both():

@@ -210,7 +210,7 @@ def plan_drive(
 
     from identification.uncertainty.drive_design import Limits, peak_response, plan_bound, propose_drive
     from tunnel_lab.envs.menu import Costs
-    from tunnel_sim.effects import ALL_EFFECTS
+    from tunnel_sim.effects import the_effect
     from tunnel_sim.engine.virtual_campaign import plan_effects
     from tunnel_sim.files.plan_file import EffectTable, check_size, plan_from, read_plan, run_count
     from tunnel_sim.files.rig_file import load_rig
@@ -232,7 +232,7 @@ def plan_drive(
     refuse_unwritable_files(out)
     document, rig, where = read_plan(plan), load_rig(), shown(plan)
     if buffeting is not None:  # of the bandwidth that the plan states
-        kind = next(kind for kind in ALL_EFFECTS if kind.random == "broad_band")
+        kind = the_effect(random="broad_band", condition="wind_on")
         stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
         kept = [effect for effect in document.effects if effect.name != kind.name]
         if buffeting:

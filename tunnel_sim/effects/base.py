@@ -298,16 +298,17 @@ class Effect:
         del stiffness
         return 0.0
 
-    def moment_density(self, rate: float) -> float:
+    def moment_density(self, rate: float, reference_moment: float) -> float:
         """Spectral intensity of the effect's random moment, as if it were white.
 
         Args:
             rate: angular frequency of the motion, rad/s.
+            reference_moment: ½ρV²Al of the run, N m; 0 with the wind off.
 
         Returns:
-            q of the moment coefficient with the wind on, ⟨c(t)c(t′)⟩ = q δ(t − t′), s; 0 without a broad spectrum.
+            q of the moment, ⟨M(t)M(t′)⟩ = q δ(t − t′), (N m)² s; 0 without a broad spectrum.
         """
-        del rate
+        del rate, reference_moment
         return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:

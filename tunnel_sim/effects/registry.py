@@ -166,8 +166,8 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
     own = [kind for kind in kinds if kind not in ALL_EFFECTS]
     for kind in own:
         check_kind(kind)
-    for band in {kind.random for kind in own if kind.random}:
-        same = [kind.name for kind in kinds if kind.random == band]
+    for spectrum in {(kind.random, kind.condition) for kind in own if kind.random}:
+        same = [kind.name for kind in kinds if (kind.random, kind.condition) == spectrum]
         if len(same) > 1:
             what = f"has the spectrum of {same[0]}, and no run could tell them apart"
             raise TunnelError(what, where=f"effect {same[-1]}", remedy="leave one of them out")

@@ -138,7 +138,7 @@ def marks_mesh(rig: Rig) -> Mesh:
     return merged_mesh(parts)
 
 
-_SERIES = ("wind_speed", "forcing")
+_SERIES = ("wind_speed", "forcing", "ambient")
 _THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
 _COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; only copies are given away
 _MOST_COMPILED = 16

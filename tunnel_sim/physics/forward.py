@@ -72,7 +72,9 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
+    ambient = settings.series.get("ambient")
     imposed = _NONE if forcing is None else np.array(forcing.values, dtype=np.float64)
+    beside = _NONE if ambient is None else np.array(ambient.values, dtype=np.float64)
     program = np.array(settings.program, dtype=np.float64) if settings.program else _NONE
     drive = None if settings.drive is None else settings.drive.acting
     driven = () if drive is None else (drive.values, drive.time_s)
@@ -83,6 +85,9 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         "forcing": imposed.ctypes.data,
         "forcing_count": imposed.size,
         "forcing_interval": forcing.interval if forcing is not None else 0.0,
+        "ambient": beside.ctypes.data,
+        "ambient_count": beside.size,
+        "ambient_interval": ambient.interval if ambient is not None else 0.0,
         "program": program.ctypes.data,
         "program_count": program.size,
         "angle": settings.release_angle,
@@ -113,7 +118,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     names = run_dtype().names
     assert names is not None
     row = tuple(fields.get(name, 0) for name in names)  # in one go: setting fields one by one is slow
-    return np.array([row], dtype=run_dtype()), (values, imposed, program, *driven)
+    return np.array([row], dtype=run_dtype()), (values, imposed, beside, program, *driven)
 
 
 def backlash(angle: Array, half_width: float, start: float) -> Array:

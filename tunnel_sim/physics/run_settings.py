@@ -255,7 +255,8 @@ class RunSettings:
         duration, timestep: of the run, and of an integration step, s.
         parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
             zero.
-        series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
+        series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient, and
+            ``ambient``, a moment on the body that needs no wind, in N m.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from benchmarks.causes.entry import About, answer_of, main
+from benchmarks.causes.entry import KINDS, About, answer_of, main
 from diagnosis.blind.cases import SCATTERING
 
 ABOUT = About("tunnel diagnose", "as delivered, no option")
@@ -19,7 +19,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """
     from diagnosis import diagnose
 
-    found = diagnose(folder).to_json_dict()
+    found = diagnose(folder, kinds=KINDS).to_json_dict()
     sets = [(_names(c["effect"]), float(c["probability"])) for c in found["candidates"]]
     probability = dict(found["inclusion"])
     probability["unknown"] = sum(p for names, p in sets if names == ("unknown",))

@@ -15,15 +15,10 @@ from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.process_noise import (
-    SpectrumPart,
-    bursts,
-    departure_from_white,
-    is_steady_noise,
-    of_all_runs,
-    with_response,
-)
-from diagnosis.search.random_moments import is_no_noise, obeys_a_law, weigh_random_moments, wind_off_excess
+from diagnosis.search.process_noise import with_response
+from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
+from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
+from diagnosis.search.steady_noise import bursts, departure_from_white, is_steady_noise, of_all_runs
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit.gap_campaigns import (
@@ -82,11 +77,11 @@ def random_response(rng, spring, speed, intensity, bandwidth):
 
 
 def fit_turbulence(base, *, centred=False):
-    return pn._fit(pn._channels(base), (pn._CENTRED if centred else pn._BROAD,))
+    return pn._fit(pn._channels(base), (CENTRED if centred else BROAD,))
 
 
 def fit_wandering_shedding(base):
-    return pn._fit(pn._channels(base), (pn._wandering(base.problem.data),))
+    return pn._fit(pn._channels(base), (wandering(base.problem.data),))
 
 
 @pytest.fixture(scope="module")
@@ -168,9 +163,9 @@ def deflected(data, coefficient):
 
 def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     base = nominal(deflected(campaign(), 0.005))
-    assert obeys_a_law(base)
+    assert obeys_a_law(base, STREAM)
     assert weigh_random_moments(whole_runs(base, BOTH), []) == []
-    monkeypatch.setattr(random_moments, "obeys_a_law", lambda _: False)
+    monkeypatch.setattr(random_moments, "obeys_a_law", lambda *_: False)
     assert is_no_noise(base)  # so that none is even sought
     assert weigh_random_moments(whole_runs(base, BOTH), []) == []
     monkeypatch.setattr(random_moments, "is_no_noise", lambda _: False)
@@ -181,7 +176,7 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
 def test_a_random_moment_obeys_no_law(bandwidth):
     for seed in range(2):
         blown = nominal(buffeted(campaign(), 0.01, bandwidth, seed))
-        assert not obeys_a_law(blown)
+        assert not obeys_a_law(blown, STREAM)
         assert not is_no_noise(blown)
 
 
@@ -224,7 +219,7 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     found = answer.beside.fit
     assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
     assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
-    assert abs(wind_off_excess(found)) < 0.1
+    assert abs(excess_elsewhere(found, answer.process.runs)) < 0.1
 
 
 @pytest.mark.slow
@@ -240,7 +235,7 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     found = answer.beside.fit
     assert found.value("coulomb_friction.friction_moment") == pytest.approx(0.003, rel=0.05)
     assert found.value("cubic_stiffness.coefficient") == pytest.approx(-0.03, rel=0.05)
-    assert abs(wind_off_excess(found)) < 0.1
+    assert abs(excess_elsewhere(found, answer.process.runs)) < 0.1
 
 
 def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
@@ -328,7 +323,7 @@ def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(mo
 
 def test_a_gap_in_still_air_is_no_buffeting():
     fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
-    assert wind_off_excess(fit) > 0.1
+    assert excess_elsewhere(fit, fit_turbulence(fit).runs) > 0.1
     assert weigh_random_moments(whole_runs(fit, BOTH), []) == []
 
 
@@ -417,7 +412,7 @@ def test_vortices_beside_a_slow_error_of_one_run_have_one_part(monkeypatch):
     base = nominal(replace(data, runs=(*others, last)))
 
     def second_parts():
-        return {part.band for one in pn.random_moments(base) for part in one.spectrum[1:]}
+        return {part.band for one in pn.random_moments(base, STREAM) for part in one.spectrum[1:]}
 
     assert "broad_band" not in second_parts()
     monkeypatch.setattr(pn, "_pays_in_all_runs", lambda *_: True)
@@ -437,7 +432,7 @@ def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence
         return 0.03 * found / np.std(found)
 
     base = nominal(with_moment(campaign(), octave))
-    found = pn.likeliest(pn.random_moments(base), Settings().moment)
+    found = pn.likeliest(pn.random_moments(base, STREAM), Settings().moment)
     assert [part.band for part in found.spectrum] == ["broad_band", "broad_band"]
     (answer,) = weigh_random_moments(whole_runs(base, BOTH), [])
     assert answer.effects == ("buffeting",)

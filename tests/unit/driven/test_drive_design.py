@@ -137,12 +137,17 @@ def test_without_sensor_noise_the_bound_is_that_of_a_regression(free: PlanDocume
 
 
 def test_the_density_is_that_of_the_drawn_moment() -> None:
-    effect = effect_class("buffeting")(intensity=0.02, bandwidth=8.0)
     # its integral over all frequencies (Hz, both signs) is the variance
     rates = 2.0 * np.pi * np.linspace(-4000.0, 4000.0, 400_001)
-    density = [effect.moment_density(rate) for rate in rates]
-    assert np.trapezoid(density, rates) / (2.0 * np.pi) == pytest.approx(0.02**2, rel=2e-3)
-    assert effect_class("coulomb_friction")(0.01).moment_density(10.0) == 0.0
+    for effect, pressure, std in (
+        (effect_class("buffeting")(intensity=0.02, bandwidth=8.0), 5.0, 0.1),
+        (effect_class("buffeting")(intensity=0.02, bandwidth=8.0), 0.0, 0.0),  # with the wind off
+        (effect_class("ambient_vibration")(moment=0.02, bandwidth=8.0), 5.0, 0.02),
+        (effect_class("ambient_vibration")(moment=0.02, bandwidth=8.0), 0.0, 0.02),
+    ):
+        density = [effect.moment_density(rate, pressure) for rate in rates]
+        assert np.trapezoid(density, rates) / (2.0 * np.pi) == pytest.approx(std**2, rel=2e-3)
+    assert effect_class("coulomb_friction")(0.01).moment_density(10.0, 5.0) == 0.0
 
 
 def test_what_cannot_be_planned_is_refused(free: PlanDocument) -> None:

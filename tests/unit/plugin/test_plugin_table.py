@@ -14,7 +14,7 @@ from tunnel_sim.physics.moment_law import parameter_names, parameter_units, para
 
 README = (Path(__file__).parents[3] / "mjcf" / "plugin" / "README.md").read_text(encoding="utf-8")
 INPUTS = ("wind_speed", "wind_speed_interval", "forcing", "forcing_interval", "moment_program")
-INPUTS += ("drive", "drive_interval", "drive_held", "drive_on_end")
+INPUTS += ("ambient", "ambient_interval", "drive", "drive_interval", "drive_held", "drive_on_end")
 
 
 def _rows(heading: str) -> dict[str, list[str]]:

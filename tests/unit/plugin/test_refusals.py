@@ -96,6 +96,8 @@ def test_numeric_of_another_program() -> None:
         ({**SERIES, "wind_speed_interval": "-0.5"}, "wind_speed_interval must be one positive number"),
         ({**SERIES, "wind_speed_interval": "0.5 0.5"}, "wind_speed_interval must be one positive number"),
         ({"forcing_interval": "0.1"}, "forcing_interval is given without forcing"),
+        ({"ambient": "0.1 0.2"}, "give its ambient_interval"),
+        ({"ambient_interval": "0.1"}, "ambient_interval is given without ambient"),
         ({"drive": "0.1"}, "give its drive_interval"),
         ({"drive_held": "1"}, "drive_held is given without drive"),
     ],
@@ -105,7 +107,7 @@ def test_series(numerics: dict[str, str], message: str) -> None:
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-@pytest.mark.parametrize("name", ["cn_beta", "aero_lag", "wind_speed", "forcing"])
+@pytest.mark.parametrize("name", ["cn_beta", "aero_lag", "wind_speed", "forcing", "ambient"])
 def test_not_finite(name: str, value: float) -> None:
     # XML gives a warning for NaN on its own; a specification in Python does not
     spec = mujoco.MjSpec.from_string(small_model({name: None}))

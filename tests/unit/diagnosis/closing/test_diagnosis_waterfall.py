@@ -24,8 +24,9 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.run_data import FOLDS
 from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.process_noise import ProcessNoise, SpectrumPart
+from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.random_spectra import SpectrumPart
 from diagnosis.search.study import Answer
 from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import Settings
@@ -154,8 +155,9 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     """Where the wind is off the runs' own residuals are left, and nothing beside the moment is taken out."""
     kind = effect_class("buffeting")
     best = added(base, IDLE)
+    windy = tuple(run.id for run in data.runs if run.wind_on)
     process = ProcessNoise(
-        (SpectrumPart(0.01, 5.0),), np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
+        (SpectrumPart(0.01, 5.0),), windy, np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
     )
     random = RandomAnswer(
         (kind,), process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))

@@ -1,0 +1,98 @@
+"""Whether what a random moment's filter leaves is steady noise, alike in all runs, and the moment no line."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import residual_spectra
+from diagnosis.search.process_noise import ProcessNoise
+from diagnosis.settings import RandomMomentSettings
+
+_LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
+
+
+def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
+    """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
+    return (
+        departure_from_white(result) <= chosen.white_innovations
+        and bursts(result, chosen.burst_rate) <= chosen.burst_power
+        and of_all_runs(result) >= chosen.one_run_rate
+    )
+
+
+def departure_from_white(result: ProcessNoise) -> float:
+    """How far innovations are from white and steady.
+
+    Returns:
+        Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
+        its standard deviations.
+    """
+    departures = []
+    for innovations in result.innovations:
+        power = np.abs(np.fft.rfft(innovations - innovations.mean())) ** 2 / innovations.size
+        for part in np.array_split(power[1:], 8):
+            departures.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
+        for part in np.array_split(innovations, 4):
+            departures.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
+    return float(np.max(np.abs(departures)))
+
+
+def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
+    """The greatest power of innovations within a short time, divided by the greatest that chance explains.
+
+    A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run, up
+    to a quarter of it.
+
+    Args:
+        false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
+    """
+    lengths = [1 << k for k in range(20)]
+    windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
+    rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
+    highest = 0.0
+    for innovations, length in windows:
+        total = np.concatenate(([0.0], np.cumsum(innovations**2)))
+        power = float(np.max(total[length:] - total[:-length]))
+        highest = max(highest, power / float(chdtri(length, rate)))
+    return highest
+
+
+def of_all_runs(result: ProcessNoise) -> float:
+    """Probability that a random moment that acts in all runs shows in one of them as much as this one does.
+
+    A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
+    quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
+    n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
+
+    Returns:
+        The first term of Fisher's series, which is at least the probability; a fraction.
+    """
+    total = float(result.by_run.sum())
+    share = float(result.by_run.max()) / total if total > 0.0 else 0.0
+    return min(1.0, result.by_run.size * (1.0 - share) ** (result.by_run.size - 1))
+
+
+def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
+    """Whether a line at one frequency, with a phase of its own in every run, is nearly all that a fit leaves.
+
+    The phase of a random moment about a frequency wanders. Without a centre it is no line: the rig's own response
+    is narrow, and the release of every run absorbs what is steady at its frequency.
+
+    Args:
+        fit: by least squares in the sensor's noise, in which the release has absorbed its part.
+        process: the likeliest in what it leaves.
+    """
+    runs = fit.problem.data.runs
+    spectra = [one for run, one in zip(runs, residual_spectra(fit), strict=True) if run.id in process.runs]
+    drops = [0.0]
+    for part in process.spectrum:
+        if part.centre > 0.0:
+            reach = _LINE_WIDTHS * max(part.bandwidth, 1.0 / max(one.duration for one in spectra))
+            near = np.linspace(part.centre - reach, part.centre + reach, 201)
+            drops.append(float(np.max(np.sum([one.power(np.abs(near)) for one in spectra], axis=0))))
+    left = (
+        float(r @ r) - r.size for run, r in zip(runs, fit.residuals, strict=True) if run.id in process.runs
+    )
+    return max(drops) > fit.settings.moment.steady_line_share * sum(left)
