@@ -292,7 +292,34 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     left = len(document["runs"]) - SHOWN_RUNS
     more = f"and {counted(left, 'more run')}, which runs_frame() lists" if left > 0 else ""
     tables: list[str | TextTable] = [coefficients_table(document), runs_table(document), more]
-    return [*tables, *repeatability_lines(document), *(f"Note: {note}" for note in notes)]
+    beside = (*repeatability_lines(document), trade_off_line(document, SYMBOLS))
+    return [*tables, *beside, *(f"Note: {note}" for note in notes)]
+
+
+def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
+    """The two parameters that the runs separate least, and the run that would; empty where there are none.
+
+    Args:
+        document: of an estimate or a diagnosis.
+        symbols: of the parameters that have one, by name.
+    """
+    found = document.get("trade_off")
+    if found is None:
+        return ""
+    one, other = (_parameter_label(name, symbols) for name in found["parameters"])
+    correlation = f"{abs(found['correlation']):.3g}"
+    sign = "−" if found["correlation"] < 0.0 else ""
+    return (
+        f"What trades off: {one} and {other} are poorly separable in these runs (correlation {sign}{correlation}): "
+        f"{found['remedy']}"
+    )
+
+
+def _parameter_label(name: str, symbols: Mapping[str, str]) -> str:
+    """A parameter in a sentence: its symbol, or its effect with its name."""
+    effect, _, own = name.rpartition(".")
+    words = own.replace("_", " ")
+    return f"{effect.replace('_', ' ')} ({words})" if effect else symbols.get(name, words)
 
 
 DEVIATIONS: Mapping[str, str] = {

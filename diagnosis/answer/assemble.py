@@ -17,6 +17,7 @@ from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
+from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
@@ -116,6 +117,7 @@ def assemble(
             noise.source,
         ),
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
+        trade_off=least_separated(chosen, study.campaign),
         blind_spots=study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
         provenance={

@@ -30,7 +30,7 @@ from diagnosis.words.tables import (
     patch_table,
 )
 from diagnosis.words.verdict import headline, next_steps
-from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
+from identification.printing import COEFFICIENTS, p_text, significant, trade_off_line, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
@@ -134,6 +134,7 @@ def render_report(
         "set_out": set_out(document),
         "coefficients": view.coefficient_rows(document),
         "coefficients_line": coefficients_line(document),
+        "trade_off": trade_off_line(document, COEFFICIENTS),
         "next_steps": next_steps(document),
         "place": view.place_rows(document),
         "lines": view.line_rows(document),
