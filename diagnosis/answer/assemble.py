@@ -11,6 +11,7 @@ import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import Answers, before_the_causes, coefficients, possible_answers
+from diagnosis.answer.friction_curve import friction_curve
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
@@ -45,7 +46,8 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     maps = found.maps
     if answer is not None:
         both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
-        maps = with_answer(found, study.campaign, *both)
+        friction = friction_curve(answer, study.similarity) if study.causes else None
+        maps = replace(with_answer(found, study.campaign, *both), friction=friction)
     if not study.causes:
         return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
     compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
