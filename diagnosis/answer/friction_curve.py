@@ -19,7 +19,8 @@ from tunnel_sim.vocabulary.record import Array
 
 _PLACES = 80  # of the curve
 _BELOW = 0.5  # of the least rate among the points: where the curve begins
-_BINS = 12  # of equal ratios of rates
+_BINS = 12  # of equal ratios of rates, at most
+_RATIO = 1.15  # of the rates in a bin, at least
 _NOISE = 10.0  # standard deviations of the noise that a stroke travels, at least: a reversal is then no noise
 _PEAK = 0.5 * np.pi  # greatest rate of a swing over the mean of its rate over the time
 
@@ -159,10 +160,11 @@ def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:
     Strokes that follow each other share a reversal, whose error cancels in their sum: they count as one.
     """
     rates = np.concatenate([one.rate for one in runs])
-    edges = np.geomspace(rates.min(), rates.max() * (1.0 + 1e-9), _BINS + 1)
-    groups: list[list[tuple[float, float, float, int]]] = [[] for _ in range(_BINS)]
+    bins = int(np.clip(np.log(rates.max() / rates.min()) / np.log(_RATIO), 1.0, _BINS))
+    edges = np.geomspace(rates.min(), rates.max() * (1.0 + 1e-9), bins + 1)
+    groups: list[list[tuple[float, float, float, int]]] = [[] for _ in range(bins)]
     for one in runs:
-        places = np.clip(np.searchsorted(edges, one.rate, side="right") - 1, 0, _BINS - 1)
+        places = np.clip(np.searchsorted(edges, one.rate, side="right") - 1, 0, bins - 1)
         ends = np.flatnonzero(np.diff(places)) + 1
         for first, last in pairwise([0, *ends.tolist(), places.size]):
             travel = one.travel[first:last]

@@ -121,9 +121,23 @@ class CoulombFriction(Effect):
 
     def stands(self, stiffness: float) -> float:
         """The angle at which the spring's moment is that of the friction at rest, rad; 0 where it then vanishes."""
+        return self.at_rest / stiffness if stiffness > 0.0 else 0.0
+
+    @property
+    def at_rest(self) -> float:
+        """The friction that holds a body at rest, N m; 0 where it vanishes with the rate."""
         rises = self.exponent > 0.0 or self.saturation > 0.0
-        at_rest = 0.0 if rises else self.friction_moment * (1.0 + self.peak)
-        return at_rest / stiffness if stiffness > 0.0 else 0.0
+        return 0.0 if rises else self.friction_moment * (1.0 + self.peak)
+
+    @classmethod
+    def of_law(cls, parameters: Mapping[str, float]) -> CoulombFriction:
+        """The friction of a moment law.
+
+        Args:
+            parameters: of the law by name, in its units; those not given are 0.
+        """
+        own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
+        return cls(parameters.get("friction_moment", 0.0), **own)
 
     def sliding(self, rate: Array) -> Array:
         """The friction at a steady rate, when the contact has deflected fully, N m, shape (n,).
