@@ -40,6 +40,7 @@ COEFFICIENTS: Mapping[str, str] = {
     "mechanical_damping": "damping",
     "added_stiffness": "added stiffness",
     "moment_offset": "constant moment",
+    "servo_kp": "kp",
 }
 """Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
 
@@ -307,12 +308,20 @@ def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
     if found is None:
         return ""
     one, other = (_parameter_label(name, symbols) for name in found["parameters"])
-    correlation = f"{abs(found['correlation']):.3g}"
-    sign = "−" if found["correlation"] < 0.0 else ""
     return (
-        f"What trades off: {one} and {other} are poorly separable in these runs (correlation {sign}{correlation}): "
-        f"{found['remedy']}"
+        f"What trades off: {one} and {other} are poorly separable in these runs (correlation "
+        f"{_correlation(found['correlation'])}): {found['remedy']}"
     )
+
+
+def _correlation(value: float) -> str:
+    """A correlation with as many decimals as tell it from 1, six at most."""
+    apart = max(1.0 - abs(value), 10.0**-_MOST_DECIMALS)
+    decimals = min(max(2, math.ceil(-math.log10(apart))), _MOST_DECIMALS)
+    return f"{'−' if value < 0.0 else ''}{abs(value):.{decimals}f}"
+
+
+_MOST_DECIMALS = 6
 
 
 def _parameter_label(name: str, symbols: Mapping[str, str]) -> str:

@@ -65,6 +65,7 @@ ROLES: Mapping[str, Role] = {
     "cn_beta": Role(wind=2.0),
     "cn_r": Role(frequency=1.0, wind=1.0),
     "drive_gain": Role(amplitude=0.0, input=True),
+    "servo_kp": Role(weight=True),
     "moment_offset": Role(amplitude=0.0),
     "zero": Role(amplitude=0.0, reading=True),
 }

@@ -19,7 +19,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
-from diagnosis.model.joint import Joint, LooseJoint, reach
+from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
@@ -94,8 +94,11 @@ def found_law(
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    offset = dict(zip(problem.names, common.tolist(), strict=True)).get("moment_offset", 0.0)
-    spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    fitted = dict(zip(problem.names, common.tolist(), strict=True))
+    kp = fitted.get("servo_kp")
+    of_servo = kp - data.model.kp if kp is not None and isinstance(data.model, ServoJoint) else 0.0
+    added = physics.spring_stiffness - law.stiffness - of_servo
+    spring = np.array([-fitted.get("moment_offset", 0.0), added, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
     own_program = problem.stated(common, release, data.runs[index]).program
@@ -147,6 +150,7 @@ def found_law(
         program=_own_program(program, law.rest + data.similarity.rest, own) if program else (),
         contact=tuple((name, own(value, unit)) for name, value, unit in friction.contact),
         actuator=actuator,
+        kp=None if kp is None else own(kp, "N m/rad"),
         noise=noise,
     )
     return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))

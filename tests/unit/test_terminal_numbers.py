@@ -209,7 +209,7 @@ def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_sep
     given["trade_off"] = {"parameters": names, "correlation": -0.976, "remedy": "drive it slower"}
     line = (
         "What trades off: damping and coulomb friction (friction moment) are poorly separable in these runs "
-        "(correlation −0.976): drive it slower"
+        "(correlation −0.98): drive it slower"
     )
     assert line in diagnosis_parts(given)
     assert line in closing_lines(given)

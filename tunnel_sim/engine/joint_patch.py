@@ -57,6 +57,7 @@ class JointPatch:
         damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
         friction: the whole moment of dry friction, N m.
         program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
+        kp: of the position servo that drives the joint, N m/rad; None: as in the model.
         contact: numerics of the plugin's own friction, by name, N m and rad; empty: ``friction`` is all.
         noise: standard deviation of the sensor's noise, rad; 0: not written.
     """
@@ -68,6 +69,7 @@ class JointPatch:
     program: tuple[float, ...] = ()
     contact: tuple[tuple[str, float], ...] = ()
     actuator: ActuatorPatch | None = None
+    kp: float | None = None
     noise: float = 0.0
 
 
@@ -115,6 +117,10 @@ def patched(
         joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
     if patch.actuator is not None:
         _write_actuator(spec, patch.actuator)
+    if patch.kp is not None and model.law.actuator is not None:
+        servo, share = spec.actuators[model.law.actuator.index], -patch.kp / model.law.actuator.servo[1]
+        servo.gainprm[0] *= share
+        servo.biasprm[1] *= share
     if patch.program or patch.contact:
         if model.law.slide:
             raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
@@ -317,6 +323,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
             (f"actuator {model.actuator(i).name or i + 1} {name}", unit): values
             for i in range(model.nu)
             for name, unit, values in (
+                ("gain", "1", [model.actuator_gainprm[i, 0]]),
                 ("ctrlrange", "1", model.actuator_ctrlrange[i] * model.actuator_ctrllimited[i]),
                 ("time constant", "s", [model.actuator_dynprm[i, 0] * _filters(model, i)]),
                 ("delay", "s", [model.actuator_delay[i]]),

@@ -106,7 +106,8 @@ def test_an_estimate_names_the_damping_of_two_near_wind_speeds_and_not_once_its_
     assert abs(near.trade_off.correlation) == pytest.approx(strongest)
     line = trade_off_line(document, SYMBOLS)
     assert line.startswith("What trades off: Cn")
-    assert f"(correlation {near.trade_off.correlation:.3g}".replace("-", "−") in line
+    shown = line.partition("(correlation ")[2].partition(")")[0]
+    assert float(shown.replace("−", "-")) == pytest.approx(near.trade_off.correlation, abs=0.005)
     assert line.endswith("add runs with the wind off or at another wind speed")
     assert line in str(near).replace("\n", " ")
     assert Estimate.from_json_dict(json.loads(json.dumps(document))) == near
@@ -128,3 +129,11 @@ def test_a_fit_of_a_diagnosis_names_its_pair_and_leaves_out_what_lies_at_a_bound
     document = {"trade_off": vars(found)}
     words = trade_off_line(document, {"mechanical_damping": "damping", "cn_r": "Cnr"})
     assert "damping and Cnr are poorly separable in these runs (correlation 0.99)" in words
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(0.976, "0.98"), (-0.9938, "−0.994"), (0.99978, "0.9998"), (-1.0, "−1.000000")]
+)
+def test_a_correlation_is_told_from_one(value, shown):
+    found = {"parameters": ["cn_r", "cn_beta"], "correlation": value, "remedy": "do it"}
+    assert f"(correlation {shown})" in trade_off_line({"trade_off": found}, SYMBOLS)
