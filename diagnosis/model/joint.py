@@ -13,6 +13,7 @@ from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel, Start
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.rig import Rig
+from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
 from tunnel_sim.effects import Effect
@@ -97,7 +98,8 @@ class _OfLaw(NominalModel):
         """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
-            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring]
+            gone[OF_GEAR] = [kind for kind in kinds if kind.parts]
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.parts]
         elif self.law.hangs:
             gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]

@@ -26,6 +26,11 @@ if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
 
 _NO_SPRING = "The servo is no spring, and these effects of one are not tried: {}."
+#: Why play is not tried where a servo holds the joint.
+OF_GEAR = (
+    "The servo holds the motor, so that play would be between motor and link: that takes a model of two bodies, "
+    "and is not tried: {}."
+)
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 
 
@@ -73,10 +78,11 @@ class _OfServo(NominalModel):
         super().refuse(campaign)
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
-        """Effects of a spring."""
-        of_spring = [kind for kind in kinds if kind.on_spring or kind.chosen_spring() is not None]
-        left = [kind for kind in kinds if kind not in of_spring]
-        return {_NO_SPRING: of_spring} | super().untried(campaign, left)
+        """Effects of a spring, and play."""
+        play = [kind for kind in kinds if kind.parts]
+        of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
+        left = [kind for kind in kinds if kind not in (*play, *of_spring)]
+        return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)
 
     def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
         """The physics of several runs, with the damping of the servo."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis import Diagnosis, diagnose, read_model, vocabulary
-from diagnosis.diagnosable import refuse_undiagnosable
+from diagnosis.diagnosable import kinds_for, refuse_undiagnosable
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.servo import Servo, ServoPerInertia
 from identification import identify
@@ -140,6 +140,16 @@ def test_the_kind_of_rig_is_chosen_by_the_column_and_the_gains(known: Campaign) 
     assert type(nominal_model(commanded(kp=None, kv=None))) is ServoPerInertia
     moments = replace(known, runs=tuple(replace(run, drive=None) for run in known.runs))
     assert type(nominal_model(moments)) is not Servo
+
+
+def test_why_play_and_effects_of_a_spring_are_not_tried_is_said(known: Campaign) -> None:
+    kinds = vocabulary(("free_play", "cubic_stiffness", "spring_miscalibration", "coulomb_friction"))
+    kept, said = kinds_for(known, kinds, nominal_model(known))
+    assert [kind.name for kind in kept] == ["coulomb_friction"]
+    play, others = said
+    assert "between motor and link" in play
+    assert play.endswith("not tried: free_play.")
+    assert others.endswith("of one are not tried: cubic_stiffness, spring_miscalibration.")
 
 
 @pytest.mark.parametrize(
