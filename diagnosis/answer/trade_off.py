@@ -43,8 +43,9 @@ def role_in_effect(kind: type[Effect], info: ParameterInfo) -> Role:
     """The role of an effect's parameter, by its unit and by where its effect acts."""
     kg, _, s = dimension(info.unit)
     windy, damps = kind.condition == "wind_on", kind.channel == "damping"
+    shapes = info != kind.parameters()[0]  # all but the severity
     return Role(
-        amplitude=None if info.form else 1.0 - angle_power(info.unit),
+        amplitude=None if shapes else 1.0 - angle_power(info.unit),
         frequency=s + 2.0 if kg == 1.0 else float(windy and damps),
         wind=(1.0 if damps else 2.0) if windy else 0.0,
         input=kind.driven,

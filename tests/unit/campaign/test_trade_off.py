@@ -74,6 +74,7 @@ def test_the_run_changes_what_the_two_follow_with_different_powers(first, second
         ("quadratic_damping", "coefficient", Role(amplitude=2.0, frequency=2.0)),
         ("cubic_stiffness", "coefficient", Role(amplitude=3.0)),
         ("gravity_stiffness", "stiffness", Role()),
+        ("gravity_stiffness", "rest_angle", Role(amplitude=None)),
         ("structural_damping", "loss_factor", Role()),
         ("nonlinear_yaw_damping", "coefficient", Role(amplitude=3.0, frequency=1.0, wind=1.0)),
         ("wind_speed_drift", "settling", Role(amplitude=None, wind=2.0, length=True)),
