@@ -38,7 +38,7 @@ class SensorNonlinearity(Effect):
     example = (0.2,)
 
     coefficient: float = parameter(
-        "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-1.0, fit_upper=1.0
+        "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-5.0, fit_upper=5.0
     )
     exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
     quadratic: float = parameter(

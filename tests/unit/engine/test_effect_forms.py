@@ -138,6 +138,12 @@ def test_a_range_per_squared_angle_follows_the_swing() -> None:
     assert contact.fit_range(0.1 * SWING) == pytest.approx((0.1 * contact.fit_lower, contact.fit_upper))
 
 
+def test_a_fit_may_take_a_reading_that_is_off_by_a_quarter() -> None:
+    """At 20°: sensors that read the tangent, or an arm's chord, are off by that much and more."""
+    lower, upper = effect_class("sensor_nonlinearity").parameters()[0].fit_range(SWING)
+    assert min(-lower, upper) * np.deg2rad(20.0) ** 2 > 0.25
+
+
 SLIDING = {
     "exponent": ({"exponent": 0.3}, lambda v: (v / 2.0) ** 0.3),
     "saturation": ({"saturation": 0.5}, lambda v: np.tanh(v / 0.5)),
