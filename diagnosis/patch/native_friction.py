@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.facts.found import Fact
-from diagnosis.settings import AnswerSettings
 from tunnel_sim.effects.friction import AGAINST_RATE, CoulombFriction
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.vocabulary.record import Array
@@ -43,7 +42,7 @@ class NativeFriction:
 
 
 def native_friction(
-    parameters: Mapping[str, float], rates: Array, law: JointLaw, damping: float, chosen: AnswerSettings
+    parameters: Mapping[str, float], rates: Array, law: JointLaw, damping: float, may_miss: float
 ) -> NativeFriction:
     """The friction of a moment law in the elements of MuJoCo.
 
@@ -56,7 +55,7 @@ def native_friction(
         rates: that the runs visit, above 0, rad/s, shape (n,).
         law: of the joint as the model has it.
         damping: what is written beside that of the joint, N m s/rad.
-        chosen: how much a polynomial may miss.
+        may_miss: share of the greatest friction that a polynomial may miss.
     """
     friction = CoulombFriction.of_law(parameters)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
@@ -73,7 +72,7 @@ def native_friction(
     found = np.linalg.lstsq(powers, wanted, rcond=1e-12)[0]
     missed = float(np.max(np.abs(powers @ found - wanted)) / np.max(wanted))
     found = found / rates[-1] ** np.arange(4)
-    if missed < chosen.patched_misses and found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0:
+    if missed < may_miss and found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0:
         figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
         return NativeFriction(float(found[0]), found[1:], differences=(Fact("polynomial", figures),))
     values = {"F": moment, "F0": friction.at_rest} | {

@@ -91,6 +91,7 @@ def found_law(
     rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     differences: list[Fact] = []
+    may_miss = data.settings.answer.patched_misses
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
@@ -125,9 +126,7 @@ def found_law(
             found[np.abs(found) < 1e-9 * greatest] = 0.0
             found /= sizes
             missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-            if missed < data.settings.answer.patched_misses and not (
-                name == "r" and native[0] + law.damping + found[0] < 0.0
-            ):
+            if missed < may_miss and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
                 native += found
                 if missed >= 1e-6:
                     figures = {"moment": words, "missed_percent": 100.0 * missed}
@@ -135,7 +134,7 @@ def found_law(
             else:
                 program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
                 differences.append(Fact("no native element", {"moment": words}))
-    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), data.settings.answer)
+    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss)
     damping += friction.damping
     program = _added(program, friction.program)
     differences += friction.differences
