@@ -29,14 +29,11 @@ from identification.campaign.between_runs import (
 from tunnel_sim.vocabulary.record import Array
 
 #: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
-#: differences, which would pin a parameter that the runs do not determine.
-_APART = 1e-4
+#: differences, which would pin a parameter that the runs do not determine. The errors are 1e-11 at most. What a
+#: true difference is worth may be 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
+_APART = 1e-9
 _NARROWER = 0.3  # factor on widths from which their maxima are sought
 _USUAL = UsualWidths()
-#: Standard deviation from within runs alone, over that with their comparison. In 20 campaigns whose runs differ by
-#: chance alone it is at most 1.5 for the size of an effect that each run shows, and 16 to 20 (medians) for that of
-#: one that acts between runs. A rod and gravity, which runs show in part, have 4 and 6.
-_COMPARED = 2.0
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
 
 Kept = NDArray[np.bool_]
@@ -182,14 +179,17 @@ class Between:
         """The same with the common parameters integrated out, which compares widths."""
         return self.found.restricted + self.prior_cost
 
-    @property
-    def compared(self) -> Kept:
-        """Which common parameters are known by the comparison of runs, shape (common,).
+    def shown(self, values: Array, stds: float) -> Kept:
+        """Which common parameters the runs show not to be zero by themselves, without their comparison.
 
-        Of these the runs that may differ most say at most half as much: the standard deviation is twice as large.
+        Args:
+            values: of the common parameters, shape (common,).
+            stds: standard deviations from zero that show it, where the runs may differ most.
+
+        Returns:
+            Shape (common,).
         """
-        alone, found = np.diag(self.most.covariance), np.diag(self.found.covariance)
-        return np.asarray(alone > _COMPARED**2 * found, np.bool_)
+        return np.asarray(values**2 >= stds**2 * np.diag(self.most.covariance), np.bool_)
 
     def cost(self, known: Array) -> float:
         """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much.

@@ -244,17 +244,24 @@ class Fit:
 
     @property
     def compared(self) -> int:
-        """How many effects chance differences between the runs could do: their sizes are known by comparison."""
+        """How many effects chance differences between runs could do: no run shows them by itself."""
         if self.between is None:
             return 0
-        known = dict(zip(self.problem.names, self.between.compared.tolist(), strict=True))
+        shown = self.between.shown(self.point.common, self.settings.scatter.shown_stds)
+        by_itself = dict(zip(self.problem.names, shown.tolist(), strict=True))
         sizes = (f"{kind.name}.{kind.parameters()[0].name}" for kind in self.problem.effects)
-        return sum(known.get(size, False) for size in sizes)
+        return sum(not by_itself.get(size, True) for size in sizes)
 
     @property
     def unlikelihood(self) -> float:
-        """−2 ln L up to a constant: χ² where the runs repeat, else with their deviations integrated out."""
-        return self.total if self.between is None else self.between.likelihood
+        """−2 ln L up to a constant: χ² where the runs repeat, else with their deviations integrated out.
+
+        It is that of the point and the widths of the fit: linear theory far from a minimum promises anything.
+        """
+        if not self.problem.scatter:
+            return self.total
+        here = self.columns.at(self.widths, width_prior(self.problem))
+        return self.total + here.found.log_determinant + here.prior_cost
 
     @property
     def total(self) -> float:

@@ -289,6 +289,13 @@ class ScatterSettings:
         "convention",
         ONE_IN_1000,
     )
+    shown_stds: float = setting(
+        4.0,
+        "Size of an effect from which runs show it by themselves, without their comparison.",
+        "convention",
+        "By chance one effect in 16,000 is as large.",
+        unit="std",
+    )
     widths_settled: float = setting(
         1.0,
         "Fall of −2 ln L from which a fit is repeated with other widths.",
@@ -312,12 +319,11 @@ class WeighingSettings:
     )
     needless_scatter: float = setting(
         4.0,
-        "−2 ln of that evidence by which a needless effect that is known by the comparison of runs may lower it.",
+        "−2 ln of that evidence by which a needless effect that no run shows by itself may lower it.",
         "estimated",
-        "With the price of an effect it is 10. In 56 campaigns whose runs differ by chance alone, the best of all "
-        "effects lowered it by 8.5 at most, and by more than 5 in eight of them. The tail falls by e for every 2: "
-        "one such campaign in 100 exceeds 10. Effects whose size each run shows lowered it by 3.5 at most, but for "
-        "those of freed forms, which have a price of their own.",
+        "With the price of an effect it is 10. In 72 campaigns whose runs differ by chance alone, the best of all "
+        "effects lowered it by more than 10 in two (11.9 and 13.7), by 8.9 and 6.4 in two, and by 3.1 at most in "
+        "the rest: two or three in 100 exceed 10.",
         unit="χ²",
         decision="0036",
     )

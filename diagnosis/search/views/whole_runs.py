@@ -15,7 +15,7 @@ from diagnosis.model.blocks import without_long_rest
 from diagnosis.model.chance import Scatter
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
+from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
 from diagnosis.search.reach import left_by_all
@@ -208,7 +208,9 @@ class WholeRuns(View):
         with clock.step("effects"):
             grown = grow(view, clock.progress, unexplained)
             others = (self.beside(one) for one in likely)
-            found = {one.names: one for one in (none, *others, *grown) if one is not None}
+            found: dict[tuple[str, ...], Hypothesis] = {}
+            for one in filter(None, (none, *others, *grown)):
+                found[one.names] = of_more_weight(found.get(one.names), one, self._scattering_gap)
         return view.with_moments(Sets(view, tuple(found.values())), clock)
 
     def with_moments(self, found: Sets, clock: Clock) -> Sets:

@@ -51,6 +51,12 @@ def test_runs_that_repeat_better_cost_less() -> None:
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
 
-def test_what_every_run_shows_is_not_known_by_comparison() -> None:
-    assert columns(0.03 * WIDTH).likeliest(PRIOR).compared.tolist() == [True]
-    assert columns(0.03 * WIDTH, within=True).likeliest(PRIOR).compared.tolist() == [False]
+@pytest.mark.parametrize(
+    ("within", "size", "shown"), [(True, 0.1, True), (False, 0.1, False), (False, 140.0, True)]
+)
+def test_runs_show_by_themselves_what_greatest_differences_cannot_hide(
+    within: bool, size: float, shown: bool
+) -> None:
+    """Twelve runs know their common deviation to a third of the greatest width, which is 20 widths."""
+    between = columns(0.03 * WIDTH, within=within).likeliest(PRIOR)
+    assert between.shown(np.array([size * WIDTH]), 4.0).tolist() == [shown]
