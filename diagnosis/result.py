@@ -23,6 +23,7 @@ from diagnosis.words.written import sentences
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
+from identification.trade_off import TradeOff
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 _LAST = (
     "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds", "maps",
-    "provenance",
+    "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
+    "maps", "provenance",
 )  # fmt: skip
 
 
@@ -249,6 +250,7 @@ class Diagnosis:
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
         hidden: the effects that could hide, the one that moves a coefficient most against its standard deviation
             first.
+        trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
         maps: data of the figures, in JSON's types.
@@ -276,6 +278,7 @@ class Diagnosis:
     noise: NoiseSummary
     verdict: str = ""
     hidden: tuple[Hidden, ...] = ()
+    trade_off: TradeOff | None = None
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     cautions: tuple[str, ...] = ()

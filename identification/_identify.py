@@ -21,6 +21,7 @@ from identification.progress import Progress, shown_by
 from identification.returned import checked_return
 from identification.statistics import widened_by_contradictions
 from identification.status import Outcome, Remark, left_out_as_asked
+from identification.trade_off import of_coefficients
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive, refuse_untreated
@@ -104,7 +105,9 @@ def identify(
     if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     estimate = replace(
-        estimate, remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks)
+        estimate,
+        remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks),
+        trade_off=of_coefficients(estimate.parameters, estimate.covariance_matrix, left),
     )
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")

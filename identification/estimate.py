@@ -19,6 +19,7 @@ from identification.printing import as_html, as_text, estimate_brief, estimate_p
 from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_severity as by_severity
+from identification.trade_off import TradeOff
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError, installing
@@ -242,6 +243,7 @@ class Estimate:
         remarks: of the examination before the estimation, on runs left out, cut or to look at.
         repeatability: the scatter between runs, which the covariance includes; None where the runs show none beyond
             their noise, and none is stated.
+        trade_off: the two coefficients that the runs separate least; None where they separate all of them.
     """
 
     __pydantic_config__ = _FINITE
@@ -262,6 +264,7 @@ class Estimate:
     noise: NoiseLevel | None = None
     remarks: tuple[Remark, ...] = ()
     repeatability: RunScatter | None = None
+    trade_off: TradeOff | None = None
 
     @property
     def status(self) -> Status:

@@ -204,6 +204,13 @@ MOMENT_DROP_FOR_CORNER = 20.0
 LEAST_CORNER_DROP = 4.0
 """Further drop of −2 ln L, two standard deviations, that a corner frequency must bring."""
 
+# --- When two parameters trade off. ---
+
+TRADE_OFF_CORRELATION = 0.95
+"""Absolute correlation of two parameters from which they are said to trade off: the variance of each is then ten
+times what it would be with the other known, the customary sign of collinearity in regression (a variance inflation
+factor 1/(1 − r²) of 10)."""
+
 # --- When the scatter of the runs is believed, and when two scores differ. ---
 
 LEAST_WIDTH_FREEDOM = 1.0

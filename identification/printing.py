@@ -40,6 +40,7 @@ COEFFICIENTS: Mapping[str, str] = {
     "mechanical_damping": "damping",
     "added_stiffness": "added stiffness",
     "moment_offset": "constant moment",
+    "servo_kp": "kp",
 }
 """Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
 
@@ -292,7 +293,42 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     left = len(document["runs"]) - SHOWN_RUNS
     more = f"and {counted(left, 'more run')}, which runs_frame() lists" if left > 0 else ""
     tables: list[str | TextTable] = [coefficients_table(document), runs_table(document), more]
-    return [*tables, *repeatability_lines(document), *(f"Note: {note}" for note in notes)]
+    beside = (*repeatability_lines(document), trade_off_line(document, SYMBOLS))
+    return [*tables, *beside, *(f"Note: {note}" for note in notes)]
+
+
+def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
+    """The two parameters that the runs separate least, and the run that would; empty where there are none.
+
+    Args:
+        document: of an estimate or a diagnosis.
+        symbols: of the parameters that have one, by name.
+    """
+    found = document.get("trade_off")
+    if found is None:
+        return ""
+    one, other = (_parameter_label(name, symbols) for name in found["parameters"])
+    return (
+        f"What trades off: {one} and {other} are poorly separable in these runs (correlation "
+        f"{_correlation(found['correlation'])}): {found['remedy']}"
+    )
+
+
+def _correlation(value: float) -> str:
+    """A correlation with as many decimals as tell it from 1, six at most."""
+    apart = max(1.0 - abs(value), 10.0**-_MOST_DECIMALS)
+    decimals = min(max(2, math.ceil(-math.log10(apart))), _MOST_DECIMALS)
+    return f"{'−' if value < 0.0 else ''}{abs(value):.{decimals}f}"
+
+
+_MOST_DECIMALS = 6
+
+
+def _parameter_label(name: str, symbols: Mapping[str, str]) -> str:
+    """A parameter in a sentence: its symbol, or its effect with its name."""
+    effect, _, own = name.rpartition(".")
+    words = own.replace("_", " ")
+    return f"{effect.replace('_', ' ')} ({words})" if effect else symbols.get(name, words)
 
 
 DEVIATIONS: Mapping[str, str] = {

@@ -11,12 +11,14 @@ import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import Answers, before_the_causes, coefficients, possible_answers
+from diagnosis.answer.friction_curve import friction_curve
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
+from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
@@ -44,7 +46,8 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     maps = found.maps
     if answer is not None:
         both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
-        maps = with_answer(found, study.campaign, *both)
+        friction = friction_curve(answer, study.similarity) if study.causes else None
+        maps = replace(with_answer(found, study.campaign, *both), friction=friction)
     if not study.causes:
         return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
     compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
@@ -116,6 +119,7 @@ def assemble(
             noise.source,
         ),
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
+        trade_off=least_separated(chosen, study.campaign),
         blind_spots=study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
         provenance={

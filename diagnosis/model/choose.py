@@ -5,10 +5,11 @@ from __future__ import annotations
 from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import PerInertia, Rig
+from diagnosis.model.servo import Servo, ServoPerInertia
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: In the order in which they are asked whether a campaign is theirs.
-KINDS: tuple[type[NominalModel], ...] = (LooseBody, PerInertia, Rig)
+KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, Rig)
 
 
 def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:

@@ -13,14 +13,17 @@ from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel, Start
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.rig import Rig
+from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.rig import JointLaw
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Actuator, JointLaw
 
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
@@ -95,7 +98,8 @@ class _OfLaw(NominalModel):
         """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
-            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring]
+            gone[OF_GEAR] = [kind for kind in kinds if kind.parts]
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.parts]
         elif self.law.hangs:
             gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
@@ -223,6 +227,52 @@ class Joint(_OfLaw, Rig):
 
 
 @dataclass(frozen=True)
+class ServoJoint(Joint):
+    """A joint whose position servo has a kp that is fitted: it acts with the angle and with the command.
+
+    Args:
+        kp: of the model, N m/rad.
+        held_at: position of the joint at its rest, rad, where its servo has a moment of its own against gravity.
+    """
+
+    kp: float = field(kw_only=True)
+    held_at: float = field(kw_only=True)
+
+    coefficient_units: ClassVar[Mapping[str, str]] = {"servo_kp": "N m/rad", **Joint.coefficient_units}
+
+    def similar(self, change: Similarity) -> NominalModel:
+        """The joint and the kp of the similar campaign."""
+        return replace(super().similar(change), kp=change.similar(self.kp, "N m/rad"))  # type: ignore[call-arg]
+
+    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+        """The joint's, and the kp."""
+        return *super().inertial(data), Parameter("servo_kp", "N m/rad", lower=0.0, size=self.kp)
+
+    def spring(self, values: Mapping[str, float], run: RunData) -> float:
+        """With the kp in place of the model's, N m/rad."""
+        return super().spring(values, run) + values["servo_kp"] - self.kp
+
+    def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
+        """The physics of several runs, whose commands act with the kp, and which hang lower with a smaller one."""
+        table = super().settings(values, runs)
+        for place, kp in enumerate(values["servo_kp"].tolist()):
+            drive = table.drive[place]
+            if drive is not None:
+                offset = drive.offset - (kp - self.kp) * self.held_at
+                table.drive[place] = replace(drive, scale=drive.scale * kp / self.kp, offset=offset)
+        return table
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """From the kp of the model."""
+        for start in super().starts(data):
+            yield replace(start, common={**start.common, "servo_kp": self.kp})
+
+    def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The kp first."""
+        return "servo_kp", *super().coefficient_names(names)
+
+
+@dataclass(frozen=True)
 class LooseJoint(_OfLaw, LooseBody):
     """A driven joint that nothing holds."""
 
@@ -250,7 +300,8 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     """
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
-    controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
+    by_actuator = ("drive", "command_rad")
+    controlled = any(run.drive is not None and run.drive.column in by_actuator for run in campaign.runs)
     if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
@@ -287,7 +338,24 @@ def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]
         for run in campaign.runs
     )
     found = replace(campaign, runs=runs, law=law)
+    if "gain" in law.free and law.actuator is not None:
+        return found, ServoJoint(law=law, kp=-law.actuator.servo[1], held_at=law.rest)
     return found, (LooseJoint if found.unrestrained else Joint)(law=law)
+
+
+def _as_control(drive: Drive, actuator: Actuator, where: str) -> Drive:
+    """The command of a position servo as the control of its actuator.
+
+    Raises:
+        TunnelError: when the actuator does not hold the joint where it is told to.
+    """
+    kp, said = -actuator.servo[1], f"actuator {one_line(actuator.name)!r}"
+    if not kp > 0.0:
+        what = (
+            f"the input is command_rad, and {said} holds no position: without control its moment is the same"
+        )
+        raise TunnelError(what, where=where, remedy="name the position actuator, or name the input drive")
+    return Drive("drive", drive.values * (kp / actuator.gain), drive.hold)
 
 
 def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
@@ -300,12 +368,14 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
         return drive
     if actuator is None:
         if drive.gain is None:
-            what = "the joint has no actuator in the model that the column drive could be the control of"
+            what = f"the joint has no actuator in the model that the column {drive.column} could be the control of"
             raise TunnelError(
                 what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm"
             )
         return drive
     said = f"actuator {one_line(actuator.name)!r}"
+    if drive.column == "command_rad":
+        drive = _as_control(drive, actuator, where)
     if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
         what = f"drive_gain = {drive.gain:g} is stated, and {said} gives {actuator.gain:g} N m per unit of control"
         raise TunnelError(

@@ -119,6 +119,8 @@ class PerInertia(Rig):
 
     per_inertia: ClassVar[bool] = True
     coefficient_units: ClassVar[Mapping[str, str]] = {"omega_n": "rad/s", "zeta": "1"}
+    #: Name of the parameter that is the stiffness of the spring.
+    of_spring: ClassVar[str] = "stiffness"
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
@@ -149,24 +151,24 @@ class PerInertia(Rig):
         """The common stiffness in place of the inertia."""
         del data
         return (
-            Parameter("stiffness", "1/s2", lower=0.0, size=10.0),
+            Parameter(self.of_spring, "1/s2", lower=0.0, size=10.0),
             Parameter("mechanical_damping", "1/s", lower=0.0, size=0.02),
         )
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:
         """The common stiffness, 1/s²."""
         del run
-        return values["stiffness"]
+        return values[self.of_spring]
 
     def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
         """Starting values by name, of the zero apart."""
         del data
         loss = _LOSS * float(np.sqrt(shown.typical)) if shown.loss is None else shown.loss
-        return {"stiffness": shown.typical, "mechanical_damping": loss, "drive_gain": shown.gain}
+        return {self.of_spring: shown.typical, "mechanical_damping": loss, "drive_gain": shown.gain}
 
     def fitted_spring(self, value: Mapping[str, float]) -> float | None:
         """The common stiffness, 1/s²."""
-        return value["stiffness"]
+        return value[self.of_spring]
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
         """Not what only a spring of stated stiffness tells."""
@@ -213,12 +215,11 @@ class PerInertia(Rig):
         """The damping; of the frequency the spring where gravity does not restore the body in its place."""
         if name == "zeta":
             return "mechanical_damping"
-        return "stiffness" if name == "omega_n" and len(self._stiffnesses(names)) == 1 else None
+        return self.of_spring if name == "omega_n" and len(self._stiffnesses(names)) == 1 else None
 
-    @staticmethod
-    def _stiffnesses(names: Sequence[str]) -> tuple[str, ...]:
+    def _stiffnesses(self, names: Sequence[str]) -> tuple[str, ...]:
         """The parameters whose sum is the stiffness of small swings; a pendulum's only spring is gravity."""
-        return ("stiffness", *(name for name in _STIFFNESSES if name in names))
+        return (self.of_spring, *(name for name in _STIFFNESSES if name in names))
 
     def unseen(self, data: Data) -> Sequence[str]:
         """The spring is not stated."""

@@ -19,15 +19,18 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
-from diagnosis.model.joint import Joint, LooseJoint, reach
+from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
+from diagnosis.patch.native_actuator import controlled, native_actuator
+from diagnosis.patch.native_friction import native_friction
 from diagnosis.search.study import Study
-from tunnel_sim.effects.friction import AGAINST_RATE
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
+    ActuatorPatch,
     JointPatch,
     Start,
+    creep_rate,
     inertia_of_steps,
     patched,
     patched_xml,
@@ -59,7 +62,14 @@ class FoundLaw:
     differences: tuple[Fact, ...]
 
 
-def found_law(problem: Problem, common: Array, release: Array, noise: float, index: int = 0) -> FoundLaw:
+def found_law(
+    problem: Problem,
+    common: Array,
+    release: Array,
+    noise: float,
+    index: int = 0,
+    actuator: ActuatorPatch | None = None,
+) -> FoundLaw:
     """The law of a fit, in the units of the measured campaign.
 
     Args:
@@ -67,6 +77,7 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
         release: of a run, shape (own,).
         noise: of the sensor, rad; 0: not written.
         index: of that run, with the wind off.
+        actuator: what is written into the actuator that drives the joint; None: nothing.
     """
     data = problem.data
     assert isinstance(data.model, Joint | LooseJoint)
@@ -80,11 +91,15 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     differences: list[Fact] = []
+    may_miss = data.settings.answer.patched_misses
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    offset = dict(zip(problem.names, common.tolist(), strict=True)).get("moment_offset", 0.0)
-    spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    fitted = dict(zip(problem.names, common.tolist(), strict=True))
+    kp = fitted.get("servo_kp")
+    of_servo = kp - data.model.kp if kp is not None and isinstance(data.model, ServoJoint) else 0.0
+    added = physics.spring_stiffness - law.stiffness - of_servo
+    spring = np.array([-fitted.get("moment_offset", 0.0), added, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
     own_program = problem.stated(common, release, data.runs[index]).program
@@ -111,17 +126,18 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
             found[np.abs(found) < 1e-9 * greatest] = 0.0
             found /= sizes
             missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-            if missed < data.settings.answer.patched_misses and not (
-                name == "r" and native[0] + law.damping + found[0] < 0.0
-            ):
+            if missed < may_miss and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
                 native += found
                 if missed >= 1e-6:
                     figures = {"moment": words, "missed_percent": 100.0 * missed}
                     differences.append(Fact("polynomial", figures))
             else:
-                added = formula.program(values, {"b": "angle", "r": "rate"})
-                program = (*program, *added, _number("add")) if program else added
+                program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
                 differences.append(Fact("no native element", {"moment": words}))
+    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss)
+    damping += friction.damping
+    program = _added(program, friction.program)
+    differences += friction.differences
     units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
     k0, k1, k2, k3 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
     c0, c1, c2 = (own(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
@@ -129,27 +145,36 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
         inertia=own(physics.yaw_inertia, "kg m2"),
         spring=(k0, k1, k2, k3),
         damping=(c0, c1, c2),
-        friction=own(physics.parameters.get("friction_moment", 0.0), "N m"),
+        friction=own(friction.loss, "N m"),
         program=_own_program(program, law.rest + data.similarity.rest, own) if program else (),
+        contact=tuple((name, own(value, unit)) for name, value, unit in friction.contact),
+        actuator=actuator,
+        kp=None if kp is None else own(kp, "N m/rad"),
         noise=noise,
     )
-    return FoundLaw(patch, (*differences, *_unwritten(physics, problem)))
+    return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
 
 
-def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
-    """What the patched model does otherwise than the law found, or leaves out."""
+def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | None) -> list[Fact]:
+    """What the patched model does otherwise than the law found, or leaves out.
+
+    Args:
+        written: what is written into the actuator.
+    """
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
     left_out = {
-        "soft friction": bool(physics.parameters.get("friction_moment")),
-        "presliding": bool(physics.parameters.get("presliding")),
-        "friction against rate": any(physics.parameters.get(term) for term in AGAINST_RATE),
         "rod": physics.rod_twist is not None,
-        "delayed input": any(kind.delays for kind in problem.effects),
-        "actuator": any(kind.driven and not kind.delays for kind in problem.effects),
+        "delayed input": written is None and any(kind.delays for kind in problem.effects),
+        "actuator": written is None and any(kind.driven and not kind.delays for kind in problem.effects),
         "air": problem.data.wind_on,
     }
     found = [Fact(kind) for kind, left in left_out.items() if left]
     return [*found, Fact("sensor", {"effects": sensors})] if sensors else found
+
+
+def _added(program: tuple[float, ...], further: tuple[float, ...]) -> tuple[float, ...]:
+    """The program of the sum of two; either may be empty."""
+    return (*program, *further, _number("add")) if program and further else (*program, *further)
 
 
 def _number(operation: str) -> float:
@@ -184,7 +209,12 @@ _SHIFT = 1e-4  # of the start, for its derivatives
 
 
 def native_closure(
-    nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut, simulate: Simulate
+    nominal: Fit,
+    chosen: Fit,
+    nominal_out: HeldOut,
+    chosen_out: HeldOut,
+    simulate: Simulate,
+    native: frozenset[str] = frozenset(),
 ) -> NativeClosure:
     """Simulate what was held out with the patched model of the fit that has not seen it; only with the wind off.
 
@@ -193,6 +223,7 @@ def native_closure(
         chosen: fit with the causes.
         nominal_out: runs held out of the first.
         chosen_out: runs held out of the second.
+        native: as of `engine_residual`.
 
     Raises:
         TunnelError: when nothing could be held out, or the patched model's motion grows without bound.
@@ -202,12 +233,12 @@ def native_closure(
     held = [i for i, run in enumerate(runs) if run.id in known and not run.wind_on]
     before: list[Array] = []
     fitted: list[Array] = []
-    native: list[Array] = []
+    engine: list[Array] = []
     for i in held:
         common, own = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        native.append(_restarted(chosen.problem, common, own, i, simulate)[1])
+        engine.append(_restarted(chosen.problem, common, own, i, simulate, native)[1])
     ids = [] if held else [run.id for run in runs if not run.wind_on]
     if ids:
         turns = turns_of(nominal, ids)
@@ -221,14 +252,14 @@ def native_closure(
             for i, left in enumerate(out):
                 if left.any():
                     own = point.release[i]
-                    seen = _restarted(chosen.problem, point.common, own, i, simulate, seen=~left)[1]
+                    seen = _restarted(chosen.problem, point.common, own, i, simulate, native, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
-                    native.append(seen[left])
-    if not native:
+                    engine.append(seen[left])
+    if not engine:
         raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
     nominal_power, fit_power, native_power = (
-        float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, native)
+        float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, engine)
     )
     return NativeClosure(nominal_power, fit_power, native_power, ON_RUNS if held else ON_STRETCHES)
 
@@ -239,13 +270,14 @@ def _restarted(
     own: Array,
     index: int,
     simulate: Simulate,
+    native: frozenset[str],
     seen: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, Array]:
     """A run's own parameters, its start refitted in the engine to what was seen, and the `engine_residual` then."""
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(release: Array) -> Array:
-        return engine_residual(problem, common, release, index, simulate)
+        return engine_residual(problem, common, release, index, simulate, native)
 
     best = left(own)
     for _ in range(_RELEASE_STEPS):
@@ -261,12 +293,20 @@ def _restarted(
     return own, best
 
 
-def engine_residual(problem: Problem, common: Array, own: Array, index: int, simulate: Simulate) -> Array:
+def engine_residual(
+    problem: Problem,
+    common: Array,
+    own: Array,
+    index: int,
+    simulate: Simulate,
+    native: frozenset[str] = frozenset(),
+) -> Array:
     """Reading minus the engine's prediction of one run.
 
     Args:
         common: parameters of all runs, shape (common,).
         own: parameters of the run, shape (own,).
+        native: ids of the runs in which the model's actuator does by itself what effects make of the input.
 
     Returns:
         In noise standard deviations, shape (n,).
@@ -275,7 +315,7 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
     chain = problem.chain(common, own, run)
     blocks = run.reading.size + blocks_beyond(chain.physics(), run) + 1
     measured = change.own(blocks * run.interval, "s")
-    start, given = _start(problem, own, index), chain.physics().drive
+    start, given = _start(problem, own, index), (chain.stated if run.id in native else chain.physics()).drive
     if given is not None:  # without the constant moment, which is written into the model
         acting = replace(given, offset=0.0).acting
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
@@ -331,9 +371,17 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
 
     given = model.spec().compile() if study.campaign.driven else None
+    runs, actuator = controlled(study.campaign, model.law.actuator), model.law.actuator
+    at = next((i for i, run in enumerate(problem.data.runs) if run.id in runs), None)
+
+    def actuated(common: Array) -> ActuatorPatch | None:
+        if actuator is None or at is None:
+            return None
+        return native_actuator(problem, common, chosen.point.release[at], at, actuator, change)
 
     def law(common: Array) -> FoundLaw:
-        found = found_law(problem, common, chosen.point.release[still], noise, still)
+        release = chosen.point.release[still]
+        found = found_law(problem, common, release, noise, still, actuated(common))
         if given is None:
             return found
         steps = inertia_of_steps(given, float(given.dof_damping[0]) + found.patch.damping[0])
@@ -343,24 +391,29 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     def compiled(common: bytes) -> mujoco.MjModel:
         return patched(model, law(np.frombuffer(common)).patch)[0].compile()
 
-    actuator = None if model.law.actuator is None else model.law.actuator.index
-    moments = {run.id for run in study.campaign.runs if run.drive is None or run.drive.column == "moment_nm"}
-
     def simulate(common: Array, start: Start, duration: float) -> Motion:
-        by = None if start.run in moments else actuator
+        by = actuator.index if actuator is not None and start.run in runs else None
         return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration, by)
 
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
-    closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
+    native = frozenset[str]() if actuated(chosen.point.common) is None else runs
+    closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     found = law(chosen.point.common)
     differences = found.differences
+    if found.patch.friction > 0.0:
+        creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
+        differences += (
+            Fact("soft friction", {"below_per_s": creep, "unit": "m" if model.law.slide else "rad"}),
+        )
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     own = list(chosen.point.release)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
-        own = [_restarted(problem, chosen.point.common, one, i, simulate)[0] for i, one in enumerate(own)]
-    starts = [_start(problem, one, i) for i, one in enumerate(own)]
+        common = chosen.point.common
+        own = [_restarted(problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
+    inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
+    starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from diagnosis.settings.origin import BY_CHANCE, ONE_IN_1000, setting
+from identification.policy import TRADE_OFF_CORRELATION
 
 
 @dataclass(frozen=True)
@@ -238,6 +239,12 @@ class AnswerSettings:
         "Standard deviation over a parameter's value and usual size from which it is not determined.",
         "judgement",
         "Even its order of magnitude is then unknown.",
+    )
+    trades_off_from: float = setting(
+        TRADE_OFF_CORRELATION,
+        "Absolute correlation of two parameters from which they are said to trade off.",
+        "convention",
+        "The variance of each is ten times what it would be with the other known: collinear, as regression has it.",
     )
     patched_misses: float = setting(
         0.02,

@@ -165,10 +165,12 @@ PATCH: Mapping[str, Sentence] = {
     "its greatest moment within the records.",
     "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it. Call "
     "tunnel_sim.load_plugin() before MuJoCo reads the file.",
-    "soft friction": "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint "
-    "creeps. Its time constant is set to two steps, the shortest allowed.",
-    "presliding": "The presliding of the friction has no native element and is left out.",
-    "friction against rate": "The friction's dependence on the rate has no native element and is left out.",
+    "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it yields as a damper "
+    "does, and a joint that friction holds creeps. Its time constant is set to two steps, the shortest allowed.",
+    "presliding": "The presliding of the friction has no native element, the plugin acts on hinges only, and it is "
+    "left out.",
+    "friction against rate": "The friction's dependence on the rate has no native element, the plugin acts on "
+    "hinges only, and it is left out.",
     "rod": "The twist of the rod is left out: it needs a body and a joint of its own.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",

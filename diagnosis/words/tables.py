@@ -38,6 +38,7 @@ from identification.printing import (
     coefficient_label,
     estimated,
     significant,
+    trade_off_line,
     unit_mark,
 )
 from identification.status import Remark
@@ -323,8 +324,7 @@ def closing_lines(document: Document) -> list[str]:
     if checked["agrees"]:
         apart = reading_shown(checked["largest_difference_rad"], 2, unit)
         lines.append(f"The gaps are computed by the MuJoCo model, which agrees with the fits within {apart}")
-    if hidden := hidden_line(document):
-        lines.append(hidden)
+    lines += [line for line in (trade_off_line(document, COEFFICIENTS), hidden_line(document)) if line]
     if note:
         lines.append(f"Note: {note}")
     remarks = [str(Remark.from_json_dict(remark)) for remark in document.get("remarks", ())]

@@ -34,6 +34,7 @@ from identification.printing import TextTable, coefficients_table, status_lines
 from identification.status import Status
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows
+from tunnel_lab.report.page import render_report
 from tunnel_lab.terminal import outputs
 
 Document = dict[str, Any]
@@ -199,6 +200,21 @@ def test_noise_and_confirmation(given: Document) -> None:
     assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
     given["confirmation"]["agrees"] = False
     assert len(closing_lines(given)) == 1
+
+
+def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_separate_it(
+    given: Document,
+) -> None:
+    names = ["mechanical_damping", "coulomb_friction.friction_moment"]
+    given["trade_off"] = {"parameters": names, "correlation": -0.976, "remedy": "drive it slower"}
+    line = (
+        "What trades off: damping and coulomb friction (friction moment) are poorly separable in these runs "
+        "(correlation −0.98): drive it slower"
+    )
+    assert line in diagnosis_parts(given)
+    assert line in closing_lines(given)
+    assert f"<p>{line}.</p>" in render_report(given, campaign())
+    assert "What trades off" not in render_report(given | {"trade_off": None}, campaign())
 
 
 def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_table(given: Document) -> None:

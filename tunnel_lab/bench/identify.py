@@ -14,7 +14,15 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import SYMBOLS, TextTable, repeatability_lines, status_lines, unit, with_std
+from identification.printing import (
+    SYMBOLS,
+    TextTable,
+    repeatability_lines,
+    status_lines,
+    trade_off_line,
+    unit,
+    with_std,
+)
 from identification.status import Remark
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
@@ -167,7 +175,8 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
     notes: dict[str, list[str]] = {}
     for document in documents:
         remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-        for line in [*remarks, *repeatability_lines(document), *status_lines(document)]:
+        beside = [*repeatability_lines(document), trade_off_line(document, SYMBOLS)]
+        for line in filter(None, [*remarks, *beside, *status_lines(document)]):
             notes.setdefault(line, []).append(document["estimator"])
     return [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),

@@ -98,7 +98,8 @@ def diagnose(
             "--free",
             metavar="A,B",
             help="Parameters of the model to fit: inertia, damping, stiffness, rest (a constant moment where "
-            "nothing holds the joint). Default: those that the runs can determine.",
+            "nothing holds the joint), gain (the kp of a position servo). Default: those that the runs can "
+            "determine.",
         ),
     ] = None,
     actuator: Annotated[

@@ -39,7 +39,11 @@ def import_files(
     ] = None,
     input_as: Annotated[
         str | None,
-        _column("--input-as", metavar="COLUMN", help="What the input is: moment_nm, drive or base_rad."),
+        _column(
+            "--input-as",
+            metavar="COLUMN",
+            help="What the input is: moment_nm, drive, base_rad or command_rad.",
+        ),
     ] = None,
     input_hold: Annotated[
         str | None,

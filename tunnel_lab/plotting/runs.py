@@ -54,7 +54,7 @@ MOST_PANELS = 24
 _COLUMNS = 3
 _POINTS = 2000  # least and greatest readings of as many stretches are drawn
 _GREY = "0.6"
-_INPUTS = {"moment_nm": "moment", "drive": "input", "base_rad": "root"}
+_INPUTS = {"moment_nm": "moment", "drive": "input", "base_rad": "root", "command_rad": "command"}
 
 
 def run_label(run: Run) -> str:

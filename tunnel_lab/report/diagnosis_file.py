@@ -132,6 +132,10 @@ class DiagnosisDocument(Document):
         default_factory=list,
         description="effects that could hide: the largest size that the runs do not exclude, and its moves",
     )
+    trade_off: Table | None = Field(
+        default=None,
+        description="the two parameters that the runs separate least: parameters, correlation, remedy",
+    )
     found: Table = Field(
         default_factory=dict, description="what the sentences state beside the numbers, each with its kind"
     )

@@ -44,6 +44,7 @@ from tunnel_lab.report.drawing import (
     misfit_scale,
     run_labels,
 )
+from tunnel_lab.report.friction import friction_figure
 from tunnel_lab.report.repeatability import repeatability_figure
 from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
@@ -87,6 +88,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
         }
     figures |= {
         "which": candidates_figure(document),
+        "friction": friction_figure(document),
         "repeatability": repeatability_figure(document),
         "how-far": closure_figure(document),
         "law": law_figure(document),

@@ -30,7 +30,7 @@ from diagnosis.words.tables import (
     patch_table,
 )
 from diagnosis.words.verdict import headline, next_steps
-from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
+from identification.printing import COEFFICIENTS, p_text, significant, trade_off_line, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
@@ -54,6 +54,7 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
+    "friction": "Friction against rate: the fitted law with its band, and points by the energy lost.",
     "repeatability": "Frequency and damping ratio of every run minus the model's, with the scatter as a band.",
     "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
@@ -134,6 +135,7 @@ def render_report(
         "set_out": set_out(document),
         "coefficients": view.coefficient_rows(document),
         "coefficients_line": coefficients_line(document),
+        "trade_off": trade_off_line(document, COEFFICIENTS),
         "next_steps": next_steps(document),
         "place": view.place_rows(document),
         "lines": view.line_rows(document),

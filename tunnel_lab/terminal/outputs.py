@@ -290,6 +290,8 @@ def show_estimate(
     say(BRACKETS)
     for line in printing.repeatability_lines(document):
         say(line)
+    if line := printing.trade_off_line(document, SYMBOLS):
+        say(line)
     command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
     for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
         say(f"Note: {line.replace(DIAGNOSE, command)}")

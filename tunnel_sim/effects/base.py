@@ -298,6 +298,18 @@ class Effect:
         del stiffness
         return 0.0
 
+    def sliding(self, rate: Array) -> Array | None:
+        """The effect's friction while the body moves at a steady rate, against the motion.
+
+        Args:
+            rate: above 0, rad/s, shape (n,).
+
+        Returns:
+            The moment, N m, shape (n,); None of an effect that is no friction.
+        """
+        del rate
+        return None
+
     def moment_density(self, rate: float, reference_moment: float) -> float:
         """Spectral intensity of the effect's random moment, as if it were white.
 

@@ -12,9 +12,12 @@ from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.record import Array
 
 # At 2 rad/s, saturating friction has then risen to 96 %, and 2 % of a peak remain. Beyond, it would follow damping.
 _LOW_RATE = 1.0  # rad/s
+_SHOWN = 2.0  # standard deviations from which a presliding range is more than the textbook form has
+_UNCHANGED_AT = 2.0  # rad/s: where the power of the rate is 1, as in the compiled law
 _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "presliding": "presliding",
     "friction_exponent": "exponent",
@@ -111,13 +114,41 @@ class CoulombFriction(Effect):
             std, rate = stds.get("peak"), text(values["peak_rate"], stds.get("peak_rate"), "rad/s")
             more = text(100.0 * peak, None if std is None else 100.0 * std, "%")
             return f"{said} and up to {more} more below a rate of {rate}"
+        presliding, std = values.get("presliding", 0.0), stds.get("presliding")
+        if std is not None and presliding > _SHOWN * std:
+            return f"{said} whose contact deflects by {text(presliding, std, 'rad')} before it slides"
         return said
 
     def stands(self, stiffness: float) -> float:
         """The angle at which the spring's moment is that of the friction at rest, rad; 0 where it then vanishes."""
+        return self.at_rest / stiffness if stiffness > 0.0 else 0.0
+
+    @property
+    def at_rest(self) -> float:
+        """The friction that holds a body at rest, N m; 0 where it vanishes with the rate."""
         rises = self.exponent > 0.0 or self.saturation > 0.0
-        at_rest = 0.0 if rises else self.friction_moment * (1.0 + self.peak)
-        return at_rest / stiffness if stiffness > 0.0 else 0.0
+        return 0.0 if rises else self.friction_moment * (1.0 + self.peak)
+
+    @classmethod
+    def of_law(cls, parameters: Mapping[str, float]) -> CoulombFriction:
+        """The friction of a moment law.
+
+        Args:
+            parameters: of the law by name, in its units; those not given are 0.
+        """
+        own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
+        return cls(parameters.get("friction_moment", 0.0), **own)
+
+    def sliding(self, rate: Array) -> Array:
+        """The friction at a steady rate, when the contact has deflected fully, N m, shape (n,).
+
+        Args:
+            rate: above 0, rad/s, shape (n,).
+        """
+        power = (rate / _UNCHANGED_AT) ** self.exponent
+        rise = np.tanh(rate / self.saturation) if self.saturation > 0.0 else 1.0
+        peak = 1.0 + self.peak * np.exp(-((rate / self.peak_rate) ** 2))
+        return np.asarray(self.friction_moment * power * rise * peak, np.float64)
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with steps short enough to resolve the contact."""

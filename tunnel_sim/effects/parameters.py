@@ -40,6 +40,7 @@ class ParameterInfo:
         inside: whether a fit that ends at a bound of it asks for another law, as with a free exponent.
         of_input: whether it says what the effect has to do with the input of a driven run; values are tried and not
             fitted. Free decays do not depend on it.
+        along_run: whether it shapes a change along the run.
     """
 
     name: str
@@ -59,6 +60,7 @@ class ParameterInfo:
     per_pressure: bool
     inside: bool
     of_input: bool
+    along_run: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
         """Least and greatest value that a fit may take.
@@ -97,6 +99,7 @@ def parameter(
     per_pressure: bool = False,
     inside: bool = False,
     of_input: bool = False,
+    along_run: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -115,6 +118,7 @@ def parameter(
         "per_pressure": per_pressure,
         "inside": inside,
         "of_input": of_input,
+        "along_run": along_run,
     }
     return field(default=default, metadata=metadata)
 
@@ -138,7 +142,7 @@ EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 def settling() -> Any:
     """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
     meaning = "length of the run over the drift's time constant"
-    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True)
+    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True)
 
 
 def ramp(part: Array, rate: float) -> Array:

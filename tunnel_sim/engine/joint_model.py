@@ -117,6 +117,15 @@ def read_joint_model(
     if law.stiffness == 0.0 and "stiffness" in fitted:
         what = "the joint has no spring whose stiffness could be fitted"
         raise TunnelError(what, where="--free", remedy="leave out stiffness")
+    if "gain" in fitted and (law.actuator is None or not law.actuator.servo[1] < 0.0):
+        what = "no position servo drives the joint whose gain could be fitted"
+        raise TunnelError(what, where="--free", remedy="name its actuator with --actuator, or leave out gain")
+    if {"inertia", "gain"} <= set(fitted) and not law.terms:
+        what = "inertia and gain cannot both be found where the servo alone holds the joint"
+        raise TunnelError(what, where="--free", remedy="name one of the two")
+    if {"gain", "stiffness"} <= set(fitted):
+        what = "the gain of the servo is a stiffness of the joint, too, and only one of them can be fitted"
+        raise TunnelError(what, where="--free", remedy="name one of the two")
     if {"inertia", "stiffness"} <= set(fitted) and not (law.terms or driven):
         what = "inertia and stiffness of a linear spring cannot both be found from free decays"
         raise TunnelError(what, where="--free", remedy="name one of the two")

@@ -22,7 +22,29 @@ from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 # the plugin wants them
 _AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
+_SPARE = 2  # samples of a delayed control beyond the delay: both neighbours of a time between samples
+_SLOW = 1e-9  # rad/s: slower than any creep
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
+
+
+@dataclass(frozen=True)
+class ActuatorPatch:
+    """What stands between the control of an actuator and its moment.
+
+    MuJoCo delays the control, clips it and then filters it. The range of the control clips it before the filter,
+    and leaves out the bias of a servo; ``forcerange`` would do neither.
+
+    Args:
+        index: of the actuator in the model.
+        limit: greatest control, in its own unit; 0: the model's own range.
+        lag: time constant of its filter, s; 0: none.
+        delay: of the control, s; 0: none.
+    """
+
+    index: int
+    limit: float = 0.0
+    lag: float = 0.0
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -35,6 +57,8 @@ class JointPatch:
         damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
         friction: the whole moment of dry friction, N m.
         program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
+        kp: of the position servo that drives the joint, N m/rad; None: as in the model.
+        contact: numerics of the plugin's own friction, by name, N m and rad; empty: ``friction`` is all.
         noise: standard deviation of the sensor's noise, rad; 0: not written.
     """
 
@@ -43,6 +67,9 @@ class JointPatch:
     damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 0.0
     program: tuple[float, ...] = ()
+    contact: tuple[tuple[str, float], ...] = ()
+    actuator: ActuatorPatch | None = None
+    kp: float | None = None
     noise: float = 0.0
 
 
@@ -88,7 +115,13 @@ def patched(
     joint.frictionloss = patch.friction
     if patch.friction != before.dof_frictionloss[0]:
         joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
-    if patch.program:
+    if patch.actuator is not None:
+        _write_actuator(spec, patch.actuator)
+    if patch.kp is not None and model.law.actuator is not None:
+        servo, share = spec.actuators[model.law.actuator.index], -patch.kp / model.law.actuator.servo[1]
+        servo.gainprm[0] *= share
+        servo.biasprm[1] *= share
+    if patch.program or patch.contact:
         if model.law.slide:
             raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
         plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
@@ -96,7 +129,10 @@ def patched(
         spec.activate_plugin("vwt.yaw_moment")
         for name in _AIR:
             spec.add_numeric(name=name, data=[0.0], size=1)
-        spec.add_numeric(name="moment_program", data=list(patch.program), size=len(patch.program))
+        for name, value in patch.contact:
+            spec.add_numeric(name=name, data=[value], size=1)
+        if patch.program:
+            spec.add_numeric(name="moment_program", data=list(patch.program), size=len(patch.program))
     if patch.noise != 0.0:  # on the joint's position sensor, which is added where there is none
         kind = mujoco.mjtSensor.mjSENS_JOINTPOS
         own = (one for one in spec.sensors if one.type == kind and one.objname == model.joint)
@@ -110,7 +146,9 @@ def patched(
         name = f"{start.run} at {start.time:.6g} s"
         if (known := spec.key(name)) is not None:
             spec.delete(known)
-        spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
+        key = spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
+        if patch.actuator is not None and patch.actuator.lag > 0.0 and start.drive is not None:
+            key.act = [start.drive.values[0]]
     with _refusals(model):
         after = spec.compile()
     old, new = _attributes(before), _attributes(after)
@@ -121,6 +159,24 @@ def patched(
         if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
         and (spring or name != "joint springref")
     )
+
+
+def _write_actuator(spec: mujoco.MjSpec, patch: ActuatorPatch) -> None:
+    """The limit of a control as its range, a lag as a filter, and a delay as a history of the control."""
+    actuator = spec.actuators[patch.index]
+    if patch.limit > 0.0:
+        low, high = (
+            actuator.ctrlrange if spec.compile().actuator_ctrllimited[patch.index] else (-np.inf, np.inf)
+        )
+        actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.ctrlrange = np.array([max(low, -patch.limit), min(high, patch.limit)])
+    if patch.lag > 0.0:
+        actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+        actuator.dynprm[0] = patch.lag
+    if patch.delay > 0.0:
+        actuator.delay = patch.delay
+        actuator.nsample = math.ceil(patch.delay / spec.option.timestep) + _SPARE
+        actuator.interp = 1
 
 
 def _refusals(model: JointModel) -> AbstractContextManager[None]:
@@ -196,6 +252,21 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
     return 0.5 * float(options.timestep) * ends
 
 
+def creep_rate(model: mujoco.MjModel, rest: float) -> float:
+    """The rate up to which ``frictionloss`` yields as a damper does, as the engine computes it at rest, rad/s.
+
+    Args:
+        model: whose joint has a ``frictionloss``.
+        rest: position of the joint at which no other moment acts, rad.
+    """
+    data, forces = mujoco.MjData(model), []
+    for rate in (0.0, _SLOW):
+        data.qpos[0], data.qvel[0] = rest, rate
+        mujoco.mj_forward(model, data)
+        forces.append(float(data.qfrc_constraint[0]))
+    return float(model.dof_frictionloss[0]) * _SLOW / (forces[0] - forces[1])
+
+
 def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
@@ -248,6 +319,16 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
         ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
         ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
         ("actuator moment without control", "N m"): [constant],
+        **{
+            (f"actuator {model.actuator(i).name or i + 1} {name}", unit): values
+            for i in range(model.nu)
+            for name, unit, values in (
+                ("gain", "1", [model.actuator_gainprm[i, 0]]),
+                ("ctrlrange", "1", model.actuator_ctrlrange[i] * model.actuator_ctrllimited[i]),
+                ("time constant", "s", [model.actuator_dynprm[i, 0] * _filters(model, i)]),
+                ("delay", "s", [model.actuator_delay[i]]),
+            )
+        },
         **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
         ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
         ("plugin vwt.yaw_moment", "1"): [model.nplugin],
@@ -255,12 +336,18 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
+def _filters(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator follows its control with a lag."""
+    return int(model.actuator_dyntype[actuator]) == int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+
+
 def simulate_joint(
     model: mujoco.MjModel, law_rest: float, start: Start, duration: float, actuator: int | None = None
 ) -> Motion:
     """Simulate one run of a patched model, by displacement from rest, with the model's own integrator and steps.
 
-    In every step the input has its mean over the step.
+    In every step the input has its mean over the step. A delayed control is read between steps by integrators of
+    higher order: they take its means around the steps' starts.
 
     Args:
         law_rest: the joint's position at rest, rad.
@@ -275,8 +362,12 @@ def simulate_joint(
     data.qpos[0], data.qvel[0] = law_rest + start.angle, start.rate
     angle, rate, given = np.empty(count), np.empty(count), np.zeros(count)
     if start.drive is not None:
-        given = start.drive.means(model.opt.timestep * np.arange(count + 1))
+        delayed = actuator is not None and model.actuator_delay[actuator] > 0.0
+        staged = delayed and int(model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
+        given = start.drive.means(model.opt.timestep * (np.arange(count + 1) - 0.5 * staged))
         given = given * start.drive.scale if actuator is None else given
+        if actuator is not None:
+            _begin(model, data, actuator, float(given[0]))
     pushed, at = (data.qfrc_applied, 0) if actuator is None else (data.ctrl, model.actuator_ctrladr[actuator])
     with no_log():
         for i in range(count):
@@ -286,3 +377,15 @@ def simulate_joint(
         what = "the patched model's motion grows without bound"
         raise TunnelError(what, where=f"run {start.run}", remedy="shorten its timestep")
     return Motion(np.arange(count) * model.opt.timestep, angle - law_rest, rate)
+
+
+def _begin(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, control: float) -> None:
+    """Let an actuator begin as one whose control has been constant for long."""
+    low, high = model.actuator_ctrlrange[actuator]
+    if _filters(model, actuator):
+        held = min(max(control, low), high) if model.actuator_ctrllimited[actuator] else control
+        data.act[model.actuator_actadr[actuator]] = held
+    if model.actuator_delay[actuator] > 0.0:
+        samples = int(model.actuator_history[actuator, 0])
+        times = model.opt.timestep * (np.arange(samples) - float(samples))
+        mujoco.mj_initCtrlHistory(model, data, actuator, times, np.full((samples, 1), control))

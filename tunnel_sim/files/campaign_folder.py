@@ -39,8 +39,8 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import Drive, Hold, without_spring_needs_drive
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS, INPUT_COLUMNS, Drive, Hold, without_spring_needs_drive
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_of
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -79,14 +79,17 @@ class RunTable(StrictModel):
     id: OneLine = Field(description="a short unique name in quotes")
     file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
     spring_stiffness: NotNegative | None = optional(
-        "a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
-        "normalised form"
+        "a positive number in N m/rad, 0 for a driven body without a spring, the kp of a position servo, or leave "
+        "it out for the normalised form"
     )
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
     air_density: Positive | None = optional("a positive number in kg/m3")
     release_angle: float | None = optional("a number in rad")
     drive_hold: Hold | None = optional("'zero' or 'linear', between the samples of a driven run's input")
     drive_gain: float | None = optional("a number other than 0 in N m per unit of the column drive")
+    servo_kv: NotNegative | None = optional(
+        "a number in N m s/rad, zero or more, of the servo of command_rad"
+    )
 
 
 class CampaignDocument(StrictModel):
@@ -154,7 +157,7 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
         | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record", "drive")})
-        | ({} if run.drive is None else _stated({"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}))
+        | ({} if run.drive is None else _stated(run.drive.stated))
         for run in campaign.runs
     ]
     return document
@@ -228,11 +231,13 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
                 what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
                 remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
                 raise TunnelError(what, where=where, remedy=remedy)
-            drive = Drive(held.input_column, held.input, run.drive_hold, run.drive_gain)
-        elif run.drive_hold is not None or run.drive_gain is not None:
-            what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
-            remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
-            raise TunnelError(what, where=where, remedy=remedy)
+            if run.servo_kv is not None and held.input_column != "command_rad":
+                what = f"servo_kv = {run.servo_kv:g} of the column {held.input_column}"
+                raise TunnelError(what, where=where, remedy="give servo_kv of a column command_rad only")
+            drive = Drive(held.input_column, held.input, run.drive_hold, run.drive_gain, run.servo_kv)
+        elif keys := [key for key in DRIVE_KEYS if getattr(run, key) is not None]:
+            remedy = f"add a column {one_of(INPUT_COLUMNS)} to the run file, or leave the key out"
+            raise TunnelError(f"{keys[0]} without an input column", where=where, remedy=remedy)
         record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
         without_spring_needs_drive(run.spring_stiffness, drive, where)
         conditions = run.spring_stiffness, run.air_density, run.release_angle

@@ -14,12 +14,11 @@ from tunnel_sim.files.readers import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
-_INPUT = ("drive_hold", "drive_gain")
 _RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")
 _SHEET_ROWS = 1_048_576
 
@@ -84,7 +83,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
-    return (*_CONDITIONS, *_INPUT) if _input_columns(campaign) else _CONDITIONS
+    return (*_CONDITIONS, *DRIVE_KEYS) if _input_columns(campaign) else _CONDITIONS
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
@@ -102,7 +101,7 @@ def _conditions(run: Run) -> dict[str, float | str]:
     """The stated conditions of a run by key; of a driven run those of its input too."""
     stated: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
     if run.drive is not None:
-        stated |= {"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}
+        stated |= run.drive.stated
     return {key: value for key, value in stated.items() if value is not None}
 
 

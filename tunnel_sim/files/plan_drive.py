@@ -143,9 +143,10 @@ def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
         time_s: of the samples from 0 on, shape (n,), s.
     """
     given, column, values = read_input(path, where)
-    if column == "drive":
+    if column not in ("moment_nm", "base_rad"):
+        what = "no known unit" if column == "drive" else "a servo in place of the spring, which no plan has"
         remedy = "name it moment_nm (N m on the body) or base_rad (rad of the spring's root)"
-        raise TunnelError("the column drive has no known unit", where=where, remedy=remedy)
+        raise TunnelError(f"the column {column} has {what}", where=where, remedy=remedy)
     given = given - given[0]
     slack = 1e-6 * (time_s[1] - time_s[0])
     if given[-1] < time_s[-1] - slack:

@@ -86,7 +86,8 @@ class Run:
 
     Args:
         wind_speed: V, m/s; 0 is wind-off.
-        spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
+        spring_stiffness: Kr, N m/rad; of a run with a ``command_rad`` the servo's kp; None: the run is identified
+            in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
     """
@@ -114,8 +115,9 @@ class Run:
         """The moment on the body per unit of the input, N m; None where it is not known, and of a free decay."""
         if self.drive is None:
             return None
-        known = {"moment_nm": 1.0, "drive": self.drive.gain, "base_rad": self.spring_stiffness}
-        return known[self.drive.column]
+        if not self.drive.on_body:
+            return self.spring_stiffness
+        return 1.0 if self.drive.column == "moment_nm" else self.drive.gain
 
     @property
     def driven_by_stiffness(self) -> bool:

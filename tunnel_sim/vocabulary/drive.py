@@ -1,4 +1,4 @@
-"""The input of a driven run: a known moment, an input of unknown gain, or the motion of the spring's root."""
+"""The input of a driven run: a moment, an input of unknown gain, a spring's moving root, or a servo's command."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.record import Array, Record, read_only
 
 Hold = Literal["zero", "linear"]
@@ -16,11 +16,18 @@ Hold = Literal["zero", "linear"]
 HOLDS: tuple[Hold, ...] = ("zero", "linear")
 """The holds by their order, 0 and 1."""
 
-InputColumn = Literal["moment_nm", "drive", "base_rad"]
-"""A known moment on the body, N m; an input of unknown gain, any unit; the angle of the spring's root, rad."""
+InputColumn = Literal["moment_nm", "drive", "base_rad", "command_rad"]
+"""A known moment on the body, N m; an input of unknown gain, any unit; the angle of the spring's root, rad; the
+angle that a position servo is told to hold, rad. A servo is a spring from there to the body, and a damper."""
 
-INPUT_COLUMNS: tuple[InputColumn, ...] = ("moment_nm", "drive", "base_rad")
+INPUT_COLUMNS: tuple[InputColumn, ...] = ("moment_nm", "drive", "base_rad", "command_rad")
 """The columns of a run file that may hold its input."""
+
+OF_SPRING: frozenset[InputColumn] = frozenset({"base_rad", "command_rad"})
+"""Those that act through the spring."""
+
+DRIVE_KEYS = ("drive_hold", "drive_gain", "servo_kv")
+"""The keys of a run that state its input."""
 
 _CONSTANT = 1e-9  # of the largest value, within which an input counts as constant
 _ITSELF = 1e-7  # share of the variance by which an input must differ from every multiple of the response
@@ -38,16 +45,24 @@ class Drive:
         values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
         hold: between the samples; None: not stated, and taken as linear.
         gain: N m per unit of a ``drive``; None where it is not stated.
+        servo_kv: of the servo of a ``command_rad``, which is a damper to the ground, N m s/rad; None where it is
+            not stated. The servo's kp is the stiffness of the run's spring.
     """
 
     column: InputColumn
     values: Array
     hold: Hold | None = None
     gain: float | None = None
+    servo_kv: float | None = None
 
     def __post_init__(self) -> None:
         """Copy the values and make them read-only."""
         object.__setattr__(self, "values", read_only(self.values))
+
+    @property
+    def stated(self) -> dict[str, float | str | None]:
+        """What is stated of it, by the key of the format (`DRIVE_KEYS`), in its units; None where it is not."""
+        return {"drive_hold": self.hold, "drive_gain": self.gain, "servo_kv": self.servo_kv}
 
     @property
     def held(self) -> bool:
@@ -57,12 +72,12 @@ class Drive:
     @property
     def on_body(self) -> bool:
         """Whether it is a moment on the body; else it acts through the spring."""
-        return self.column != "base_rad"
+        return self.column not in OF_SPRING
 
     @property
     def unit(self) -> str:
         """Of the values."""
-        return {"moment_nm": "N m", "drive": "units", "base_rad": "rad"}[self.column]
+        return "rad" if self.column in OF_SPRING else {"moment_nm": "N m", "drive": "units"}[self.column]
 
 
 def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
@@ -123,7 +138,10 @@ def refuse_untreated(
     """
     remedy = "state the spring's stiffness, or name the input moment_nm or drive"
     what = ""
-    if spring_stiffness == 0.0 and not drive.on_body:
+    if spring_stiffness == 0.0 and drive.column == "command_rad":
+        what = "the command acts through the servo, whose kp is spring_stiffness, which is 0"
+        remedy = "state the kp of the servo as spring_stiffness, or leave spring_stiffness out"
+    elif spring_stiffness == 0.0 and not drive.on_body:
         what = "the motion of the root acts through the spring, and spring_stiffness = 0 states none"
     elif quantity == "acceleration":  # it jumps where a held input does
         what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
@@ -145,5 +163,5 @@ def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | No
             "'spring_stiffness' = 0 is not greater than 0, and only a driven run may have no spring",
             where=where,
             remedy="give spring_stiffness as a positive number in N m/rad, or the run file an input column "
-            f"{', '.join(INPUT_COLUMNS[:-1])} or {INPUT_COLUMNS[-1]}",
+            f"{one_of(INPUT_COLUMNS)}",
         )

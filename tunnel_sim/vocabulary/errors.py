@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -62,6 +62,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 def counted(count: int, noun: str) -> str:
     """A number of things in words: "1 gap", "2 gaps"; the plural of the noun ends in s."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def one_of(names: Sequence[str]) -> str:
+    """Two names or more as a choice: "one, two or three"."""
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 EXTRAS = {

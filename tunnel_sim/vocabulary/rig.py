@@ -17,6 +17,7 @@ FREE_PARAMETERS: Mapping[str, str] = {
     "damping": "mechanical_damping",
     "stiffness": "added_stiffness",
     "rest": "zero",
+    "gain": "servo_kp",
 }
 
 
@@ -68,7 +69,8 @@ class JointLaw:
         damping: C, N m s/rad.
         friction: moment of dry friction, N m.
         rest: the joint's position at rest, rad; where nothing holds it, the middle of its records.
-        free: which of `FREE_PARAMETERS` are fitted; where nothing holds the joint, ``rest`` is a constant moment.
+        free: which of `FREE_PARAMETERS` are fitted, the ``gain`` kp of a position servo among them; where
+            nothing holds the joint, ``rest`` is a constant moment.
         actuator: whose control drives the runs; None: no run is driven by a control.
         step: of the model, s.
         lead: by which the motion leads its input, as it does in integrators of first order, s.

@@ -38,13 +38,14 @@ def campaign(drive: Drive | None = None, spring: float | None = 16.0) -> Campaig
         Drive("drive", INPUT, "linear", -2.5),
         Drive("drive", INPUT),
         Drive("base_rad", 0.1 * INPUT, "linear"),
+        Drive("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7),
     ],
 )
 def test_a_mixed_campaign_is_read_as_it_was_written(tmp_path: Path, run_format: str, drive: Drive) -> None:
     read = read_campaign(write_campaign(campaign(drive), tmp_path / "c", run_format=run_format))
     found = read.runs[0].drive
     assert found is not None
-    assert (found.column, found.hold, found.gain) == (drive.column, drive.hold, drive.gain)
+    assert (found.column, found.stated) == (drive.column, drive.stated)
     assert found.values.tobytes() == drive.values.tobytes()
     assert read.runs[1].drive is None
     assert "1 driven" in repr(read)
@@ -131,6 +132,7 @@ def log(path: Path, name: str, values: np.ndarray, response: np.ndarray = RESPON
         ("torque (Nm)", "moment_nm"),
         ("shaker (V)", "drive"),
         ("base_rad", "base_rad"),
+        ("command_rad", "command_rad"),
     ],
 )
 def test_import_finds_the_input_and_says_why(tmp_path: Path, name: str, column: str) -> None:
@@ -172,6 +174,7 @@ def test_an_input_on_another_clock_is_refused(tmp_path: Path) -> None:
         (Drive("drive", INPUT, "zero", -2.5), 16.0),
         (Drive("drive", INPUT, "linear"), 0.0),
         (Drive("base_rad", 0.1 * INPUT, "zero"), 16.0),
+        (Drive("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7), 16.0),
     ],
 )
 def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Drive, spring: float) -> None:
@@ -185,7 +188,7 @@ def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Drive
         assert (after.drive is None) == (before.drive is None)
     found = read.runs[0].drive
     assert found is not None
-    assert (found.column, found.hold, found.gain) == (drive.column, drive.hold, drive.gain)
+    assert (found.column, found.stated) == (drive.column, drive.stated)
     assert np.max(np.abs(found.values - drive.values)) < 1e-15 * (kind == "xlsx") + 1e-300
 
 

@@ -324,14 +324,33 @@ def test_gear_play_before_a_spring_is_written_for_the_plugin(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_delay_of_the_input_is_named_and_stays_out_of_the_model(tmp_path: Path) -> None:
+def test_a_delay_of_the_input_is_named_and_written_into_the_actuator(tmp_path: Path) -> None:
     data = robot_campaign(robot(TRUE), delay=2)
     answer = diagnose(data, kinds=vocabulary(KINDS), model=own_model(tmp_path, data, robot()))
     assert answer.causes == ("input_delay",)
     assert near(answer, "delay", 2.0 / RATE)
     assert answer.model is not None
     assert answer.model.closure.native_closed > 0.999
-    assert any("delay of the input is not part of the model" in note for note in answer.model.notes)
+    assert not any("delay of the input" in note for note in answer.model.notes)
+    xml = answer.model.write(tmp_path / "out.xml").read_text()
+    assert mujoco.MjModel.from_xml_string(xml).actuator_delay[0] == pytest.approx(2.0 / RATE, rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_lag_of_the_actuator_is_named_and_written_as_its_filter(tmp_path: Path) -> None:
+    lagging = MOTOR.replace("/>", ' dyntype="filterexact" dynprm="0.03"/>').replace("<motor", "<general")
+    data = robot_campaign(robot(TRUE, actuators=lagging))
+    kinds = vocabulary((*KINDS, "actuator_lag", "actuator_saturation"))
+    answer = diagnose(data, kinds=kinds, model=own_model(tmp_path, data, robot()))
+    assert answer.causes == ("actuator_lag",)
+    assert near(answer, "lag", 0.03, 0.02)
+    assert answer.model is not None
+    assert answer.model.closure.native_closed > 0.998
+    written = mujoco.MjModel.from_xml_string(answer.model.write(tmp_path / "out.xml").read_text())
+    assert written.actuator_dynprm[0, 0] == pytest.approx(0.03, rel=0.02)
+    assert written.key_act[:, 0] == pytest.approx(
+        [run.drive.values[0] for run in data.runs if run.drive], rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("integrator", [slow("implicitfast"), "Euler"])

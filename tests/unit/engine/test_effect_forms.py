@@ -208,3 +208,14 @@ def test_friction_that_vanishes_at_rest_holds_nothing() -> None:
 def test_the_form_of_friction_is_said(form: dict[str, float], said: str) -> None:
     kind = effect_class("coulomb_friction")
     assert kind.phrase({"friction_moment": 0.02, **form}, {}, lambda v, _std, unit: f"{v:g} {unit}") == said
+
+
+def test_a_presliding_range_is_said_where_it_is_more_than_its_error() -> None:
+    def said(std: float | None) -> str:
+        given = {"friction_moment": 0.02, "presliding": 0.01}
+        return effect_class("coulomb_friction").phrase(
+            given, {"presliding": std}, lambda v, _std, unit: f"{v:g} {unit}"
+        )
+
+    assert said(0.001) == "dry friction of 0.02 N m whose contact deflects by 0.01 rad before it slides"
+    assert said(0.006) == said(None) == "dry friction of 0.02 N m"

@@ -20,6 +20,7 @@ from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
 from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.figures import backbone_figure, law_figure
+from tunnel_lab.report.friction import friction_figure
 
 Document = dict[str, Any]
 
@@ -344,6 +345,29 @@ def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Documen
     (reading,) = law_figure(given | {"closable": {"curve": law | {"unit": "rad"}}}).axes
     np.testing.assert_allclose([y for _, y in curve(reading.lines[0])], np.degrees([3.0, 1.0, -2.0]))
     assert reading.get_ylabel() == "error of the reading [°]"
+
+
+def test_friction_is_drawn_with_its_band_and_the_points_with_their_errors(given: Document) -> None:
+    assert friction_figure(given) is None
+    found = {
+        "effect": "coulomb_friction", "unit": "N m",
+        "rate_rad_s": [0.1, 1.0], "moment": [3.0, 2.0], "std": [0.1, 0.2],
+        "points": [{"rate_rad_s": 0.2, "moment": 2.5, "std": 0.05, "strokes": 3}],
+    }  # fmt: skip
+    fig = friction_figure(given | {"maps": given["maps"] | {"friction": found}})
+    assert fig is not None
+    (axes,) = fig.axes
+    assert curve(axes.lines[0]) == [(0.1, 3.0), (1.0, 2.0)]
+    assert band(axes.collections[0]) == pytest.approx(
+        np.array([(0.1, 2.804), (0.1, 3.196), (1.0, 1.608), (1.0, 2.392)])
+    )
+    (points,) = axes.containers
+    assert curve(points.lines[0]) == [(0.2, 2.5)]
+    assert points.lines[2][0].get_segments()[0][:, 1] == pytest.approx([2.402, 2.598])
+    assert axes.get_ylim()[0] == 0.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("rate [rad/s]", "coulomb friction [N m]")
+    (other,) = friction_figure(given | {"maps": {"friction": found | {"unit": "rad/s2", "points": []}}}).axes
+    assert other.get_ylabel() == "coulomb friction [rad/s², over inertia]"
 
 
 def test_every_run_is_drawn_against_the_model_with_its_band() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.answer.assemble import localise
 from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary, Step, Waterfall
+from diagnosis.facts.friction import FrictionCurve, FrictionPoint
 from diagnosis.facts.remainder import Ceiling, Closable, Curve
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
@@ -33,6 +34,11 @@ CAUSE = "quadratic_damping"
 CLOSABLE = Closable(
     0.37, (Ceiling("angle", 0.417, 0.023, "runs"), Ceiling("time", -3.0, 7.0, "runs")), "angle", "A moment.",
     curve=Curve(("angle",), ((-0.1, 0.0, 0.1),), (-0.002, 0.0, 0.003), (0.001, 0.001, 0.001), "N m"),
+)  # fmt: skip
+
+FRICTION = FrictionCurve(
+    "coulomb_friction", "N m", (0.1, 1.0, 10.0), (0.004, 0.005, 0.006), (1e-4, 2e-4, 3e-4),
+    (FrictionPoint(0.3, 0.0041, 2e-4, 5), FrictionPoint(3.0, 0.0057, 1e-4, 40)),
 )  # fmt: skip
 
 
@@ -81,7 +87,10 @@ def document(data):
         waterfall=Waterfall((Step(None, base.excess), Step(CAUSE, 0.01)), {CAUSE: base.excess}, "somewhere"),
         seconds={"nominal fit": 0.5},
     )  # fmt: skip
-    drawn = {"maps": maps.to_json_dict(), "repeatability": scattering_document()["repeatability"]}
+    drawn = {
+        "maps": maps.to_json_dict() | {"friction": FRICTION.to_json_dict()},
+        "repeatability": scattering_document()["repeatability"],
+    }
     return json.loads(json.dumps(answer.to_json_dict() | drawn, allow_nan=False))
 
 

@@ -77,7 +77,7 @@ class ImportChoices(StrictModel):
     end: float | None = optional("a time of the file in s: later samples are left out")
     rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
     input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
-    input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
+    input_as: InputColumn | None = optional("'moment_nm', 'drive', 'base_rad' or 'command_rad'")
     input_hold: Hold | None = optional("'zero' or 'linear'")
     leave_out: tuple[OneLine, ...] = Field(
         default=(), strict=False, description="a list of names of runs or files"

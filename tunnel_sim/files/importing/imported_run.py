@@ -184,8 +184,10 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
     order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
     hold: Hold | None = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else None)
     gain = gain if column == "drive" else None
+    kv = raw.input_facts.get("servo_kv") if column == "command_rad" else None
     if choices.input_hold is None:
         asked = "not stated, linear is assumed; --input-hold zero if a controller holds each command"
         said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
-    return Drive(column, values[kept], hold, gain)
+    said += [] if kv is None else [f"servo_kv = {kv:g} from the file"]
+    return Drive(column, values[kept], hold, gain, kv)

@@ -14,7 +14,7 @@ from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, heading, is_input
 from tunnel_sim.files.importing.units import UNITS, kind_of
-from tunnel_sim.vocabulary.drive import Drive, InputColumn, checked_drive
+from tunnel_sim.vocabulary.drive import OF_SPRING, Drive, InputColumn, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -103,14 +103,17 @@ def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: li
         if name == "moment_nm" or _moment_unit(channel)
         else "base_rad"
         if kind_of(channel.unit) == "angle" and (name == "base_rad" or _BASE.search(channel.name))
+        else "command_rad"
+        if name == "command_rad"
         else "drive"
     )
     column = choices.input_as or guessed
-    factor = UNITS["angle"].get(channel.unit, 1.0) if column == "base_rad" else 1.0
+    factor = UNITS["angle"].get(channel.unit, 1.0) if column in OF_SPRING else 1.0
     meaning = {
         "moment_nm": "a known moment in N m",
         "drive": "an input of unknown gain",
         "base_rad": "the angle of the spring's root",
+        "command_rad": "the command of a position servo",
     }[column]
     size, lag = correlation(channel.values, reading)
     said.append(

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.units import UNITS as UNITS
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS, HOLDS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.text_cells import from_text_cell
 
 if TYPE_CHECKING:
     import polars as pl
 
-INPUT_FACTS = ("drive_hold", "drive_gain")
+INPUT_FACTS = DRIVE_KEYS
 """What a file may state of the input of a run, as an export writes it."""
 
 _RUN_NAMES = re.compile(
@@ -102,7 +102,7 @@ def heading(channel: Channel) -> str:
 
 
 def with_input_facts(table: Table) -> Table:
-    """A table whose columns ``drive_hold`` and ``drive_gain``, as an export writes them, are single numbers."""
+    """A table whose columns `DRIVE_KEYS`, as an export writes them, are single numbers."""
     stated = [channel for channel in table.channels if channel.name in INPUT_FACTS]
     facts = {c.name: float(good[0]) for c in stated if (good := c.values[np.isfinite(c.values)]).size}
     channels = tuple(channel for channel in table.channels if channel not in stated)

@@ -1,0 +1,168 @@
+"""A position servo: the moment kp (command − angle) − kv rate holds the joint where it is told to be.
+
+It is a spring of stiffness kp from the command to the joint, and a damper of kv to the ground. The runs show kv and
+the joint's own damping as a sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.rig import PerInertia, Rig
+from diagnosis.model.similarity import Similarity
+from diagnosis.model.starts import responses
+from tunnel_sim.effects import Effect
+from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from diagnosis.model.run_data import Data, RunData
+
+_NO_SPRING = "The servo is no spring, and these effects of one are not tried: {}."
+#: Why play is not tried where a servo holds the joint.
+OF_GEAR = (
+    "The servo holds the motor, so that play would be between motor and link: that takes a model of two bodies, "
+    "and is not tried: {}."
+)
+_SLOW = 0.1  # 1/s: a small decay rate of the similar rig
+
+
+def by_command(campaign: Campaign) -> bool:
+    """Whether any run is driven by the command of a servo."""
+    return any(run.drive is not None and run.drive.column == "command_rad" for run in campaign.runs)
+
+
+@dataclass(frozen=True)
+class _OfServo(NominalModel):
+    """What servos of known and of unknown gain share.
+
+    Args:
+        kv: of the servo, N m s/rad; the damping that is fitted comes beside it.
+    """
+
+    kv: float = 0.0
+
+    resonance_known: ClassVar[bool] = True  # a servo may be damped so well that none shows
+
+    def of(self, campaign: Campaign) -> NominalModel:
+        """With the kv that the runs state."""
+        stated = {0.0 if run.drive is None else run.drive.servo_kv or 0.0 for run in campaign.runs}
+        return replace(super().of(campaign), kv=min(stated))  # type: ignore[call-arg]  # refuse: they are one
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse runs without the servo, and servos of several gains.
+
+        Raises:
+            TunnelError: for the first such run.
+        """
+        for run in campaign.runs:
+            if run.drive is None or run.drive.column != "command_rad":
+                raise TunnelError(
+                    "the run has no command_rad, and other runs do: the servo may not have held the joint in it",
+                    where=f"{campaign.name}, run '{run.id}'",
+                    remedy="diagnose the runs without the servo separately",
+                )
+        if len({(run.spring_stiffness, run.drive and run.drive.servo_kv) for run in campaign.runs}) > 1:
+            raise TunnelError(
+                "the runs state servos of several gains",
+                where=campaign.name,
+                remedy="diagnose the runs of each servo separately",
+            )
+        super().refuse(campaign)
+
+    def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
+        """Effects of a spring, and play."""
+        play = [kind for kind in kinds if kind.parts]
+        of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
+        left = [kind for kind in kinds if kind not in (*play, *of_spring)]
+        return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)
+
+    def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
+        """The physics of several runs, with the damping of the servo."""
+        return super().settings(
+            {**values, "mechanical_damping": values["mechanical_damping"] + self.kv}, runs
+        )
+
+    def unseen(self, data: Data) -> Sequence[str]:
+        """The two dampers."""
+        del data
+        which = (
+            "which part of the damping is the servo's kv" if self.kv == 0.0 else "an error of the servo's kv"
+        )
+        return (f"{which}: only its sum with the joint's damping shows",)
+
+    def planned_springs(self, data: Data) -> tuple[float, ...]:
+        """None: the servo cannot be exchanged."""
+        del data
+        return ()
+
+
+@dataclass(frozen=True)
+class Servo(_OfServo, Rig):
+    """A joint held by a servo of stated kp: Izz β̈ + (C + kv) β̇ = kp (command − β).
+
+    Args:
+        kv: of the servo, N m s/rad; the damping that is fitted comes beside it.
+    """
+
+    coefficient_units: ClassVar[Mapping[str, str]] = {
+        "yaw_inertia": "kg m2", "mechanical_damping": "N m s/rad", **Rig.coefficient_units,
+    }  # fmt: skip
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Where a run has a command, and every run states the kp."""
+        return by_command(campaign) and Rig.describes(campaign)
+
+    def similar(self, change: Similarity) -> NominalModel:
+        """The kv of the similar campaign."""
+        return replace(self, kv=change.similar(self.kv, "N m s/rad"))
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """Inertia and damping by the response to the command, whose gain is the kp; then as a rig."""
+        shown = [
+            (run.spring_stiffness / one[1], 2.0 * one[0])
+            for run, one in zip(data.runs, responses(data), strict=True)
+            if one is not None and run.spring_stiffness is not None
+        ]
+        if shown and not self.own_zeros:
+            inertia, loss = np.median(shown, axis=0).tolist()
+            damping = max(inertia * max(loss, _SLOW) - self.kv, 0.0)
+            own = [{"release_angle": float(np.mean(run.reading[:3]))} for run in data.runs]
+            yield Start({"yaw_inertia": inertia, "mechanical_damping": damping}, own)
+        yield from super().starts(data)
+
+
+@dataclass(frozen=True)
+class ServoPerInertia(_OfServo, PerInertia):
+    """A joint held by a servo of unknown kp: all moments are per unit inertia, the kp among them.
+
+    Args:
+        kv: of the servo, which is not known either: 0 N m s/rad.
+    """
+
+    of_spring: ClassVar[str] = "servo_kp"
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Where a run has a command, and one states no kp."""
+        return by_command(campaign) and PerInertia.describes(campaign)
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse a kv without a kp, as for every servo.
+
+        Raises:
+            TunnelError: for the first such run.
+        """
+        super().refuse(campaign)
+        if any(run.drive is not None and run.drive.servo_kv for run in campaign.runs):
+            what = "servo_kv is stated, and no kp: without it moments are known per unit inertia only"
+            remedy = "state the kp as spring_stiffness, or leave servo_kv out"
+            raise TunnelError(what, where=campaign.name, remedy=remedy)

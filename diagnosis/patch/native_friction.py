@@ -1,0 +1,87 @@
+"""Friction of any form as MuJoCo has it: its own element as far as it goes, and the plugin for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.facts.found import Fact
+from tunnel_sim.effects.friction import AGAINST_RATE, CoulombFriction
+from tunnel_sim.physics.expression import parse
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import JointLaw
+
+_AGAINST_RATE = "friction's dependence on the rate"
+_FACTORS = {  # on the friction, by the term of the moment law
+    "friction_exponent": "(abs(r)/2)^n",
+    "friction_saturation": "tanh(abs(r)/v0)",
+    "friction_peak": "(1+b*exp(-(r/vs)^2))",
+}
+_SYMBOLS = {"n": "exponent", "v0": "saturation", "b": "peak", "vs": "peak_rate"}
+
+
+@dataclass(frozen=True, eq=False)
+class NativeFriction:
+    """Friction as it is written into a model, in the units of the law.
+
+    Args:
+        loss: ``frictionloss`` of the joint, N m.
+        damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
+        program: of a further moment of the plugin; empty: none.
+        contact: numerics of the plugin's own friction, with their values and units; empty: none.
+        differences: where the native element is not the same law, and what is left out.
+    """
+
+    loss: float = 0.0
+    damping: Array = field(default_factory=lambda: np.zeros(3))
+    program: tuple[float, ...] = ()
+    contact: tuple[tuple[str, float, str], ...] = ()
+    differences: tuple[Fact, ...] = ()
+
+
+def native_friction(
+    parameters: Mapping[str, float], rates: Array, law: JointLaw, damping: float, may_miss: float
+) -> NativeFriction:
+    """The friction of a moment law in the elements of MuJoCo.
+
+    Friction that depends on the rate is ``frictionloss`` and the joint's polynomial damping where these miss less
+    of it than is allowed. Else ``frictionloss`` is the friction at rest, which holds the joint, and the plugin adds
+    the rest, which is zero there. The plugin has a presliding contact of its own.
+
+    Args:
+        parameters: of the moment law, by name.
+        rates: that the runs visit, above 0, rad/s, shape (n,).
+        law: of the joint as the model has it.
+        damping: what is written beside that of the joint, N m s/rad.
+        may_miss: share of the greatest friction that a polynomial may miss.
+    """
+    friction = CoulombFriction.of_law(parameters)
+    moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
+    if moment == 0.0 or not (terms or friction.presliding):
+        return NativeFriction(moment)
+    if law.slide:
+        left_out = "friction against rate" if terms else "presliding"
+        return NativeFriction(moment, differences=(Fact(left_out),))
+    if not terms:
+        contact = (("friction_moment", moment, "N m"), ("presliding", friction.presliding, "rad"))
+        return NativeFriction(contact=contact, differences=(_by_plugin("friction's presliding"),))
+    wanted = friction.sliding(rates)
+    powers = np.vander(rates / rates[-1], 4, increasing=True)
+    found = np.linalg.lstsq(powers, wanted, rcond=1e-12)[0]
+    missed = float(np.max(np.abs(powers @ found - wanted)) / np.max(wanted))
+    found = found / rates[-1] ** np.arange(4)
+    if missed < may_miss and found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0:
+        figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
+        return NativeFriction(float(found[0]), found[1:], differences=(Fact("polynomial", figures),))
+    values = {"F": moment, "F0": friction.at_rest} | {
+        symbol: getattr(friction, name) for symbol, name in _SYMBOLS.items()
+    }
+    text = f"-sign(r)*(F*{'*'.join(_FACTORS[term] for term in terms)}-F0)"
+    program = parse(text, frozenset({"r", *values})).program(values, {"r": "rate"})
+    return NativeFriction(friction.at_rest, program=program, differences=(_by_plugin(_AGAINST_RATE),))
+
+
+def _by_plugin(moment: str) -> Fact:
+    return Fact("no native element", {"moment": moment})

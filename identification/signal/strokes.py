@@ -1,0 +1,111 @@
+"""The energy that a motion loses from one reversal to the next.
+
+At a reversal the body is at rest, and all its energy is in what restores it. Between two reversals friction and
+damping take the work of the input less the gain of that energy, whatever their laws are; of a free decay see Feeny
+& Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.vocabulary.record import Array
+
+_WINDOW = 0.12  # of the time between reversals, on both sides of one: its extreme is a parabola's there
+_FEWEST = 2  # samples on either side
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """A motion from reversal to reversal, n strokes.
+
+    Args:
+        turns: places of the reversals among the samples, shape (n + 1,).
+        angle: at the reversals, rad, shape (n + 1,).
+        lost: energy that friction and damping have taken, J, shape (n,).
+        spread: standard deviation of those angles over that of white noise of the samples, a ratio, shape (n + 1,).
+    """
+
+    turns: NDArray[np.int64]
+    angle: Array
+    lost: Array
+    spread: Array
+
+    @property
+    def travel(self) -> Array:
+        """Angle passed in every stroke, rad, shape (n,)."""
+        return np.abs(np.diff(self.angle))
+
+
+def reversals(angle: Array, least: float) -> NDArray[np.int64]:
+    """Places of the extremes of a motion between which it travels far enough, shape (k,).
+
+    The ends of the record are none: the body need not be at rest there.
+
+    Args:
+        angle: rad, shape (n,).
+        least: travel that makes a stroke, rad.
+    """
+    places, low, high, upward = [], 0, 0, 0
+    for place, value in enumerate(angle.tolist()):
+        if value > angle[high]:
+            high = place
+        if value < angle[low]:
+            low = place
+        if upward >= 0 and angle[high] - value >= least:  # it has turned back from a maximum
+            places.append(high)
+            upward, low = -1, place
+        elif upward <= 0 and value - angle[low] >= least:
+            places.append(low)
+            upward, high = 1, place
+    if places and (places[0] == 0):
+        places = places[1:]
+    return np.array(places, dtype=np.int64)
+
+
+def strokes(
+    angle: Array, turns: NDArray[np.int64], stiffness: float, moment: Array | None = None, centre: float = 0.0
+) -> Strokes:
+    """The energy balance of every stroke.
+
+    Args:
+        angle: at even times, rad, shape (n,).
+        turns: from `reversals`, of this motion or of one that is nearly the same, shape (k,).
+        stiffness: of what restores the body, N m/rad.
+        moment: of the input on the body at those times, N m, shape (n,); None: a free decay.
+        centre: the angle at which nothing is restored, rad.
+
+    Returns:
+        The strokes; the angles of the reversals are the extremes of parabolas through the samples around them.
+    """
+    gaps = np.diff(turns)
+    found = [
+        _extreme(angle, place, int(gaps[max(number - 1, 0) : number + 1].min(initial=angle.size)))
+        for number, place in enumerate(turns.tolist())
+    ]
+    extreme, spread = np.array(found).reshape(-1, 2).T
+    stored = 0.5 * stiffness * (extreme - centre) ** 2
+    lost = -np.diff(stored)
+    if moment is not None:
+        path = angle.copy()
+        path[turns] = extreme
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (moment[1:] + moment[:-1]) * np.diff(path))])
+        lost = lost + np.diff(work[turns])
+    return Strokes(turns, extreme, lost, spread)
+
+
+def _extreme(angle: Array, place: int, gap: int) -> tuple[float, float]:
+    """Of a parabola through the samples around a reversal, rad, and its standard deviation over the noise's."""
+    reach = max(_FEWEST, round(_WINDOW * gap))
+    first, last = max(place - reach, 0), min(place + reach + 1, angle.size)
+    powers = np.vander(np.arange(first - place, last - place, dtype=np.float64), 3)
+    inverse = np.linalg.pinv(powers)
+    square, slope, value = inverse @ angle[first:last]
+    top = 0.0
+    if square != 0.0:
+        top = float(np.clip(-0.5 * slope / square, first - place, last - 1 - place))
+    at = np.array([top**2, top, 1.0])
+    return float(at @ [square, slope, value]), float(np.linalg.norm(at @ inverse))

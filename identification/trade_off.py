@@ -1,0 +1,171 @@
+"""The two parameters that the runs of a campaign separate least, and the run that would separate them.
+
+Every parameter has a role: the powers with which its moment changes with what can be changed between runs. Two
+parameters are separated by a run in which something is changed that they follow with different powers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.policy import TRADE_OFF_CORRELATION
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class TradeOff:
+    """Two parameters of which the runs know a combination better than either.
+
+    Args:
+        parameters: names of both, in the order of the fit; those of effects are ``effect.parameter``.
+        correlation: of their errors, −1 to 1, dimensionless.
+        remedy: the run that would separate them, as a clause in the imperative.
+    """
+
+    parameters: tuple[str, str]
+    correlation: float
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Role:
+    """How the moment of a parameter follows what can be changed between runs.
+
+    Args:
+        amplitude: power of the amplitude of the motion, dimensionless; None: no power, as of a parameter that
+            shapes a law.
+        frequency: power of the frequency of the motion, dimensionless.
+        wind: power of the wind speed, dimensionless.
+        weight: whether the angle at which a known weight is held shows it, and little else.
+        input: whether it acts through the input of driven runs only.
+        reading: whether it is an error of the reading, which is no moment.
+        stated: whether it is an error of a stated stiffness.
+        length: whether it shapes a change along the run.
+    """
+
+    amplitude: float | None = 1.0
+    frequency: float = 0.0
+    wind: float = 0.0
+    weight: bool = False
+    input: bool = False
+    reading: bool = False
+    stated: bool = False
+    length: bool = False
+
+
+ROLES: Mapping[str, Role] = {
+    "yaw_inertia": Role(frequency=2.0),
+    "stiffness": Role(),
+    "added_stiffness": Role(),
+    "mechanical_damping": Role(frequency=1.0),
+    "cn_beta": Role(wind=2.0),
+    "cn_r": Role(frequency=1.0, wind=1.0),
+    "drive_gain": Role(amplitude=0.0, input=True),
+    "servo_kp": Role(weight=True),
+    "moment_offset": Role(amplitude=0.0),
+    "zero": Role(amplitude=0.0, reading=True),
+}
+"""Of the parameters of the nominal models, by name."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What can be changed between the runs of a rig.
+
+    Args:
+        springs: whether its spring can be exchanged, as that of a joint of a model cannot.
+        driven: whether it is driven.
+    """
+
+    springs: bool
+    driven: bool
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> Setting:
+        """That of a campaign."""
+        return cls(campaign.law is None and not campaign.unrestrained, campaign.driven)
+
+
+def _at_other_frequencies(rig: Setting) -> str:
+    if rig.springs:
+        return "add runs with a much softer or stiffer spring"
+    return (
+        "drive it at lower and higher frequencies"
+        if rig.driven
+        else "add runs with a known inertia on the body"
+    )
+
+
+def _at_other_amplitudes(rig: Setting) -> str:
+    return f"{'drive it to' if rig.driven else 'add releases from'} larger and smaller angles"
+
+
+def _always(words: str) -> Callable[[Setting], str]:
+    return lambda _: words
+
+
+_RUNS: Sequence[tuple[Callable[[Role], object], Callable[[Setting], str]]] = (
+    (lambda role: role.stated, _always("calibrate the springs by weights")),
+    (lambda role: role.reading, _always("read the sensor at known angles")),
+    (lambda role: role.wind, _always("add runs with the wind off or at another wind speed")),
+    (lambda role: role.weight, _always("hold the link against a known weight")),
+    (lambda role: role.input, _always("add free decays, or an input of another form")),
+    (lambda role: role.length, _always("add longer runs")),
+    (lambda role: role.amplitude, _at_other_amplitudes),
+    (lambda role: role.frequency, _at_other_frequencies),
+)
+"""What can be changed, the surest first, and the run that changes it."""
+
+
+def separating(first: Role, second: Role, rig: Setting) -> str:
+    """The run that separates two parameters, as a clause in the imperative."""
+    for follows, run in _RUNS:
+        if follows(first) != follows(second):
+            return run(rig)
+    if first.amplitude is None:  # both shape a law
+        return _at_other_amplitudes(rig)
+    return "measure one of them by itself"
+
+
+def trade_off(
+    names: Sequence[str],
+    covariance: Array,
+    roles: Mapping[str, Role],
+    rig: Setting,
+    least: float = TRADE_OFF_CORRELATION,
+) -> TradeOff | None:
+    """The two parameters whose errors are correlated most; None where no correlation is large.
+
+    Args:
+        names: of the parameters.
+        covariance: of them, in the products of their units, shape (p, p); a parameter that is not known by the fit
+            has a variance of zero, and is left out.
+        roles: by name.
+        least: absolute correlation from which two parameters trade off, a ratio.
+    """
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = np.flatnonzero((std > 0.0) & np.isfinite(std))
+    if known.size < 2:
+        return None
+    scaled = covariance[np.ix_(known, known)] / np.outer(std[known], std[known])
+    sizes = np.triu(np.abs(scaled), 1)
+    one, other = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+    if not sizes[one, other] >= least:
+        return None
+    pair = names[known[one]], names[known[other]]
+    correlation = float(np.clip(scaled[one, other], -1.0, 1.0))
+    return TradeOff(pair, correlation, separating(roles[pair[0]], roles[pair[1]], rig))
+
+
+def of_coefficients(names: Sequence[str], covariance: Array, campaign: Campaign) -> TradeOff | None:
+    """The trade-off among the coefficients of an estimate.
+
+    Args:
+        names: of the coefficients.
+        covariance: of them, in the products of their units, shape (p, p).
+    """
+    return trade_off(names, covariance, ROLES, Setting.of(campaign))

@@ -1,0 +1,50 @@
+"""The figure of friction against rate: the fitted law with its band, and the points of the energy balance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from diagnosis.words.numbers import plain
+from identification.printing import unit_mark
+from tunnel_lab.plotting.style import INTERVAL, figure, grid, log_axis, styled
+from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER, Document
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_ROOM = 1.15  # of the axis over the greatest friction drawn
+_MOST = 1.6  # times the law's greatest friction: a point that is known far worse lies beyond the axis
+
+
+@styled
+def friction_figure(document: Document) -> Figure | None:
+    """Friction against rate with 95 % intervals; None where the answer has none."""
+    found = (document.get("maps") or {}).get("friction")
+    if found is None:
+        return None
+    rate, moment, std = (np.array(found[name], np.float64) for name in ("rate_rad_s", "moment", "std"))
+    fig = figure(NARROW, 3.0)
+    axes = fig.add_subplot()
+    low, high = moment - INTERVAL * std, moment + INTERVAL * std
+    axes.fill_between(rate, np.maximum(low, 0.0), high, color=AFTER, alpha=0.25, lw=0)
+    axes.plot(rate, moment, color=AFTER, label="law, fitted")
+    tops = [float(high.max())]
+    if found["points"]:
+        at, mean, error = (
+            np.array([point[name] for point in found["points"]], np.float64)
+            for name in ("rate_rad_s", "moment", "std")
+        )
+        axes.errorbar(
+            at, mean, yerr=INTERVAL * error, fmt="o", color=INK, mfc=PAPER, ms=5, capsize=2, elinewidth=1.0,
+            label="energy lost between reversals",
+        )  # fmt: skip
+        tops.append(min(float((mean + INTERVAL * error).max()), _MOST * float(moment.max())))
+    axes.set_ylim(0.0, _ROOM * max(tops))
+    mark = "N m" if found["unit"] == "N m" else f"{unit_mark(found['unit'])}, over inertia"
+    axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(found['effect'])} [{mark}]")
+    log_axis(axes, "x")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.0, borderaxespad=0.3)
+    grid(axes)
+    return fig
