@@ -183,11 +183,12 @@ class Between:
         """Which common parameters the runs show not to be zero by themselves, without their comparison.
 
         Args:
-            values: of the common parameters, shape (common,).
-            stds: standard deviations from zero that show it, where the runs may differ most.
+            values: of the common parameters, in their units, shape (common,).
+            stds: distance from zero that shows it, in standard deviations where the runs may differ most,
+                dimensionless.
 
         Returns:
-            Shape (common,).
+            True where it is shown, shape (common,).
         """
         return np.asarray(values**2 >= stds**2 * np.diag(self.most.covariance), np.bool_)
 
