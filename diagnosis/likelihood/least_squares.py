@@ -477,10 +477,10 @@ def covariance_of(matrix: Array) -> Array:
     Args:
         matrix: symmetric, shape (n, n). A parameter that changes nothing has no variance.
     """
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    least = _ROUNDED * float(values[-1]) if values.size else 0.0
     seen = np.diag(matrix) > 0.0
+    scale = np.sqrt(np.where(seen, np.diag(matrix), 1.0))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    least = _ROUNDED * max(float(values[-1]), 1.0) if values.size else 1.0
     inverse = (vectors / np.maximum(values, least)) @ vectors.T
     return np.asarray(np.where(np.outer(seen, seen), inverse / np.outer(scale, scale), 0.0), np.float64)
 
