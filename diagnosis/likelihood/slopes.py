@@ -29,7 +29,8 @@ def changes(asked: Asked, count: int) -> list[Array]:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
         no derivative, its rod twists, or the reading is not linear in the angle.
     """
-    sampled = not reads_linearly(asked.effects[0]) or asked.chain(0).skips
+    acting = {type(effect): effect for effects in asked.effects for effect in effects}.values()
+    sampled = not reads_linearly(tuple(acting)) or any(effect.skips for effect in acting)
     if sampled or any(asked.physics.rod_twist):  # reading a motion takes longer than the motion
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.facts.found import Fact
-from tunnel_sim.effects.friction import AGAINST_RATE, CoulombFriction
+from tunnel_sim.effects.friction import AGAINST_RATE, friction_of
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
@@ -57,7 +57,7 @@ def native_friction(
         damping: what is written beside that of the joint, N m s/rad.
         may_miss: share of the greatest friction that a polynomial may miss.
     """
-    friction = CoulombFriction.of_law(parameters)
+    friction = friction_of(parameters)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
     if moment == 0.0 or not (terms or friction.presliding):
         return NativeFriction(moment)

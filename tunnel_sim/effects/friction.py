@@ -129,16 +129,6 @@ class CoulombFriction(Effect):
         rises = self.exponent > 0.0 or self.saturation > 0.0
         return 0.0 if rises else self.friction_moment * (1.0 + self.peak)
 
-    @classmethod
-    def of_law(cls, parameters: Mapping[str, float]) -> CoulombFriction:
-        """The friction of a moment law.
-
-        Args:
-            parameters: of the law by name, in its units; those not given are 0.
-        """
-        own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
-        return cls(parameters.get("friction_moment", 0.0), **own)
-
     def sliding(self, rate: Array) -> Array:
         """The friction at a steady rate, when the contact has deflected fully, N m, shape (n,).
 
@@ -171,3 +161,13 @@ class CoulombFriction(Effect):
         for term, own in _CONTACT.items():
             runs[term][:] = np.where(friction != 0.0, cls.column(effects, own), 0.0)
         runs["friction_peak_rate"][runs["friction_peak"] == 0.0] = 0.0
+
+
+def friction_of(parameters: Mapping[str, float]) -> CoulombFriction:
+    """The friction of a moment law.
+
+    Args:
+        parameters: of the law by name, in its units; those not given are 0.
+    """
+    own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
+    return CoulombFriction(parameters.get("friction_moment", 0.0), **own)
