@@ -74,5 +74,6 @@ def test_a_random_moment_adds_as_much_along_the_motion_as_along_the_rate(fitted,
             residuals.append(added)
             runs.append(replace(run, reading=run.reading + run.unscaled(added - left)))
         problem = replace(fitted.problem, data=fitted.problem.data.with_runs(tuple(runs)))
-        found.append(follows_the_motion(replace(fitted, problem=problem, residuals=residuals)))
+        acts = [run.id for run in runs if run.wind_on]
+        found.append(follows_the_motion(replace(fitted, problem=problem, residuals=residuals), acts))
     assert np.mean(found) >= 0.5 if follows else not any(found)
