@@ -19,7 +19,7 @@ from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.moments import turbulence
-from tunnel_sim.effects.air import Buffeting
+from tunnel_sim.effects.random_moments import Buffeting
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.plan import AeroDerivatives

@@ -15,7 +15,8 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.plan import EffectSetting
 
-_RANDOM = {"buffeting"}  # its moment is drawn by the simulator; it is among the drawn campaigns
+#: Their moments are drawn by the simulator; they are among the drawn campaigns.
+_RANDOM = {"ambient_vibration", "buffeting"}
 _EFFECTS = [kind for kind in ALL_EFFECTS if not (kind.name in _RANDOM or kind.scatters)]
 _SCATTERING = [kind for kind in ALL_EFFECTS if kind.scatters]
 
