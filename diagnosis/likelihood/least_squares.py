@@ -166,7 +166,6 @@ def project_release(change: Array, slopes: Array) -> Array:
 
 _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
-_ROUNDED = 1e-12  # eigenvalue of a scaled normal matrix, relative to the largest, that rounding makes of zero
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _CORRECTIONS = 2  # of the runs' own parameters after a step
 _TRIES = 9  # dampings tried in a step, each ten times the last
@@ -457,32 +456,17 @@ class _State:
         """The fit as it stands."""
         none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
         matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
+        scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         return Fit(
             self.problem,
             self.here.point,
             self.here.residuals,
             np.array([float(r @ r) for r in self.here.residuals]),
-            covariance_of(matrix),
+            np.asarray(inverse / np.outer(scale, scale), dtype=np.float64),
             self.jacobian,
             converged,
         )
-
-
-def covariance_of(matrix: Array) -> Array:
-    """The covariance of parameters from their normal matrix, shape (n, n).
-
-    What the runs do not determine is as uncertain as rounding lets one say: left out, the others' share of it would
-    seem known.
-
-    Args:
-        matrix: symmetric, shape (n, n). A parameter that changes nothing has no variance.
-    """
-    seen = np.diag(matrix) > 0.0
-    scale = np.sqrt(np.where(seen, np.diag(matrix), 1.0))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    least = _ROUNDED * max(float(values[-1]), 1.0) if values.size else 1.0
-    inverse = (vectors / np.maximum(values, least)) @ vectors.T
-    return np.asarray(np.where(np.outer(seen, seen), inverse / np.outer(scale, scale), 0.0), np.float64)
 
 
 def clip(problem: Problem, point: Point) -> Point:

@@ -11,7 +11,6 @@ from diagnosis.likelihood.least_squares import (
     FitError,
     bounded_step,
     clip,
-    covariance_of,
     fit,
     normal_equations,
     project_release,
@@ -324,14 +323,3 @@ def test_an_effect_at_its_null_predicts_as_without(kind):
     without = Problem(data).predict([Point(common, release)])[0]
     for one, other in zip(with_effect, without, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)
-
-
-def test_what_columns_do_not_determine_is_uncertain_and_not_exact():
-    """Two equal columns determine their sum; a column of zeros has no part in it."""
-    column = np.random.default_rng(1).normal(size=50)
-    jacobian = np.column_stack([column, column, 0.0 * column])
-    found = covariance_of(jacobian.T @ jacobian)
-    known = 1.0 / (column @ column)
-    assert np.sqrt(found[0, 0]) > 1e5 * np.sqrt(known)
-    assert found[0, 0] + found[1, 1] + 2.0 * found[0, 1] == pytest.approx(known, rel=1e-3)
-    assert not found[2].any()
