@@ -302,7 +302,7 @@ def follows_the_motion(fitted: Fit, acts: Collection[str]) -> bool:
 def obeys_a_law(fitted: Fit, source: Source) -> bool:
     """Whether most of what a fit leaves would be closed by one law, the same in all runs.
 
-    A random moment is another one in every run, so that no law fitted to some runs predicts the others. A missing
+    A random moment differs from run to run, so that no law fitted to some runs predicts the others. A missing
     law of angle, rate and wind speed does, and a slow random moment would take its place.
 
     Args:

@@ -37,6 +37,7 @@ class SensorNonlinearity(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.2,)
 
+    # a judgement: a reading that is off by more than 60 % at 20° is another sensor's
     coefficient: float = parameter(
         "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-5.0, fit_upper=5.0
     )
