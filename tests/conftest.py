@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401
 
@@ -15,8 +15,10 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 
 # A loaded machine may take a second over one example.
-settings.register_profile("without deadline", deadline=None)
-settings.load_profile("without deadline")
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A million examples of the fuzzers, which have 24 tests of readers and of `identify`.
+settings.register_profile("long", settings.get_profile("patient"), max_examples=42_000)
+settings.load_profile("patient")
 
 
 @pytest.fixture
