@@ -31,6 +31,15 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Identify records as they are: their examination takes most of the time, and has tests of its own."""
+    from identification import _identify
+    from identification.examination.examine import Examined
+
+    monkeypatch.setattr(_identify, "examine", lambda campaign: Examined(campaign, ()))
+
+
+@pytest.fixture
 def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
 
