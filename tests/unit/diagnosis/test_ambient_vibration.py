@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter, lsim
+from scipy.signal import lfilter
 
 from diagnosis.search.process_noise import is_of_reading, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.steady_noise import is_a_line
+from tests.reference.linear_rig import response
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -50,7 +51,7 @@ def shaken(
 ) -> Campaign:
     """Every run under a random moment of first order about a centre, in N m or in proportion to the pressure.
 
-    The nominal model is linear, so that the response is added; it is that of SciPy, at eight steps a sample.
+    The nominal model is linear, so that the response is added, at eight steps a sample.
     """
     rng, runs = np.random.default_rng(seed), []
     step = INTERVAL / 8
@@ -64,8 +65,8 @@ def shaken(
         pole = np.exp(2.0 * np.pi * (1j * centre - bandwidth) * step)
         white = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
         given = std * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], white))
-        response = lsim(([1.0 / INERTIA], [1.0, damping / INERTIA, stiffness / INERTIA]), given, time)[1][::8]
-        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response)))
+        angle = response(given, step, INERTIA, damping, stiffness)[::8]
+        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle)))
     return replace(data, runs=tuple(runs))
 
 
