@@ -13,6 +13,7 @@ from diagnosis.search.process_noise import is_of_reading, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.steady_noise import is_a_line
+from tests.marks import slow
 from tests.reference.linear_rig import response
 from tests.unit.gap_campaigns import (
     CN_BETA,
@@ -103,6 +104,7 @@ def test_both_at_once_are_one_spectrum_with_a_part_of_each() -> None:
     assert answer.effects == ("ambient_vibration", "buffeting")
 
 
+@pytest.mark.slow
 def test_runs_in_one_wind_cannot_tell_them_apart() -> None:
     found = answers(shaken(of(ONE_WIND), ONE_WIND, moment=0.03))
     assert {answer.effects for answer in found} == {("ambient_vibration",), ("buffeting",)}
@@ -118,6 +120,7 @@ def test_of_two_kinds_that_the_runs_cannot_tell_apart_the_one_that_may_be_named_
         assert answer.kinds == (kind,)
 
 
+@pytest.mark.slow
 def test_without_wind_it_is_the_surroundings() -> None:
     (answer,) = answers(shaken(of(STILL), STILL, moment=0.02))
     assert answer.effects == ("ambient_vibration",)
@@ -128,7 +131,7 @@ def test_without_a_random_moment_none_is_named(conditions: Sequence[tuple[float,
     assert answers(of(conditions)) == []
 
 
-@pytest.mark.parametrize("conditions", [CONDITIONS, STILL, STILL[:1]])
+@pytest.mark.parametrize("conditions", [slow(CONDITIONS), slow(STILL), STILL[:1]])
 def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, float]]) -> None:
     """The law is not offered as a cause; of one run it is predicted from stretch to stretch."""
     for missing in (

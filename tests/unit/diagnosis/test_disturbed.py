@@ -164,6 +164,7 @@ def test_a_blow_soon_after_the_release_leaves_the_run_out() -> None:
     assert found.at_s == pytest.approx(1.6, abs=0.2)
 
 
+@pytest.mark.slow
 def test_the_causes_beside_a_blow_are_those_planted() -> None:
     data = read_campaign(FOREIGN / "disturbed")
     found = diagnose(data, kinds=FEW).to_json_dict()
