@@ -53,7 +53,7 @@ def test_a_single_cause_is_named(names, cause):
     assert answer.causes == (cause,)
 
 
-@pytest.mark.parametrize("form", range(5))
+@pytest.mark.parametrize("form", [0, slow(1), slow(2), slow(3), 4])
 @pytest.mark.parametrize(
     "names",
     [pytest.param(()), slow(("sample_rate",)), slow(("rates_differ", "durations_differ"))],

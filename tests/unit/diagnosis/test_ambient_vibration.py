@@ -92,6 +92,7 @@ def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> 
     assert len(answer.process.runs) == len(CONDITIONS)
 
 
+@pytest.mark.slow
 def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
     assert answer.effects == ("buffeting",)
@@ -143,7 +144,7 @@ def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, flo
         assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
 
 
-@pytest.mark.parametrize("bandwidth", [0.05, 5.0])
+@pytest.mark.parametrize("bandwidth", [slow(0.05), 5.0])
 def test_noise_of_the_reading_is_no_random_moment(bandwidth: float) -> None:
     """Truth: noise of first order added to the readings, a zero that wanders or a sensor's coloured noise."""
     rng, runs, data = np.random.default_rng(8), [], of(STILL)
