@@ -194,6 +194,7 @@ parameters.friction_moment = 0.002
 """
 
 
+@pytest.mark.usefixtures("unexamined")
 def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
     """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
     (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
