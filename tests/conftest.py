@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -19,6 +21,17 @@ settings.register_profile("patient", deadline=None, suppress_health_check=[Healt
 # A million examples of the fuzzers, which have 24 tests of readers and of `identify`.
 settings.register_profile("long", settings.get_profile("patient"), max_examples=42_000)
 settings.load_profile("patient")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Thousands of tests live until the end: the garbage collector would go over them again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture
