@@ -156,9 +156,14 @@ class WholeRuns(View):
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
-        if not found.explains_runs:
+        if not found.explains_runs and self._nearly_explains(found):
             (found,) = with_forms([found], self._scattering_gap, 0.0)
         return replace(found, fit=settled(found.fit))
+
+    def _nearly_explains(self, beside: Hypothesis) -> bool:
+        """Whether what a set beside chance differences leaves within runs could be its effects' other forms."""
+        left, gap = np.sum(misfit(beside.fit).excess), np.sum(self._scattering_gap.excess)
+        return bool(left < self.base.settings.search.nearly_explained * gap)
 
     def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
         """The likeliest of the sets that explain every run by itself and of their parts that do.
