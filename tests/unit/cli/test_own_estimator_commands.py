@@ -16,7 +16,7 @@ from identification import estimators, identify, make_estimator, register_estima
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments import breakdown, runner, score_trials
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score_grid import load_grid

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 import tomli_w
 
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments.sweep import run_shard
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_summary import lines_of
