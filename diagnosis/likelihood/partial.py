@@ -23,9 +23,9 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
     """Fit only each run's own parameters: release and phases.
 
     Args:
-        start: common parameters, which are held, and releases to start from.
-        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
-            about the same parameters.
+        start: common parameters, which are fixed, and releases to start from.
+        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit
+            at nearly the same parameters.
 
     Returns:
         The point found, each run at its own best, and the scaled residuals there by run.
@@ -56,15 +56,15 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
 def fit_seen(
     whole: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str] = ()
 ) -> tuple[Point, list[Array]]:
-    """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
+    """Fit some of the blocks, with the sensitivities of the fit of all blocks.
 
     Args:
-        seen: by run the blocks to fit, shape (n,).
-        held: names of common parameters that stay as they are.
+        seen: the blocks to fit, by run, shape (n,).
+        held: names of common parameters to be kept fixed.
 
     Returns:
-        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
-        of a run that is not seen, stay as they were.
+        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own
+        parameters of a run without blocks to fit, are unchanged.
     """
     free = np.array(
         [whole.bound(name) is None and name not in held for name in whole.problem.names], np.float64

@@ -1,4 +1,4 @@
-"""Effects with numbers of their own in every run, found in the residuals: phases, and instants of skips."""
+"""Effects with their own parameters in every run, found in the residuals: phases, and instants of skips."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or di
 
 @dataclass(frozen=True, eq=False)
 class ResidualsOf:
-    """The residuals of a fit, as effects search them (`tunnel_sim.effects.evidence.Residuals`)."""
+    """The residuals of a fit, searched by effects (`tunnel_sim.effects.evidence.Residuals`)."""
 
     fit: Fit
 
@@ -61,10 +61,10 @@ def ringing(fit: Fit) -> Sought | None:
 
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
-        frequency is left beside the motion's own.
+        frequency is distinct from the motion.
 
-    Where a frequency is that of a run's own motion, or a multiple of it, that run does not count. At least half of
-    them must: springs and winds differ, and a line that is near the motion of one run is beside that of another.
+    A run does not count where the frequency is that of its own motion, or a multiple. At least half of the
+    runs must count: springs and winds differ, so a line near the motion of one run is distinct in another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
@@ -110,11 +110,11 @@ _APART = 0.02  # frequencies tried, relative: within the half-power width of the
 
 
 def excited(fit: Fit) -> Sought | None:
-    """The strongest oscillation beside the motion that the input excites from rest, the same in all runs.
+    """The strongest oscillation, distinct from the motion, that the input excites from rest, common to all runs.
 
     Returns:
-        Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which do nothing in driven
-        runs; None where no run on a spring is driven, or no frequency is left beside the motion's own.
+        Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which are unused in
+        driven runs; None where no run on a spring is driven, or no frequency is distinct from the motion.
     """
     runs, parts, own = fit.problem.data.runs, [], []
     for number, run in enumerate(runs):
@@ -156,11 +156,12 @@ def skip(fit: Fit, *, with_input: bool = False) -> Sought | None:
     """The instants at which the runs jump ahead by one common time.
 
     Args:
-        with_input: whether the input of driven runs jumps too, so that only their state changes at once; else their
-            reading is that of a later time from there on, as in free decays.
+        with_input: whether the input of driven runs jumps too, so that only their state changes at once; else
+            the reading is late from there on, as in free decays.
 
     Returns:
-        The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough, or
+        The time lost (s) with every run's instants, as many as χ² supports; None where no run is long enough,
+        or none has an input that could jump.
         none has an input that could jump.
     """
     data = fit.problem.data
@@ -197,15 +198,15 @@ class _Skip:
 
 
 class _Skipping:
-    """One run, in which skips are sought by linear theory.
+    """Search for skips in one run, by linear theory.
 
-    What a second lost at block k adds to the reading of a later block t is a sum over j of a_j(k) b_j(t) z_j^(t−k):
+    A second lost at block k adds to the reading of a later block t a sum over j of a_j(k) b_j(t) z_j^(t−k):
 
-    - The rate of the motion at t, where the reading alone jumps, and in free decays.
-    - The free motion that begins with the rate and the acceleration at k, where the input jumps too.
+    - where the reading alone jumps, and in free decays: the rate of the motion at t;
+    - where the input jumps too: the free motion that begins with the rate and the acceleration at k.
 
-    The residual changes by what the whitening filter makes of that. What the run's own sensitivities absorb is
-    taken out for all k at once by sums from the end.
+    The residual changes by that sum after the whitening filter. The part absorbed by the run's own
+    sensitivities is removed for all k at once by sums from the end.
     """
 
     def __init__(self, fit: Fit, number: int, *, with_input: bool) -> None:
@@ -230,11 +231,11 @@ class _Skipping:
         self.weight = np.maximum(power, 1e-9 * float(np.sum((self.scale * rate) ** 2)))
 
     def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
-        """The skips that leave least, each sought again beside the others.
+        """The skips of least residual, each sought again beside the others.
 
         Args:
-            found: where the search starts; None starts without any.
-            time: lost at every skip, s; None for a time of its own at each.
+            found: where the search starts; None: without any.
+            time: lost at every skip, s; None: each skip has its own.
         """
         found = list(found or [])
         inside = slice(_EDGE, self.left.size - _EDGE)
@@ -251,7 +252,7 @@ class _Skipping:
         return found
 
     def drop(self, steps: list[_Skip], time: float) -> float:
-        """Of χ² by skips of one time (s)."""
+        """Drop of χ² by skips of one time (s)."""
         left = self.left - self._change([(step, time) for step in steps])
         return float(self.left @ self.left - left @ left)
 
@@ -269,7 +270,7 @@ class _Skipping:
         return self._unabsorbed(self.run.scaled(added))
 
     def _seen(self, whitened: Array) -> Array:
-        """Products of what a second lost at every block adds with values that the filter's transpose changed."""
+        """Products of the change by a second lost at every block with values after the transposed filter."""
         columns = whitened.reshape(len(whitened), -1)
         found = sum(
             (a[:, None] * _after((b * self.scale)[:, None] * columns, z)).real for a, b, z in self.terms
@@ -277,7 +278,7 @@ class _Skipping:
         return np.asarray(found, np.float64).reshape(whitened.shape)
 
     def _powers(self) -> Array:
-        """Powers of what a second lost at every block adds."""
+        """Powers of the change by a second lost at every block."""
         if len(self.terms) == 1:
             # the sum from any value to the last is the power of the whitened slope from there on
             return self.run.noise.powers_onward(np.real(self.terms[0][1] * self.scale))
@@ -297,7 +298,7 @@ class _Skipping:
 
 
 def _after(values: np.ndarray, factor: complex = 1.0) -> np.ndarray:
-    """Sums from each block to the last, every later block times one more power of a factor."""
+    """Sums from each block to the last, each later block multiplied by one more power of a factor."""
     if factor == 1.0:
         return np.cumsum(values[::-1], axis=0)[::-1]
     from scipy.signal import lfilter  # only here: slow to load
