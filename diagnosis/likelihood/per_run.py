@@ -162,7 +162,6 @@ def skip(fit: Fit, *, with_input: bool = False) -> Sought | None:
     Returns:
         The time lost (s) with every run's instants, as many as χ² supports; None where no run is long enough,
         or none has an input that could jump.
-        none has an input that could jump.
     """
     data = fit.problem.data
     runs = [_Skipping(fit, number, with_input=with_input) for number in range(len(data.runs))]
