@@ -1,6 +1,6 @@
 """Caveats, remarks on the noise, and notes, each under the kind of its fact.
 
-A sentence is a template of the fact's figures, or a function of them where it depends on them otherwise.
+A sentence is a template of the fact's figures, or a function of them where a template is not enough.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ NOISE: Mapping[str, Sentence] = {
     "differs by run": "the records contradict the stated {stated_rad:3}: their noise differs by run, "
     "{least_rad:3} to {most_rad:3}",
 }
-"""Why the noise is taken as it is: clauses."""
+"""Reasons for the noise used: clauses."""
 
 REMARKS: Mapping[str, tuple[Sentence, str]] = {
     "within step": (
@@ -158,7 +158,7 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
         "sample faster to tell them apart",
     ),
 }
-"""What is noted of the noise, and its remedy."""
+"""Remarks on the noise, with their remedies."""
 
 PATCH: Mapping[str, Sentence] = {
     "polynomial": "The {moment} is written as a polynomial of third order, which misses {missed_percent:.2g} % of "
@@ -183,12 +183,12 @@ PATCH: Mapping[str, Sentence] = {
     "asks for it; RK4 and shorter steps do not. The inertia that dampers seem to add in such steps is taken off "
     "what is written.",
 }
-"""Where a patched model is not the same law."""
+"""Differences between the patched model and the law found."""
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """A reading in a sentence, written with as many digits as its format says.
+    """A reading in a sentence, with as many digits as its format asks for.
 
     Args:
         value: in the unit.
@@ -230,7 +230,7 @@ _NO_DECAY = "no damping ratio and no derivative is stated, since no run is a fre
 
 
 def coefficient_note(document: Document) -> str:
-    """How to read the coefficients: where a cause changes their meaning, and what unstated sizes leave open."""
+    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
     if document["found"]["limit_cycles"]:
         return _NO_DECAY
     before, causes = document["coefficients"]["before"], document["causes"]
@@ -241,10 +241,10 @@ def coefficient_note(document: Document) -> str:
 
 
 def size_note(beta: str) -> str:
-    """What is identified in place of the coefficients where sizes are not stated.
+    """The quantities identified in place of the coefficients where sizes are not stated.
 
     Args:
-        beta: name of what is identified in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
+        beta: name of the quantity in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
 
     Returns:
         A sentence; empty where the sizes are stated.
