@@ -232,9 +232,9 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    The decision is a likelihood ratio. The spectrum is that of white noise and a first-order process, which is a random walk
-    where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise. It is
-    fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi
+    The decision is a likelihood ratio. The spectrum is that of white noise and a first-order process, which is a
+    random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
+    It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi
     10.1007/BF02590998).
     """
     spectra = []

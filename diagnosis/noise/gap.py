@@ -62,8 +62,8 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 def level_p_value(fit: Fit, noise: Noise) -> float:
     """P-value of the estimated noise level if the stated noise, with its rounding, is right.
 
-    It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the median found,
-    at the largest noise that the statement allows.
+    It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+    median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
     level = noise.estimated / (fit.settings.gap.noise_above_stated * noise.stated_variance)

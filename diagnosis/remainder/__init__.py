@@ -1,1 +1,1 @@
-"""What no named effect explains: how much of it could be closed, and the law that would close it."""
+"""The residual that no named effect explains: the share that could be explained, and the law for it."""
