@@ -96,9 +96,9 @@ class GapSummary:
     """The gap of the campaign.
 
     Args:
-        excess_before: of the nominal model, in noise variances, on readings held out of the fits; where nothing is
-            found, in the fitted runs.
-        excess_after: with the causes added, on the same readings, in noise variances.
+        excess_before: of the nominal model, in units of the noise variance, on readings held out of the fits; where
+            nothing is found, in the fitted runs.
+        excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap that is closed, 0 to 1.
         closed_on: the readings on which these are measured (`diagnosis.facts.closure`).
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
@@ -154,8 +154,8 @@ class Candidate:
     Args:
         effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
         probability: that it is the answer, a fraction.
-        excess_after: with it added, in the fitted runs, in noise variances. Each instant and phase of a single run
-            counts as 10 of χ².
+        excess_after: with it added, in the fitted runs, in units of the noise variance. Each instant and phase
+            of a single run counts as 10 of χ².
         closed: share of the gap that it closes there.
         parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
     """

@@ -21,7 +21,7 @@ class NativeClosure:
     """How far the gap closes on readings held out of the fit.
 
     Args:
-        before: mean squared residual of the nominal model, in noise variances of a block mean.
+        before: mean squared residual of the nominal model, in units of a block mean's noise variance.
         fit: of the fits' own integrator with the causes, in the same unit.
         native: of the patched model, simulated by the engine, in the same unit.
     """

@@ -234,8 +234,8 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
 
     The decision is a likelihood ratio. The spectrum is that of white noise and a first-order process, which is a
     random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
-    It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi
-    10.1007/BF02590998).
+    It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423,
+    doi 10.1007/BF02590998).
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):

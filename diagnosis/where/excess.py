@@ -112,7 +112,7 @@ class BandExcess:
     """One band of the residual, all runs together.
 
     Args:
-        excess: sum of power beyond that of white noise, in noise variances.
+        excess: sum of power beyond that of white noise, in units of the noise variance.
         mean: excess per coefficient, a ratio.
         p_value: probability of as much without a gap.
     """
