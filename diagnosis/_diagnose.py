@@ -82,7 +82,7 @@ def diagnose(
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
-        say("how far it closes")  # where it is, and the answer without what no effect explains
+        say("how far it closes")  # the place, and the answer without the remainder
         patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
         answer = _assembled(study, chosen, patched, unpatched)
         if chosen.limit_cycles:
@@ -173,7 +173,7 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
         with np.errstate(over="raise"):  # a fitted model that runs away
             left = way.closable(study, significant=significant, decided=decided)
         answer = replace(answer, closable=left)
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without it
         caution = (Fact("remainder not solved"),)
     # below one half a set of effects comes first, though each may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}

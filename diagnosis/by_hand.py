@@ -26,7 +26,7 @@ from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
-_ITERATIONS = 6  # of a fit with fewer effects, started from one with more
+_ITERATIONS = 6  # of a fit that starts from one with more effects
 
 
 @dataclass(frozen=True)

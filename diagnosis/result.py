@@ -358,7 +358,7 @@ class Diagnosis:
         Raises:
             TunnelError: for a figure or a run that this diagnosis does not have.
         """
-        from tunnel_lab.report import draw  # the one way up (decision 0001); matplotlib is slow to load
+        from tunnel_lab.report import draw  # the one upward import (decision 0001); matplotlib is slow
 
         return draw(self.to_json_dict(), what, runs)
 

@@ -81,7 +81,7 @@ def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
     return replace(found, std=None, determined=False)
 
 
-_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it was stopped by the bound
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it is at the bound
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:

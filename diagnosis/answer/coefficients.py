@@ -191,7 +191,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
     fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
-            continue  # held
+            continue  # fixed
         move = max((hidden.moves[name].value for hidden in answers.hidden), default=0.0)
         each = [
             of

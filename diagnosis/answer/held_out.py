@@ -142,8 +142,8 @@ def excess_base(study: Study) -> Base:
     return Base(estimated, 0.0, hum)
 
 
-_ITERATIONS = 6  # the fit of all causes is close for the parameters that are left
-_NO_GAIN = 0.999  # of the χ² of a fit of fewer causes: another start may do better
+_ITERATIONS = 6  # the fit of all causes is close for the other parameters
+_NO_GAIN = 0.999  # share of the χ² of fewer causes above which another start is tried
 
 Names = frozenset[str]
 
@@ -222,7 +222,7 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     else:
         last = models.random_excess(random)
         without = {name: last + size for name, size in models.read_off.items()}
-        acting = [kind.name for kind in random.kinds]  # one may act steadily, too, and be among the steps
+        acting = [kind.name for kind in random.kinds]  # a cause may act steadily too, and be among the steps
         moment = " + ".join([name for name in acting if name not in names] or acting)
         without[moment] = steps[-1].excess
         steps.append(Step(moment, last))
@@ -243,8 +243,8 @@ class _Models:
     def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
         self._study, self._base, self._known = study, base, dict(known)
         powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
-        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # and what each adds
-        self._ratio = 1.0 + base.extra  # of the estimated noise to the base
+        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # contributions
+        self._ratio = 1.0 + base.extra  # estimated noise over the base
         self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)
         self.causes: Names = self._fit.causes | self.read_off.keys()

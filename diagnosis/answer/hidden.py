@@ -81,7 +81,7 @@ class _Size:
 
     size: float
     moves: Array  # of the coefficients there, shape (coefficients,)
-    drop: float  # of χ² at the likeliest size, less what the runs' own numbers gain by chance
+    drop: float  # of χ² at the likeliest size, less the chance gain of parameters per run
 
 
 def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
@@ -112,7 +112,7 @@ def _within(
     assert start.scaled is not None
     size = float(start.point.common[start.scaled])
     least, greatest = size_range(start)
-    if start.second_order:  # of the other sign the effect has another law
+    if start.second_order:  # with the opposite sign the effect follows another law
         least = 0.0
     parts = [1.0, 0.5] if start.second_order else [1.0]
     seen = [_profiled(fit, start, part, influence, least_share) for part in parts]
@@ -145,7 +145,7 @@ def _real_roots(polynomial: Array) -> list[float]:
 
 
 _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
-_LEAST_PART = 1e-3  # of the way to a trial
+_LEAST_PART = 1e-3  # least step towards a trial, as a share of it
 _REAL = 1e-6  # share of a root that its imaginary part may be
 
 

@@ -168,7 +168,7 @@ def remainder(
         hidden: the effects that could hide beside the answer.
     """
     random, chosen = study.random, study.settings.answer
-    if random is not None:  # where it acts it leaves innovations
+    if random is not None:  # its runs have innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if run.id not in random.process.runs]
         both = np.concatenate([*random.process.innovations, *still])

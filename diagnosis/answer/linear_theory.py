@@ -20,7 +20,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
 _SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
-_OWN_SIZE = 3.0  # factor by which linear theory may change the size that was found in the records' lines
+_OWN_SIZE = 3.0  # factor by which linear theory may change a size found in the records' lines
 
 
 def wind_on_runs(fit: Fit) -> list[WindOnRun]:
@@ -89,9 +89,9 @@ def coefficient_move(fit: Fit, name: str) -> float:
         rank = np.argsort(order, kind="stable")
         at = int(np.searchsorted(np.cumsum(weight[rank]), 0.5 * total))
         middle = order[rank[min(at, rank.size - 1)]]
-        for low in (order < middle, order <= middle):  # runs of one condition are not divided
+        for low in (order < middle, order <= middle):  # runs of equal order are not divided
             share = float(weight[low].sum()) / max(total, 1e-300)
-            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half says nothing
+            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half has no information
                 both = 2.0 * share * (1.0 - share)
                 moved = float(pull[low].sum()) / both
                 chance = chosen.move_stds**2 * total / (2.0 * both)
@@ -132,7 +132,7 @@ class _Cause:
     )
     least: float  # multiple of the size that is allowed
     greatest: float  # multiple of the size that is allowed
-    by_chance: float  # χ² by which the numbers of the runs' own may lower it
+    by_chance: float  # chance gain of χ² by parameters per run
 
 
 @dataclass(frozen=True, eq=False)

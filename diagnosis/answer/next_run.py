@@ -19,7 +19,7 @@ _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
 _DURATIONS = (10.0, 30.0)  # s
 _PHASES = 8  # of the true model's periodic effect, to average over
-_PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
+_PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, one or two), to fit
 
 
 def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
@@ -109,7 +109,7 @@ class _Prediction:
     """A model's prediction of a run."""
 
     reading: Array  # mean over the phases of its periodic effects, rad, shape (n,)
-    waves: Array  # what the cosine and the sine of each phase add, rad, shape (n, 2 × effects)
+    waves: Array  # contributions of the cosine and the sine of each phase, rad, shape (n, 2 × effects)
     slopes: Array  # derivatives to the release, shape (n, 2)
 
 

@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
-_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
+_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a quickly decaying mode is lost in the whole
 _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
 
 

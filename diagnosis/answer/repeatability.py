@@ -27,7 +27,7 @@ from tunnel_sim.physics.settings_table import SettingsTable
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
-_FEWEST = 5  # runs among which one may deviate far beyond the others, or which may show a drift
+_FEWEST = 5  # fewest runs for an outlier or a drift
 _OF_TREND = 2  # numbers of a straight line
 
 
@@ -142,7 +142,7 @@ class _Runs:
         widths = likeliest_widths(products, self.prior)
         beside = marginal(products, widths)
         slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
-        if std <= 0.0:  # nothing but the common parameters changes along the campaign
+        if std <= 0.0:  # only the common parameters change along the campaign
             return None
         # only the runs determine the width
         p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))

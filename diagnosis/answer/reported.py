@@ -21,7 +21,7 @@ from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_FINER = 4  # steps in place of one, where the input is delayed
+_FINER = 4  # times as many steps where the input is delayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample."""
-    ratio = base.extra + 1.0  # of the estimated noise to the base
+    ratio = base.extra + 1.0  # estimated noise over the base
     random = study.random
     explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
     predicted = {**shown.before, **shown.before_out} if study.causes else shown.before

@@ -74,7 +74,7 @@ _POINTS = 401
 _WIDTHS = (0.005, 1.0)
 _HALVINGS = 20
 _RESAMPLES = 500
-_LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel holds at least one statement
+_LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel covers at least one statement
 
 
 @dataclass(frozen=True, eq=False)

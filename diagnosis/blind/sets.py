@@ -278,8 +278,8 @@ def answer_campaign(
         with answering_with(_own_effects(effects_file)):
             found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
         answer = found.to_json_dict()
-        answer.pop("maps", None)  # pictures' data: larger than the records, and nothing is scored by them
-    except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
+        answer.pop("maps", None)  # data of the figures: larger than the records, and not scored
+    except Exception as error:  # one bad campaign must not end the whole set; the score counts it as wrong
         said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
         answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}
     answer["data_sha256"] = folder_hash(folder)

@@ -175,7 +175,7 @@ def ratio(drop: Array, left: Array) -> tuple[float, float]:
 
 
 GAPS = "short gaps"
-_STRETCHES = 6  # in a run, where no run can be left out
+_STRETCHES = 6  # in a run, where no run can be held out
 _GAP = 3  # rows: an eighth of a cycle
 _TURNS = 3
 

@@ -84,9 +84,7 @@ def by_run(
         `normal_equations`.
     """
     columns = list(zip(jacobian, residuals, strict=True))
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # of a run that grew without bound; its step is refused
+    with np.errstate(over="ignore", invalid="ignore"):  # a run diverged; its step is refused
         known = Products.of(jacobian) if products is None else products
         seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
         seen = seen if pull is None else seen + pull[:, :, None]
@@ -165,7 +163,7 @@ def project_release(change: Array, slopes: Array) -> Array:
 
 
 _MAX_ITERATIONS = 25
-_HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
+_HOPELESS = 5  # steps after which a fit must be better than without the added effect
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _CORRECTIONS = 2  # of the runs' own parameters after a step
 _TRIES = 9  # dampings tried in a step, each ten times the last
@@ -356,11 +354,11 @@ def fit(
             else gain < max(0.1, tolerance * state.here.cost)
         )
         if poor and borrowed:
-            borrowed = False  # once more with its own sensitivities
+            borrowed = False  # repeat with its own sensitivities
         elif poor:
             converged = True
         if base is not None and iterations >= _HOPELESS and state.here.cost > base.total:
-            break  # more parameters, and still worse than without them
+            break  # worse than without its further parameters
     return state.result(converged)
 
 
@@ -482,7 +480,7 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    with np.errstate(invalid="ignore", over="ignore"):  # a run that grew without bound; its cost is infinite
+    with np.errstate(invalid="ignore", over="ignore"):  # a run that diverged; its cost is infinite
         return [
             run.scaled(run.reading - values)
             for run, values in zip(problem.data.runs, prediction, strict=True)

@@ -42,7 +42,7 @@ _PADDING = 8
 _BESIDE = (
     0.6,
     4.0,
-)  # Hz of the similar rig: nearest and farthest that a line is compared with what is beside it
+)  # Hz of the similar rig: least and greatest distance of the spectrum compared with a line
 _MOTION_KNOWN = 1e-3  # of a multiple of the motion's frequency, which changes a little with the amplitude
 _SAME = 1e-6  # cycles per sample
 _CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
@@ -303,7 +303,7 @@ def _line(
     spectra = [whole[i] for i in concerned]
     refined = _refined(among, spectra, place)
     orders = [run.of_motion(refined) for run in among]
-    if all(orders):  # at a multiple of every run's motion, of which none is far above all others
+    if all(orders):  # at a multiple of every run's motion, none of which is far above all others
         floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
     sines = _sines(among, spectra, refined)
     phases = np.zeros(len(runs))

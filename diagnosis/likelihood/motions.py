@@ -177,7 +177,7 @@ class Motions:
         samples = int(self.blocks[places[0]]) + 1
         angle, rate, status = integrate(self.law[places], self.rows[places], samples)
         first = 0
-        while status:  # one of them grew, and the later ones are not done
+        while status:  # one of them diverged, and the later ones are not done
             angle[first + status - 1], rate[first + status - 1] = np.inf, np.inf
             first += status
             if first == len(places):
@@ -246,7 +246,7 @@ def read_together(
     found = []
     for number, (place, run) in enumerate(zip(places, runs, strict=True)):
         chain, zero = asked.chain(place), float(asked.zero[place])
-        if not np.isfinite(angle[number, 0]):  # it grew without bound
+        if not np.isfinite(angle[number, 0]):  # it diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
             ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
@@ -275,7 +275,7 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
     """
     weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]
-    with np.errstate(invalid="ignore"):  # a motion that grew without bound
+    with np.errstate(invalid="ignore"):  # a motion that diverged
         found: Array = (
             weights[:, 0] * angle[:, :-1]
             + weights[:, 1] * angle[:, 1:]

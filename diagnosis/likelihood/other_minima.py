@@ -17,7 +17,7 @@ from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 16  # points predicted at once: a campaign's predictions fill memory
-_REFITTED = 3  # of the best points, since linear theory cannot tell which is the deepest
+_REFITTED = 3  # of the best points, since linear theory does not show the deepest
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from tunnel_sim.vocabulary.record import Array
 
 _STEPS = 6  # Gauss–Newton steps without a group
 _TRIES = 4  # dampings tried in a step
-_GAIN = 1e-4  # share of χ² that a step must save
-_RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
-_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
+_GAIN = 1e-4  # least drop of χ² in a step, as a share of it
+_RELEASE_STEPS = 4  # two are enough with slopes at nearly the same parameters
+_RELEASE_GAIN = 1e-6  # least drop of a run's χ² in a step, as a share of it
 
 
 def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
@@ -42,7 +42,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
             steps.append(np.linalg.lstsq(rows, values, rcond=1e-10)[0])
         trial = Point(best.common, best.release + np.stack(steps))
         moved = scaled_residuals(problem, trial)
-        with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
+        with np.errstate(invalid="ignore"):  # a diverging prediction is kept unchanged
             saved = problem.parameters.surprises(best) - problem.parameters.surprises(trial)
             gains = [float(r @ r - m @ m) + own for r, m, own in zip(residuals, moved, saved, strict=True)]
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]

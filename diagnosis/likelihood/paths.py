@@ -22,7 +22,7 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
 _WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
-_LARGE = 30.0  # noise variances of a block mean: of a residual beyond, the smoothing may take nothing
+_LARGE = 30.0  # noise variances of a block mean: larger residuals must not be smoothed away
 _ROWS = 24  # per cycle, to which white residuals are averaged: the motion has no more than its third harmonic
 
 
@@ -200,7 +200,7 @@ def paths(fit: Fit) -> list[Path]:
 _FINE, _MEDIUM, _COARSE = 33, 15, 7  # splines over the range of the motion
 _SLOW = 16  # splines over the time of a run
 _PER_CYCLE = 6.0  # splines in time that follow a blow
-_SETTLED = 0.02  # of the greatest rate: within it, dry friction may be any moment
+_SETTLED = 0.02  # of the greatest rate: below it, dry friction may be any moment
 
 
 @dataclass(frozen=True, eq=False)

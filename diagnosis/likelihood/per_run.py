@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.record import Array
 _RINGING_PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
-_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the one common time found
+_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the common time
 _EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or distinguished from the release
 
 
@@ -168,10 +168,10 @@ def skip(fit: Fit, *, with_input: bool = False) -> Sought | None:
     if any(run.left.size < 4 * _EDGE for run in runs) or (with_input and not data.driven):
         return None
     found = []
-    for count in range(1, _MOST_SKIPS + 1):  # so many skips in every run, all of one time
+    for count in range(1, _MOST_SKIPS + 1):  # number of skips in every run, all of one time
         steps, lost = [run.steps(count) for run in runs], 0.0
         for number in range(_ROUNDS):
-            if number > 0:  # two skips close together were one of twice the time, and another one of nothing
+            if number > 0:  # two skips close together are one of twice the time and an empty one
                 steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
             times, weights = (
                 np.array([[getattr(step, name) for step in of_run] for of_run in steps])

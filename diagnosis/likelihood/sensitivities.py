@@ -38,7 +38,7 @@ def sensitivities(
             prediction, *predictions = problem.predict([point, *moved])
         else:
             predictions = problem.predict(moved)
-        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+        with np.errstate(invalid="ignore"):  # a run that diverged; the caller checks for it
             for place, values in zip(lost, predictions, strict=True):
                 for change, here, there in zip(found, prediction, values, strict=True):
                     change[place] = there - here

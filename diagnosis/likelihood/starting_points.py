@@ -21,9 +21,9 @@ from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
-_HELD = 1e18  # precision of deviations that stay as they are
-_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of what the fit leaves
-_NEARER = 0.02  # of the size that linear theory gives an effect
+_HELD = 1e18  # precision of fixed deviations
+_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
+_NEARER = 0.02  # share of an effect's size by linear theory
 
 
 def nominal_start(data: Data) -> Point:
@@ -317,7 +317,7 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
 def absorbed(base: Fit, change: Sequence[Array]) -> Point:
     """The point at which a fit's parameters absorb a change of the scaled prediction, by one Gauss–Newton step."""
     products = base.products
-    if base.problem.scatter:  # which may be chance beside what is absorbed
+    if base.problem.scatter:  # chance differences may contribute to the absorbed change
         precision = base.problem.parameters.precision
         products = Products.of(base.jacobian, np.where(precision > 0.0, _HELD, 0.0))
     return damped_step(

@@ -24,8 +24,8 @@ from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
-_CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
-_BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
+_CYCLES = 8.0  # least number in a part: the motion's windowed line then stays within the excluded share
+_BESIDE = 0.25  # of the motion's frequency, excluded on either side of its harmonics
 _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
 _OCTAVE_PARTS = 2  # bands in an octave
 _SLOPE_BANDS = 4  # lowest bands that give the slope below them
@@ -224,7 +224,7 @@ def whitened(data: Data, colour: Colour) -> Data:
     return data.with_runs(tuple(runs))
 
 
-_LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: as good as none
+_LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
 _CORNERS = (1.0, 4.0, 16.0)  # of the colour's lowest frequency, to start from
 _WHITE = 30.0  # the level's natural logarithm stays within this of that of white noise
 

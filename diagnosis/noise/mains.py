@@ -29,8 +29,8 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
-_KNOTS = 12.0  # per cycle of the motion: a curve follows what is slower than six times the motion
-_NEAR = 0.25  # of 1/duration, within which the frequency of a line found in the whole records is refined
+_KNOTS = 12.0  # per cycle of the motion: a curve follows motions slower than six times it
+_NEAR = 0.25  # of 1/duration: range in which the frequency of a line is refined
 
 
 @dataclass(frozen=True)

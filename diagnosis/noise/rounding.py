@@ -112,7 +112,7 @@ class Rounded(Rounding):
     def expected(self, fit: Fit) -> tuple[Array, Array]:
         """From the repetitions; not less than white noise."""
         seen = [powers(fit, residuals)[:2] for residuals in self.residuals(fit.problem.data)]
-        count = np.maximum(seen[0][1], 0.5)  # any number where there are none
+        count = np.maximum(seen[0][1], 0.5)  # avoids a division by zero
         found = [power / count for power, _ in seen]
         level = np.mean(found, axis=0)
         beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count

@@ -68,7 +68,7 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
 
 
 _ORDER = 5
-_KNOTS = 24.0  # per cycle at most: the curve follows what is slower than twelve times the motion
+_KNOTS = 24.0  # greatest number per cycle: the curve follows motions slower than twelve times it
 _LONG_GAP = 0.25  # of a cycle: the curve is not drawn across it
 _LEAST_PIECES = 8  # of a curve
 
@@ -128,7 +128,7 @@ _LINES = 24  # of a window
 _DEGREE = 2  # of the polynomials of the response to the input, and of the ends of the record
 _FROM = 0.1  # of the sampling rate: the lowest frequency used where the record allows no higher one
 _TO = 0.49  # of the sampling rate
-_BAND = 0.999  # share of the power of a driven motion that its band holds
+_BAND = 0.999  # share of the power of a driven motion within its band
 
 
 def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, float]:

@@ -24,7 +24,7 @@ _OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
 """The rise of friction at low rates (Stribeck), and friction that is smooth about rest."""
 _OF_ANGLE = ("b^2", "b^3", "abs(b)*b")
 _OF_BOTH = ("b^2*r", "b*sign(r)", "abs(b)*sign(r)")
-_WIDTHS = (0.05, 0.2)  # of the greatest rate, from which a fit finds those between
+_WIDTHS = (0.05, 0.2)  # of the greatest rate; a fit reaches the values between
 _FIRST = 0.01  # of the greatest restoring moment: where the fit of a coefficient starts
 
 

@@ -134,7 +134,7 @@ def _places(r: Ranges) -> Array:
 
 _TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
 _FAR = 1e3  # bounds of a coefficient, in its first value
-_NEAR = 4.0  # bounds of a width or place, likewise
+_NEAR = 4.0  # bounds of a width or place, in its first value
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from tunnel_sim.effects import Effect
 if TYPE_CHECKING:
     from diagnosis.search.views.view import View
 
-_ITERATIONS = 12  # of a fit on the way; the answer's own is polished
+_ITERATIONS = 12  # of an intermediate fit; the answer's is polished
 
 
 def grow(
@@ -79,10 +79,10 @@ def going_on(
     best = max((*ranked, *parents), key=scale.weight)
     if (
         best.explains_runs
-    ):  # what differs between runs is left: another effect may explain it, beside this set
+    ):  # differences between runs remain: another effect may explain them, beside this set
         return [best] if best in ranked else []
     going = []
-    for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
+    for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
         if first or scale.weight(child) > max(map(scale.weight, smaller)) - settings.search.growth_loss:
@@ -119,7 +119,7 @@ def sets_with_one_more(
                 progress(" + ".join((*parent.effects, kind.name)))
             starts = starts[: kind.tries]
             tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
-            if all(fitted.total > base.total for fitted in tried):  # linear theory led too far
+            if all(fitted.total > base.total for fitted in tried):  # linear theory overshot
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
@@ -153,7 +153,7 @@ def _worth_fitting(
         for (
             kind,
             starts,
-        ) in scored:  # what the effect's own numbers in every run gain by chance does not count
+        ) in scored:  # the chance gain of the effect's parameters per run does not count
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
         if not parent.effects:
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]

@@ -308,7 +308,7 @@ def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...
     infos = {f"{k.name}.{i.name}": i for k in freed.problem.effects for i in k.parameters()}
 
     def pull(name: str) -> float:
-        std = freed.std(name)  # a form that the runs cannot tell has none
+        std = freed.std(name)  # an undetermined form has none
         return (freed.value(name) - infos[name].default) / std if std > 0.0 else 0.0
 
     return tuple(form for form in forms if max(pull(name) ** 2 for name in form) > rise)
@@ -362,5 +362,5 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
-        return None  # nor where the runs tell no form at all
+        return None  # also where the runs determine no form
     return found if found.total < fitted.total and is_plausible(found) else None

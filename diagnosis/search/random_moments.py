@@ -380,7 +380,7 @@ def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
             reached[top.names] = top
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
-        if len(reached) > 1:  # to and fro between sets
+        if len(reached) > 1:  # alternates between sets
             top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
     return top
 
@@ -400,7 +400,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
             continue
         sought = fit(start.problem, start.point)
         tried = [known, sought]
-        if sought.point.release.shape == known.point.release.shape:  # else another number of instants
+        if sought.point.release.shape == known.point.release.shape:  # else the number of instants differs
             release = sought.point.release.copy()
             kept = known.chi2 < sought.chi2
             old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))

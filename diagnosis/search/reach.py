@@ -19,7 +19,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
 _NULL = 1e-9  # singular value, relative to the largest, that counts as zero
-_RANK = 1e-6  # likewise of the columns of all effects, which are changes by finite differences
+_RANK = 1e-6  # the same for the columns of all effects, which are finite differences
 
 
 def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]) -> float:

@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _ROUNDS = 4  # of the fit of a half
 _SETTLED = 0.5  # standard deviations by which a round may still move a parameter
-_RIDGE = 1e-12  # of the scaled normal matrix: what a half does not determine has a huge variance
+_RIDGE = 1e-12  # of the scaled normal matrix: undetermined parameters get a huge variance
 
 
 def unresolved(whole: Fit) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
     for early in (True, False):
         seen = [(np.arange(r.size) < r.size // 2) == early for r in whole.residuals]
         fitted = whole
-        for _ in range(_ROUNDS):  # the sensitivities of the whole may be far from those of the half
+        for _ in range(_ROUNDS):  # the sensitivities of the whole may differ much from those of the half
             before = fitted.point.common
             fitted = fit_at(problem, fit_seen(fitted, seen, held=forms)[0])
             stds = _stds(fitted, seen, forms)

@@ -163,7 +163,7 @@ def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
     with clock.step("pruning"):
         known = (*sets.hypotheses, *prune(best, sets.hypotheses))
         sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
-    with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
+    with clock.step("forms"):  # of rival sets, freed where that pays: growth frees those of few sets
         least = view.base.settings.search.rival_forms
         near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > least]
         if len(near) < 2:

@@ -234,8 +234,8 @@ _MOTION = 0.4  # of the run's frequency: the same for the motion itself, whose f
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
 _APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
 _PER_RUN = 2
-_OF_INPUT = 1e-3  # of the power of a run's input: less at a frequency may have been picked up by its wires
-_MULTIPLES = 3  # of the frequency of an input: of higher ones no response is the greater part of a gap
+_OF_INPUT = 1e-3  # of the power of a run's input: less may be interference in its wires
+_MULTIPLES = 3  # of the frequency of an input: responses at higher ones are never most of a gap
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ _HALF = 2.0  # cycles on either side of an instant that are fitted; nearer to an
 _APART = 0.25  # cycles between the instants
 _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
-_ROUNDS = 3  # of finding that change, each from the one before
+_ROUNDS = 3  # of finding that change, each from the previous one
 _CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
 _QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
 

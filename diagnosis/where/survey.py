@@ -65,7 +65,7 @@ class _Samples:
     amplitude: list[Array]  # rad
     power: list[Array]
     expected: list[float]  # of the power under noise
-    variance: list[float]  # likewise
+    variance: list[float]  # of the power under noise
 
     @classmethod
     def of(cls, nominal: Fit, scaled: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]) -> _Samples:

@@ -107,7 +107,7 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
     def text(value: float, std: float | None, unit: str) -> str:
         return for_people(
             value, std, said.get(unit, unit)
-        )  # moments are per inertia where nothing states one
+        )  # moments are per unit inertia where no inertia is stated
 
     return kind.phrase(values, {full: one["std"] for full, one in given.items()}, text)
 
@@ -217,7 +217,7 @@ def consequence(document: Document) -> str:
     return f"{first}{text[1:]}."
 
 
-_OPEN = 0.5  # standard deviations, as a share of the value, beyond which its change says nothing
+_OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
 
 
 def _apart(before: float, after: float) -> str:

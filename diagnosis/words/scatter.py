@@ -233,7 +233,7 @@ def repeat_steps(document: Document) -> list[str]:
     )
     poorly = _told_apart(spreads_of(document), settings_of(document).words)
     named = {SCATTERS[name] for name in scattering(document["causes"])}
-    if poorly and "wind_speed" not in named:  # whose advice says it too
+    if poorly and "wind_speed" not in named:  # whose advice includes this
         steps.append("Log the wind speed of every run: the runs do not tell it from the spring.")
     return steps
 

@@ -290,7 +290,7 @@ def inclusion_line(document: Document) -> str:
     least = settings_of(document).words.effect_listed
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
     listed = [name for name, value in found if value >= least]
-    last = scattering(listed)  # of every answer
+    last = scattering(listed)  # scatter is common to every answer
     likely = dict(found)
     shown = [f"{name} {probability(likely[name])}" for name in [n for n in listed if n not in last] + last]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""

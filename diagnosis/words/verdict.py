@@ -139,7 +139,7 @@ def _answer(document: Document, rest: str) -> str:
         said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
         return " ".join(filter(None, (said, *last)))
     sources = []
-    for name in proper:  # what each acts on and, where the campaign can show it, whether it needs the wind
+    for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
         wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
         wind = wind if found["both_winds"] else ""
@@ -213,7 +213,7 @@ def _immaterial(changes: Mapping[str, float]) -> str:
     return f"The gap is immaterial: its causes change {' and '.join(said)}."
 
 
-_NO_CHANGE = 0.01  # %: a smaller change is no more than none to people
+_NO_CHANGE = 0.01  # %: smaller changes are shown as this
 
 
 def _disturbed(found: Mapping[str, Any]) -> str:
@@ -296,8 +296,8 @@ RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
 """Sentences on a rival that is not an effect of the vocabulary, by kind."""
 
 
-_VISIBLE = 0.005  # of a damping ratio: a change that is said
-_VISIBLE_FREQUENCY = 5e-5  # as a fraction, likewise
+_VISIBLE = 0.005  # least change of a damping ratio that is stated
+_VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
 
 
 def size_words(document: Document, size: Document) -> str:

@@ -30,8 +30,8 @@ from diagnosis.search.views.view import View
 from tunnel_sim.effects import Effect
 
 _SHORT, _LONG = 2, 18  # cycles
-_LONGER = 3  # times, from one fit to the next: the phase at the end of a stretch is known to that much
-_TOLERANCE = 1e-3  # of the fits on the way
+_LONGER = 3  # ratio of the lengths of successive fits: the phase at the end of a stretch is known well enough
+_TOLERANCE = 1e-3  # of the intermediate fits
 _ITERATIONS = 15
 
 
@@ -171,7 +171,7 @@ class InStretches(View):
         first = fit_nominal(short.data)
         try:
             base, long = fit_longer(first, short, data, long_stretch(short))
-        except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+        except (FitError, np.linalg.LinAlgError):  # a model without the causes may diverge in long stretches
             base, long = first, short
         return cls(prepared, base, first, short, long)
 

@@ -56,7 +56,7 @@ class WholeRuns(View):
         moving, rested = without_long_rest(prepared.nominal.problem.data)
         if rested:  # where dry friction stops a body, χ² has many minima
             nominal = try_fit(replace(prepared.nominal.problem, data=moving), prepared.nominal.point)
-            if nominal is not None:  # what is left may be too short: whole runs then
+            if nominal is not None:  # the rest may be too short: then whole runs
                 prepared = replace(prepared, nominal=nominal, rested=rested)
         if not prepared.nominal.problem.scatter:
             return cls(prepared, prepared.nominal, first)
