@@ -167,7 +167,7 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
     decided, way = answer.decision.decided, way_for(study)
     caution = (Fact(way.caution),) if way.caution else ()
     say("what no effect explains")
-    # of an undecided diagnosis the whole gap remains
+    # in an undecided diagnosis the whole gap remains
     significant = not decided or (answer.rest is not None and answer.rest.significant)
     try:
         with np.errstate(over="raise"):  # a fitted model that runs away
@@ -237,7 +237,7 @@ def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tupl
         Effect classes in the order of the vocabulary.
 
     Raises:
-        TunnelError: when a name is unknown, or nothing is left.
+        TunnelError: when a name is unknown, or no effect remains.
     """
     wanted = {effect_class(name) for name in include} if include else set(known_effects())
     kinds = tuple(

@@ -122,7 +122,7 @@ def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Ca
     """Leave out the runs that cannot be fitted together with the others, with reasons.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
-    equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they
+    equal). Among runs that do not state it, those with the same frequency at the same wind speed remain: only they
     can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left
     out.
     """

@@ -182,7 +182,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         - the part of the causes' forms that no free decay shows;
         - half the change by freeing the forms, since another family of forms may change as much.
 
-        ``unknown`` likewise adds half the change from the nominal model. The effect that could hide and would move
+        ``unknown`` also adds half the change from the nominal model. The effect that could hide and would move
         the coefficient most (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size
         is two standard deviations. The central interval is given where it is not that of a normal distribution
         (`interval_beside`). No standard deviation is given at a bound, or where the runs do not determine the

@@ -290,7 +290,7 @@ class _Models:
         return self._excess[fitted]
 
     def random_excess(self, random: RandomAnswer) -> float:
-        """What all causes and a random moment leave: the moment's innovations where it acts."""
+        """Residual gap of all causes and a random moment: the moment's innovations where it acts."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)
         acts = random.process.runs

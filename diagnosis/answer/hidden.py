@@ -39,7 +39,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
     where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
     that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
-    (`diagnosis.answer.linear_theory.beside`), 1 where only noise is left.
+    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains.
 
     Args:
         fit: with or without effects.

@@ -278,7 +278,7 @@ def _step(
 ) -> _Step | None:
     """Add the effects with some indices; None where they change the readings alike, or a size is out of range.
 
-    ``gram`` holds products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
+    ``gram`` has the products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
     ``form_std`` is the standard deviation of a move due to the form, as a share of it.
     """
     own = gram[np.ix_(chosen, chosen)]

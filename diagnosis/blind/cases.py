@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.between_runs import SCATTERED
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)
-"""Excess of a moderate gap: 1 to 10 times the noise power."""
+"""Excess of a moderate gap: 1 to 10 noise variances."""
 
 
 _Probability = Annotated[float, Field(ge=0.0, le=1.0)]

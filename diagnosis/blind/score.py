@@ -209,7 +209,7 @@ class Score:
     sealed: bool
 
     def exact(self) -> dict[str, Proportion]:
-        """Exact match of the causes, by kind of campaign and severity (times the noise power)."""
+        """Exact match of the causes, by kind of campaign and severity (in noise variances)."""
         found = {}
         for kind in ("single", "pair", "three", "four", "none", "outside", "withheld"):
             cases = [c for c in self.cases if c.kind == kind]
@@ -382,7 +382,7 @@ def score_set(
         effects_file: file of added effects with which the set was answered; None: none.
 
     Raises:
-        TunnelError: when a campaign is not answered, key, campaign or answer is not what its hash says, or one of
+        TunnelError: when a campaign is not answered, key, campaign or answer does not match its hash, or one of
             them is malformed.
     """
     campaigns = campaign_folders(folder)

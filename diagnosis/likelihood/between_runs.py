@@ -124,7 +124,7 @@ class RunColumns:
     def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
         """The likeliest widths, and the runs with them."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
-        # what a width does, a further parameter may do as well: there are several maxima then
+        # a further parameter may act like a width: there are then several maxima
         narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
         tries = [np.array(one) for one in product(*zip(*narrower, strict=True))]
         costs = [marginal(self.products, one).restricted + prior.cost(one) for one in tries]

@@ -103,7 +103,7 @@ class Ridge:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the coefficients, shape (c + k, c + k)."""
+        """Covariance of the coefficients, shape (c + k, c + k)."""
         size, scaled = self._scaled
         return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
 

@@ -170,7 +170,7 @@ _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
 class FitError(ArithmeticError):
-    """A fit left the range in which the model can be integrated."""
+    """A fit is outside the range in which the model can be integrated."""
 
 
 @dataclass(frozen=True, eq=False)

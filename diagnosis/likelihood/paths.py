@@ -45,7 +45,7 @@ class Path:
 
     @cached_property
     def time(self) -> Array:
-        """Time since the start of what is fitted, s, shape (n,)."""
+        """Time since the start of the fitted part, s, shape (n,)."""
         return np.asarray((np.arange(self.run.reading.size) + 0.5) * self.run.interval)
 
     @cached_property

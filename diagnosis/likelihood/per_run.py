@@ -35,7 +35,7 @@ class ResidualsOf:
 
         Args:
             least: frequency times size over wind speed, dimensionless.
-            greatest: likewise.
+            greatest: upper bound of the same ratio, dimensionless.
         """
         return _of_line(wind_line(self.fit, least, greatest, size))
 

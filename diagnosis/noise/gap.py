@@ -202,7 +202,7 @@ class _Candidate:
 
         Where the whitened fit still has a gap, the colour must appear in runs with the wind off, and above the
         motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. The noise
-        may not exceed its stated level. Where no gap is left, it must not be the spectrum of a wandering zero, of
+        may not exceed its stated level. Where no gap remains, it must not be the spectrum of a wandering zero, of
         an error that every run repeats or of an oscillation that the input excites.
         """
         chosen = self.nominal.settings

@@ -47,7 +47,7 @@ def native_friction(
     """The friction of a moment law in the elements of MuJoCo.
 
     Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial damping where their error
-    is within the allowance. Else ``frictionloss`` is the friction at rest, which holds the joint, and the plugin
+    is within the allowance. Else ``frictionloss`` is the friction at rest, and the plugin
     adds the rest, which is zero there. The plugin has its own presliding contact.
 
     Args:

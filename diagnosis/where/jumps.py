@@ -34,7 +34,7 @@ class Jumps:
 
     Args:
         id: of the run.
-        time: the instants since the start of what is fitted, shape (n,), s.
+        time: the instants since the start of the fitted part, shape (n,), s.
         drop: of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of the departure
             from smooth harmonics around the instant, or of the run's other jumps, whichever is largest.
         chance: probability of as large a drop at that instant by chance, shape (n,).

@@ -41,7 +41,7 @@ class Survey:
     """Maps, and further figures for the text about them.
 
     Args:
-        frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
+        frequency_interval: shortest interval of frequency with most of the excess, Hz.
         moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """

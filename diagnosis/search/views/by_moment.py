@@ -20,7 +20,7 @@ from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import UNKNOWN
 
-# Of a random moment's response per interval, in variances of white noise.
+# powers of a random moment's response per interval, in variances of white noise
 _POWERS = np.geomspace(1e-12, 1e12, 49)
 
 

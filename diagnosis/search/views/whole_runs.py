@@ -229,7 +229,7 @@ class WholeRuns(View):
         return hypothesis
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence, which is left to the end because another view may follow.
+        """The answer fitted to convergence; done last because another view may follow.
 
         It includes chance differences between the runs where they pay the price of an effect.
         """
