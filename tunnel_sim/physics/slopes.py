@@ -47,7 +47,7 @@ class Slopes:
         angle: of the rod's upper end, rad, shape (n, samples).
         rate: of it, rad/s, shape (n, samples).
         by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where there is
-            none; or of the weighted sums, shape (n, columns, samples − 1). Those along changes of the wind are last.
+            none; or of the weighted sums, shape (n, columns, samples − 1). Along changes of the wind they are last.
         by_rate: derivatives of the rate, of that shape; of weighted sums none.
         status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
     """
@@ -76,9 +76,8 @@ def slopes(
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
             between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
-        winds: changes of the winds of samples, along which there are derivatives beside those by the terms, m/s, by
-            run, of equal number, `most_winds` at most, shape (changes, samples of the run's wind); in a constant wind
-            the derivatives are NaN.
+        winds: changes of the winds of samples, along which there are derivatives too, m/s, by run, shape (changes,
+            samples of the run's wind), `most_winds` changes at most; in a constant wind the derivatives are NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     runs["samples"] = samples
