@@ -1,1 +1,1 @@
-"""The residual that no named effect explains: the share that could be explained, and the law for it."""
+"""The explainable part of an answer's residual, and the law for it."""

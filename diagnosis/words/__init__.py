@@ -1,4 +1,4 @@
-"""All sentences about a diagnosis, written from its document alone as the last step of `diagnose`.
+"""All sentences about a diagnosis, written from its document alone.
 
 The modules:
 
