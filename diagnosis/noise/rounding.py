@@ -15,9 +15,8 @@ from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.bands import TESTS, powers
 from tunnel_sim.vocabulary.record import Array
 
-#: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the
-#: first harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch.
-#: 11).
+#: Noise of this many steps makes the rounding error independent of the motion to within 1e-4: the first
+#: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
 _BLURS = 0.5
 _MOST, _FEWEST = 16, 4  # repetitions of the campaign
 _SAMPLES = 2.5e6  # read again in all

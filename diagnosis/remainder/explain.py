@@ -290,8 +290,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
     frequency = float(found.x)
-    # Share of the line in one half of a run that the other half predicts: 1 where phase and amplitude are
-    # constant.
+    # Share of the line in one half of a run that the other half predicts: 1 at constant phase and amplitude.
     # Chance lowers the prediction by 2 in every half, and raises the fit.
     predicted, fitted = 0.0, 0.0
     for path in unexplained.paths:

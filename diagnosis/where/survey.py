@@ -77,8 +77,7 @@ class _Samples:
             [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
             [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
             [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
-            # squares of filtered noise are correlated: the number of independent ones is that of passing
-            # coefficients
+            # squares of filtered noise are correlated: as many are independent as coefficients pass
             [2.0 * share / run.block**2 for (_, share), run in zip(inside, runs, strict=True)],
         )
 
