@@ -222,7 +222,7 @@ def _disturbed(found: Mapping[str, Any]) -> str:
     if found["used"]:
         why = "the other runs do not determine the model"
         return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used all the same: {why}."
-    without = "without this run" if kept is None else f"without what it recorded from {kept:.4g} s on"
+    without = "without this run" if kept is None else f"without its readings from {kept:.4g} s on"
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 
 
