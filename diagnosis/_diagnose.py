@@ -244,5 +244,5 @@ def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tupl
         kind for kind in known_effects() if kind in wanted - {effect_class(name) for name in exclude}
     )
     if not kinds:
-        raise TunnelError("no effect remains in the vocabulary", remedy="exclude fewer effects")
+        raise TunnelError("no effect is left in the vocabulary", remedy="exclude fewer effects")
     return kinds
