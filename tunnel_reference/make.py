@@ -19,8 +19,9 @@ from tunnel_reference.conditions import (
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1

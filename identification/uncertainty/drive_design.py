@@ -90,7 +90,13 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
                 density = sum(effect.moment_density(rate, reference) for effect in effects)
                 moments.append(density / plan.truth.yaw_inertia**2)
     try:
-        bound = campaign_bound(campaign, **asdict(plan.truth), noise_std=noise, random_moments=moments)
+        bound = campaign_bound(
+            campaign,
+            **asdict(plan.truth),
+            noise_std=noise,
+            drive_gain=plan.conditions[0].gain,
+            random_moments=moments,
+        )
     except np.linalg.LinAlgError:
         bound = CampaignBound((), ())
     if not {"cn_beta", "cn_r"} <= set(bound.parameters):
