@@ -178,7 +178,8 @@ class RunData:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
-            gain: the parameter that multiplies the moment; where none does it does not matter.
+            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; where none does it
+                does not matter.
             offset: a constant moment beside the input, N m; 0 where that of the input is 0 throughout.
         """
         if self.drive is None:

@@ -67,7 +67,7 @@ def turned(base: Base, spring: float) -> Array:
 def pushed(base: Base, spring: float) -> Array:
     """The angle of a body whose centre of mass lies at an arm across the motion of the base.
 
-    By Lagrange's equation: with the base at x, T = ½ I θ̇² + m r cos θ θ̇ ẋ + ½ m ẋ², so that I θ̈ + C θ̇ + K θ = −m r cos θ ẍ.
+    With the base at x, T = ½ I θ̇² + m r cos θ θ̇ ẋ + ½ m ẋ²: Lagrange's equation is I θ̈ + C θ̇ + K θ = −m r cos θ ẍ.
     """
 
     def slope(t: float, y: Array) -> list[float]:
