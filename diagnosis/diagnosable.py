@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.inputs import untried_by_inputs
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
@@ -187,12 +188,6 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     return max((group for found in groups for group in found), key=len)
 
 
-_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
-_TURNING_BASE = (
-    "Where the base turns, these effects depend on more than its acceleration, and are not tried: {}."
-)
-
-
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
     """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
 
@@ -275,13 +270,8 @@ def kinds_for(
         return tuple(kind for kind in kinds if not kind.driven), ()
     moments = any(run.drive is not None and run.drive.kind.by_actuator for run in campaign.runs)
     kept = tuple(kind for kind in kinds if moments or not kind.of_moment)
-    gone: dict[str, list[type[Effect]]] = {}
-    if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
-        gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
-        kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
-    if any(run.drive is not None and run.drive.kind.by_inertia for run in campaign.runs):
-        gone[_TURNING_BASE] = [kind for kind in kept if kind.by_angle_in_room]
-        kept = tuple(kind for kind in kept if not kind.by_angle_in_room)
+    gone = untried_by_inputs(campaign, kept)
+    kept = tuple(kind for kind in kept if not any(kind in some for some in gone.values()))
     for why, some in model.untried(campaign, kept).items():
         gone[why], kept = some, tuple(kind for kind in kept if kind not in some)
     said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]

@@ -10,9 +10,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
-from typing import ClassVar, Literal, overload
+from typing import TYPE_CHECKING, ClassVar, Literal, overload
 
-from tunnel_sim.vocabulary.record import Array
+if TYPE_CHECKING:
+    from tunnel_sim.vocabulary.record import Array  # commands answer before NumPy is loaded
 
 InputColumn = Literal[
     "moment_nm", "drive", "base_rad", "command_rad", "base_acceleration_rad_s2", "base_acceleration_m_s2"
