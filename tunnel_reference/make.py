@@ -89,7 +89,10 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     drives: list[Drive | None] = [None] * c.runs
     if c.drive is not None:
         column = cast(InputColumn, c.drive.column)
-        scale = c.moment_scale if column == "moment_nm" else 1.0
+        scale = {
+            "moment_nm": c.moment_scale,
+            "base_acceleration_rad_s2": c.time_scale**-2,
+        }.get(column, 1.0)
         gain = c.drive.gain * c.moment_scale if column == "drive" and c.drive.stated else None
         for run in np.flatnonzero(c.drive.driven).tolist():
             hold: Hold = "zero" if c.drive.held[run] else "linear"
