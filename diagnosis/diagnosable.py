@@ -22,6 +22,7 @@ from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.printing import unit_mark
+from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
@@ -213,6 +214,8 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
+        judged = campaign.sensor.plausible is not False
+        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
     refuse_several_gains([run.drive for run in driven], campaign.name)
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:

@@ -19,6 +19,7 @@ from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
 from identification.returned import checked_return
+from identification.signal.known_gain import refuse_other_gain
 from identification.statistics import widened_by_contradictions
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
@@ -77,6 +78,8 @@ def identify(
         checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
         quantity = campaign.sensor.quantity or "angle"
         refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
+        judged = campaign.sensor.plausible is not False
+        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
     refuse_several_gains([run.drive for run in campaign.runs], campaign.name)
     examined = examine(campaign).accepted()
     left = examined.campaign

@@ -37,7 +37,7 @@ class _OfActuator(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the actuator; a free decay has none."""
         del stated, drawn
-        if self.is_null or run.drive is None or not run.drive.by_actuator:
+        if self.is_null or run.drive is None or not run.drive.through_actuator:
             return run
         own = {info.name: getattr(self, info.name) for info in self.parameters()}
         actuator = dataclasses.replace(run.drive.actuator, **own)

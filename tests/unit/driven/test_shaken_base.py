@@ -230,6 +230,21 @@ def test_what_the_acceleration_does_not_tell_is_refused(
             use(replace(turning, runs=(run,), rig=RigProperties(INERTIA, 0.036, 0.625)))
 
 
+@pytest.mark.parametrize(
+    ("factor", "what"),
+    [(-1.0, "the other sign"), (180.0 / np.pi, "in degrees"), (np.pi / 180.0, "in radians")],
+)
+def test_an_acceleration_of_another_sign_or_unit_is_refused(
+    turning: Campaign, factor: float, what: str
+) -> None:
+    run = turning.runs[0]
+    assert run.drive is not None
+    wrong = replace(run, drive=replace(run.drive, values=factor * run.drive.values))
+    for use in (identify, refuse_undiagnosable):
+        with pytest.raises(TunnelError, match=what):
+            use(replace(turning, runs=(wrong,)))
+
+
 def test_two_unknown_gains_are_refused(moving: Campaign) -> None:
     run = moving.runs[0]
     assert run.drive is not None
@@ -295,3 +310,14 @@ def test_a_run_file_that_does_not_say_the_unit_is_refused(turning: Campaign, tmp
     file.write_text(file.read_text().replace(TURNS, "base_acceleration", 1))
     with pytest.raises(TunnelError, match="name it base_acceleration_rad_s2 or base_acceleration_m_s2"):
         read_campaign(tmp_path / "shaken")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_base_that_hardly_moves_the_body_is_not_taken_for_one_of_the_other_sign(seed: int) -> None:
+    """The motion is a free decay, beside which noise decides what follows the base."""
+    rng = np.random.default_rng(seed)
+    decay = np.exp(-DAMPING / (2.0 * INERTIA) * TIME) * np.cos(np.sqrt(SPRINGS[0] / INERTIA) * TIME)
+    reading = 0.2 * decay + NOISE * rng.standard_normal(TIME.size)
+    quiet = Drive(TURNS, 1e-4 * rng.standard_normal(TIME.size))
+    run = Run("r", Record(TIME, reading), 0.0, SPRINGS[0], drive=quiet)
+    identify(Campaign("quiet", RigProperties(), SensorProperties(sample_rate=RATE), (run,)))
