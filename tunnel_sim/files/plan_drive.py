@@ -72,17 +72,14 @@ class DriveTable(StrictModel):
     @property
     def amplitudes(self) -> tuple[float | None, ...]:
         """Peak of each driven run of a spring and a speed in the unit of the input; one None for a file."""
-        return (None,) if self.kind == "file" else tuple(getattr(self, self._given[0]))
+        if self.kind == "file":
+            return (None,)
+        return tuple(value for name in _OF_AMPLITUDES for value in getattr(self, name))
 
     @property
     def column(self) -> InputColumn:
         """The column of the input, where it is not that of a file."""
-        return _OF_AMPLITUDES[self._given[0]].column
-
-    @property
-    def _given(self) -> list[str]:
-        """The keys of amplitudes that are given."""
-        return [name for name in _OF_AMPLITUDES if getattr(self, name)]
+        return next(kind.column for name, kind in _OF_AMPLITUDES.items() if getattr(self, name))
 
 
 def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
