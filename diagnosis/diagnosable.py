@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.inputs import untried_by_inputs
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
@@ -21,11 +22,12 @@ from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.printing import unit_mark
+from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import refuse_untreated
+from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
@@ -188,9 +190,6 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     return max((group for found in groups for group in found), key=len)
 
 
-_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
-
-
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
     """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
 
@@ -204,7 +203,8 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
     for run in driven:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
-        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
+        quantity = campaign.sensor.quantity or "angle"
+        refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
         if run.spring_stiffness == 0.0 and run.wind_on:
             what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")
@@ -215,6 +215,9 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
+        judged = campaign.sensor.plausible is not False
+        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
+    refuse_several_gains([run.drive for run in driven], campaign.name)
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -245,7 +248,7 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
             continue
         found = response_to_input(run, campaign.sensor.derivative)
         known = model.resonance_known
-        if known and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+        if known and (found is None or not found[2] * (run.input_gain or run.drive.kind.scale) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
@@ -269,12 +272,10 @@ def kinds_for(
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
-    moments = any(run.drive is not None and run.drive.on_body for run in campaign.runs)
+    moments = any(run.drive is not None and run.drive.kind.by_actuator for run in campaign.runs)
     kept = tuple(kind for kind in kinds if moments or not kind.of_moment)
-    gone: dict[str, list[type[Effect]]] = {}
-    if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
-        gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
-        kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
+    gone = untried_by_inputs(campaign, kept)
+    kept = tuple(kind for kind in kept if not any(kind in some for some in gone.values()))
     for why, some in model.untried(campaign, kept).items():
         gone[why], kept = some, tuple(kind for kind in kept if kind not in some)
     said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
@@ -288,9 +289,8 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
         return (said,)
     if "drive_gain" not in fit.problem.names:
         return ()
-    known = any(
-        r.drive is not None and (r.drive.column == "moment_nm" or r.drive.gain) for r in campaign.runs
-    )
+    fitted = [r.drive for r in campaign.runs if r.drive is not None and data.model.fits_gain(r.drive)]
+    known = any(drive.gain_stated for drive in fitted)
     unit = "kg m2" if known else "N m"
     value, std = fit.value("drive_gain"), fit.std("drive_gain")
     value, std = (data.similarity.own(1.0, unit) ** (-1 if known else 1) * one for one in (value, std))

@@ -298,7 +298,7 @@ def _circumstances(base: Fit) -> Circumstances:
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
     moment, rate = 0.0, 0.0
     for run, own in zip(data.runs, base.point.release, strict=True):
-        if run.drive is not None and run.drive.on_body:
+        if run.drive is not None and run.drive.through_actuator:
             drive = base.problem.stated(base.point.common, own, run).drive
             assert drive is not None
             own_moment, own_rate = drive.greatest
