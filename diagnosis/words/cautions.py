@@ -109,8 +109,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     ),
     "remainder not sought": "No formula for the remaining gap is sought for a driven body without a restoring "
     "moment: every small error of a moment adds up in its angle.",
-    "remainder not solved": "The share of the remaining gap that could be closed was not found: its equations cannot "
-    "be solved.",
+    "remainder not solved": "The share of the remaining gap that could be closed was not found: its equations "
+    "cannot be solved.",
 }
 """Caveats of an answer."""
 
