@@ -94,6 +94,18 @@ def rounded_up(value: float) -> str:
     return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
 
 
+def size_change(before: float, after: float) -> str:
+    """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
+
+    Args:
+        before: not 0, in the unit of both.
+    """
+    if before * after < 0.0:
+        return "other sign"
+    change = 100.0 * (abs(after) / abs(before) - 1.0)
+    return f"{change:+.2g} %" if change else "0 %"
+
+
 def change_up_to(size: float, given: Mapping[str, Any]) -> str:
     """A change of a coefficient as its share, rounded up; in its unit where the coefficient itself is uncertain.
 

@@ -204,6 +204,10 @@ def test_what_remains(given: Document) -> None:
         "4.6 %."
     )
     rest = given["rest"]
+    large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
+    assert rest_words(large).startswith(
+        "Not all is explained: what remains (0.544° root mean square, 21 times the noise) moves Cnβ by less than"
+    )
     assert rest_words(given | {"causes": ["unknown"]}).startswith("It hardly matters: it moves Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
