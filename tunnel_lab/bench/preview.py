@@ -42,7 +42,7 @@ _WRITTEN = {
     "end": "Leave out samples after [s]",
     "rest": "Reading at rest of every run, to be subtracted [rad]",
     "name": "Conditions in the file names: S{spring}_V{wind_speed}_*",
-    "set": "Conditions of all runs, such as wind_speed=0 or wind_speed=V",
+    "set": "Conditions of all runs, such as wind_speed=0",
     "delimiter": "Delimiter of a text file: tab, blank, ; , or |",
     "decimal": "Decimal sign of a text file",
 }
