@@ -114,12 +114,19 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
 
 def _with_values(law: Document) -> str:
     """The numbers of a formula, as a clause; empty where it has none."""
-    stated, said = law["effect"].get("parameters", {}), []
+    stated, said, unknown = law["effect"].get("parameters", {}), [], []
     for name, one in law["parameters"].items():
+        if not 0.0 < one["std"] < _UNKNOWN * abs(one["value"]):
+            unknown.append(name)
+            continue
         unit = stated.get(name, {}).get("unit", "1")
         mark = "" if unit == "1" else f" {unit_mark(unit)}"
         said.append(f"{name} = {with_std(one['value'], one['std'])}{mark}")
-    return f", with {listed(said)}" if said else ""
+    left = f"{listed(unknown)} not determined by these runs" if unknown else ""
+    return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
+
+
+_UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
 
 
 def formula_step(document: Document) -> str:
