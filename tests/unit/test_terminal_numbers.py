@@ -361,3 +361,11 @@ def test_notes_name_the_runs_they_concern() -> None:
     every = tuple(dataclasses.replace(run, statuses=(Status.NO_OSCILLATION,)) for run in calm.runs)
     found = status_lines(dataclasses.replace(calm, runs=every).to_json_dict())
     assert found == [Status.NO_OSCILLATION.value]
+
+
+def test_the_gravest_note_comes_first() -> None:
+    calm = estimate()
+    swings = (Status.FREQUENCY_CHANGES, Status.MODEL_DEPARTS)
+    every = tuple(dataclasses.replace(run, statuses=swings) for run in calm.runs)
+    found = dataclasses.replace(calm, runs=every, statuses=(Status.MODEL_DEPARTS, Status.NO_STIFFNESS))
+    assert status_lines(found.to_json_dict()) == [one.value for one in (*swings, Status.NO_STIFFNESS)]
