@@ -242,7 +242,7 @@ def read_together(
         if ringing is not None:
             angle[number], rate[number] = ringing.added(angle[number], rate[number], run.interval)
     if reads_plainly(asked.effects[places[0]]):
-        return list(_means(runs, angle, rate) + asked.zero[places, None])
+        return list(block_means(runs, angle, rate) + asked.zero[places, None])
     found = []
     for number, (place, run) in enumerate(zip(places, runs, strict=True)):
         chain, zero = asked.chain(place), float(asked.zero[place])
@@ -252,7 +252,7 @@ def read_together(
             ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
             found.append(sample_means(chain, Motion(ends, angle[number], rate[number]), run, zero))
         else:
-            mean = _means([run], angle[number : number + 1], rate[number : number + 1])[0]
+            mean = block_means([run], angle[number : number + 1], rate[number : number + 1])[0]
             found.append(chain.reading(chain.angle(mean, run.times, run.derivative) + zero))
     return found
 
@@ -267,8 +267,12 @@ def end_weights(runs: Sequence[RunData], blocks: int) -> Array:
     return np.stack([np.broadcast_to(run.weights.reshape(4, -1), (4, blocks)) for run in runs])
 
 
-def _means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
-    """Block means of the angle, or its derivative that is read, from the blocks' ends, shape (runs, blocks)."""
+def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
+    """Block means of the angle, or its derivative that is read, from the blocks' ends, shape (runs, blocks).
+
+    Args:
+        angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1).
+    """
     weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound

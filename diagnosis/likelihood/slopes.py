@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.likelihood.motions import Asked, Motions, end_weights, side_by_side
-from tunnel_sim.effects.chain import reads_linearly, reads_plainly
-from tunnel_sim.physics.slopes import slopes, terms
+from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
+from tunnel_sim.effects.chain import reads_plainly
+from tunnel_sim.physics.slopes import most_winds, slopes, terms
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 8  # motions in a part of the work: those that the integrator takes side by side
@@ -27,17 +27,17 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, or the reading is not linear in the angle.
+        no derivative, its rod twists, or the motion is read at times of its own.
     """
-    acting = {type(effect): effect for effects in asked.effects for effect in effects}.values()
-    sampled = not reads_linearly(tuple(acting)) or any(effect.skips for effect in acting)
-    if sampled or any(asked.physics.rod_twist):  # reading a motion takes longer than the motion
+    acting = {type(effect) for effects in asked.effects for effect in effects}
+    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
     points = len(asked.runs) // count - 1
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
     moved = np.swapaxes(values[1:] - values[0], 0, 1)
+    blown = [_winds(motions, place, count) for place in range(count)]
     equal: dict[tuple[float, ...], list[int]] = {}
     for place in range(count):
         equal.setdefault(motions.steps(place), []).append(place)
@@ -49,50 +49,90 @@ def changes(asked: Asked, count: int) -> list[Array]:
     found = [np.zeros(0)] * count
 
     def follow(part: list[int]) -> None:
-        for place, change in zip(part, _part(asked, motions, part, moved[part]), strict=True):
+        winds = [blown[place] for place in part]
+        for place, change in zip(part, _part(asked, motions, part, moved[part], winds), strict=True):
             found[place] = change
 
     side_by_side(follow, parts, asked.data)
     return found
 
 
-def _part(asked: Asked, motions: Motions, part: list[int], moved: Array) -> Sequence[Array]:
+def _winds(motions: Motions, place: int, count: int) -> Array:
+    """Changes of a run's wind of samples, m/s, shape (points, samples): none in a constant wind.
+
+    NaN at a point where the wind has other samples than at the first.
+    """
+    rows, kept = motions.rows[place::count], motions.kept[place::count]
+    first = np.array(kept[0][0] if rows["wind_count"][0] > 1.0 else motions.winds[place], ndmin=1)
+    found = np.zeros((len(rows) - 1, first.size))
+    for change, row, arrays in zip(found, rows[1:], kept[1:], strict=True):
+        if (row["wind_count"], row["wind_interval"]) != (rows["wind_count"][0], rows["wind_interval"][0]):
+            change[:] = np.nan
+        elif first.size > 1:
+            change[:] = arrays[0] - first
+    return found
+
+
+def _part(
+    asked: Asked, motions: Motions, part: list[int], moved: Array, blown: Sequence[Array]
+) -> Sequence[Array]:
     """The changes of runs that are integrated side by side, shape (points, blocks) each.
 
     Args:
         part: their places.
         moved: changes of their terms, shape (runs, points, terms).
+        blown: changes of their winds, by run, as of `_winds`.
     """
     count, points = len(asked.runs) // (moved.shape[1] + 1), moved.shape[1]
     columns = np.flatnonzero(moved.any(axis=(0, 1)))
+    gusts = np.array([change.any(axis=1) for change in blown])  # a change that is NaN is one, too
+    along = np.flatnonzero(gusts.any(axis=0))[: most_winds()]
     runs, blocks = [asked.runs[place] for place in part], int(motions.blocks[part[0]])
     effects = asked.effects[part[0]]
     weights = (
         end_weights(runs, blocks)
         * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
     )
-    found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights)
+    winds = [np.nan_to_num(change[along]) for change in blown]
+    found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights, winds)
     if found.status:
         return [np.full((points, run.reading.size), np.nan) for run in runs]
-    steps = moved[:, :, columns]
+    changed = gusts[:, along, None] * (along[:, None] == np.arange(points))
+    steps = np.concatenate([moved[:, :, columns], np.swapaxes(changed, 1, 2)], axis=2)
     unknown = np.isnan(found.by_angle[:, :, 0])
     lost = np.any((steps != 0.0) & unknown[:, None], axis=2)
+    lost |= np.array([np.isnan(change).any(axis=1) for change in blown])
+    lost |= gusts & ~np.isin(np.arange(points), along)
     found.by_angle[unknown] = 0.0
-    zeros = asked.zero.reshape(points + 1, count)[:, part]
-    result = list(steps @ found.by_angle + (zeros[1:] - zeros[0]).T[:, :, None])
-    if not reads_plainly(effects):
-        for place, change in zip(part, result, strict=True):
-            change += _beside(asked, place, count)
+    result = list(steps @ found.by_angle)
+    if reads_plainly(effects):
+        zeros = asked.zero.reshape(points + 1, count)[:, part]
+        for change, beside in zip(result, (zeros[1:] - zeros[0]).T, strict=True):
+            change += beside[:, None]
+    else:
+        means = block_means(runs, found.angle, found.rate)
+        result = [
+            _read(asked, range(place, len(asked.runs), count), mean, change)
+            for place, mean, change in zip(part, means, result, strict=True)
+        ]
     for change, without in zip(result, lost, strict=True):
         change[without] = np.nan
     return result
 
 
-def _beside(asked: Asked, place: int, count: int) -> Array:
-    """The changes of what the sensor sees beside the angle, shape (points, blocks)."""
-    run = asked.runs[place]
-    still = np.zeros(run.reading.size)
-    seen = [
-        asked.chain(at).angle(still, run.times, run.derivative) for at in range(place, len(asked.runs), count)
+def _read(asked: Asked, places: Sequence[int], mean: Array, moved: Array) -> Array:
+    """The changes of a run's reading, shape (points, blocks).
+
+    Args:
+        places: of the run at the first point and at the others.
+        mean: of the angle, by block, at the first point, rad, shape (blocks,).
+        moved: changes of it, rad, shape (points, blocks).
+    """
+    run = asked.runs[places[0]]
+    angles = np.concatenate([mean[None], mean + moved])
+    chains = [asked.chain(place) for place in places]
+    read = [
+        chain.reading(chain.angle(angle, run.times, run.derivative) + zero)
+        for chain, angle, zero in zip(chains, angles, asked.zero[list(places)].tolist(), strict=True)
     ]
-    return np.stack(seen[1:]) - seen[0]
+    return np.stack(read[1:]) - read[0]

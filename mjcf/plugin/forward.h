@@ -64,12 +64,14 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
                         double* const* rate);
 
 // The terms of a plain run's acceleration, each a factor times a function of the motion, the parameters that such a
-// function has, and the run's start. A term's factor is per unit inertia. The derivatives of a motion are by these;
-// those by anything else follow from the derivatives of these by it (`vwt_terms`).
+// function has, and the run's start. A term's factor is per unit inertia, and in a wind of samples the air's are per
+// (m/s)2 or m/s of it. The derivatives of a motion are by these; those by anything else follow from the derivatives of
+// these by it (`vwt_terms`).
 #define VWT_TERMS(X)                                                                   \
-  X(angle)                 /* 1/s2, of -angle: springs, and the air without lag */    \
+  X(angle)                 /* 1/s2, of -angle: springs, and an air without a lag in a constant wind */ \
   X(rate)                  /* 1/s, of -rate */                                         \
-  X(seen)                  /* 1/s2, of the angle that air with a lag sees */           \
+  X(seen)                  /* 1/s2, of the angle that air sees with a lag or in a wind of samples */ \
+  X(air_rate)              /* of the rate, in a wind of samples */                     \
   X(steepening)            /* of that angle's power */                                 \
   X(thickening)            /* of the rate times the angle's power */                   \
   X(rate_power)                                                                       \
@@ -105,19 +107,20 @@ enum {
 #undef X
   VWT_TERM_COUNT
 };
+enum { VWT_MOST_WINDS = 8 };  // changes of a wind of samples, by which there are derivatives
 
 // Values of all terms of `count` plain runs, shape (count, VWT_TERM_COUNT).
 VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values);
 
 // As `vwt_forward`, for plain runs: also the derivatives of angle and rate by the terms in `columns`, `width` of them,
-// shape (width, samples) by run. With weights of the ends of an interval between samples, by run, shape (4, weighed)
+// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of a wind of samples, the k-th row of
+// the run's `winds`, m/s, shape (VWT_MOST_WINDS at most, wind_count). With weights of the ends of an interval between samples, by run, shape (4, weighed)
 // for its first and last angle and its first and last rate, the derivatives are those of the weighted sums instead,
 // shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all intervals. A derivative that does
-// not exist is NaN throughout. Returns -1 where a run is not plain, its wind is sampled, or its friction is a root of
-// the rate.
+// not exist is NaN throughout. Returns -1 where a run is not plain or its friction is a root of the rate.
 VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-                       const double* const* weights, int weighed, double* const* angle, double* const* rate,
-                       double* const* angle_slopes, double* const* rate_slopes);
+                       const double* const* winds, const double* const* weights, int weighed, double* const* angle,
+                       double* const* rate, double* const* angle_slopes, double* const* rate_slopes);
 
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);
@@ -139,6 +142,7 @@ VWT_API int vwt_operation_count(void);
 VWT_API const char* vwt_operation_name(int index);
 VWT_API int vwt_term_count(void);
 VWT_API const char* vwt_term_name(int index);
+VWT_API int vwt_most_winds(void);
 VWT_API int vwt_run_size(void);  // bytes
 VWT_API int vwt_run_count(void);
 VWT_API const char* vwt_run_name(int index);

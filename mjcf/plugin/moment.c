@@ -250,15 +250,3 @@ double vwt_lag_weighted(const double w[4], double lagged, double duration, doubl
   const double c3 = h * (rate0 + rate1) - 2 * change;
   return lagged + w[0] * (angle0 - lagged) + w[1] * c1 + w[2] * c2 + w[3] * c3;
 }
-
-double vwt_series(const double* values, int count, double interval, double time) {
-  if (count == 1 || !(time > 0)) {
-    return values[0];
-  }
-  const double place = time / interval;
-  if (!(place < count - 1)) {  // also where interval is zero or not a number
-    return values[count - 1];
-  }
-  const int low = (int)place;
-  return values[low] + (place - low) * (values[low + 1] - values[low]);
-}

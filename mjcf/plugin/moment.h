@@ -138,7 +138,17 @@ double vwt_lag_weighted(const double w[4], double lagged, double duration, doubl
                         double angle1, double rate1);
 
 // Linear interpolation in `count` samples at `interval` s from time 0; constant beyond the ends.
-double vwt_series(const double* values, int count, double interval, double time);
+static inline double vwt_series(const double* values, int count, double interval, double time) {
+  if (count == 1 || !(time > 0)) {
+    return values[0];
+  }
+  const double place = time / interval;
+  if (!(place < count - 1)) {  // also where interval is zero or not a number
+    return values[count - 1];
+  }
+  const int low = (int)place;
+  return values[low] + (place - low) * (values[low + 1] - values[low]);
+}
 
 #ifdef __cplusplus
 }

@@ -88,9 +88,9 @@ INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane m
       angle1 += of_angle.lagged * change->lagged[i];
       rate1 += of_rate.lagged * change->lagged[i];
     }
-    if (columns[i] < VWT_TERM_pace) {
+    if (columns[i] < VWT_TERM_pace || columns[i] >= VWT_TERM_COUNT) {
       for (int j = 0; j < 4; j++) {
-        const Lane term = by_term(law, columns[i], s->slip, &at[j]);
+        const Lane term = by_term(law, features, columns[i], s->slip, &at[j]);
         angle1 += of_angle.stage[j] * term;
         rate1 += of_rate.stage[j] * term;
       }
@@ -203,7 +203,7 @@ typedef struct {
 
 // The change of angle and rate at a sample by column.
 typedef struct {
-  Lane angle[VWT_TERM_COUNT], rate[VWT_TERM_COUNT];
+  Lane angle[VWT_MOST_COLUMNS], rate[VWT_MOST_COLUMNS];
 } Seen;
 
 INLINE void copy(int width, const Seen* from, Seen* to) {
@@ -221,7 +221,7 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
   }
   if (asked->pace >= 0) {
     const Lane none = {0}, shed = features & SHEDDING ? shed_at(law->c, s->start) : none;
-    const Air air = {law->c->air_stiffness, law->c->air_damping};
+    const Air air = air_at(law->c, features, s->start);
     const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
     const Mask rests = (law->c->friction > 0) & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
@@ -295,11 +295,14 @@ static int exists(const Coefficients* c, int k, int term) {
     case VWT_TERM_turn:
       return c->shedding[k] != 0;
     case VWT_TERM_seen:
+      return c->lag[k] != 0 || is_sampled(c, k);
     case VWT_TERM_lag:
     case VWT_TERM_start_lagged:
       return c->lag[k] != 0;
+    case VWT_TERM_air_rate:
+      return is_sampled(c, k);
     default:
-      return 1;
+      return term < VWT_TERM_COUNT || is_sampled(c, k);
   }
 }
 
@@ -366,7 +369,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
 }
 
 CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width,
-                                  const int* columns, const Out* out) {
+                                  const int* columns, const double* const* winds, const Out* out) {
   Coefficients c = {.count = count};
   State s = {.rests = {0}};
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
@@ -376,7 +379,10 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
   for (int k = 0; k < VWT_LANES; k++) {
     alone[k].passage = &passages[k];
   }
-  const Law law = law_of(&c);
+  Law law = law_of(&c);
+  for (int k = 0; k < VWT_LANES; k++) {
+    law.winds[k] = winds ? winds[k < count ? k : 0] : 0;
+  }
   Asked asked = {.width = width, .columns = columns, .pace = -1};
   for (int i = 0; i < width; i++) {
     asked.pace = columns[i] == VWT_TERM_pace ? i : asked.pace;
@@ -390,10 +396,10 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
 }
 
 int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-               const double* const* weights, int weighed, double* const* angle, double* const* rate,
-               double* const* angle_slopes, double* const* rate_slopes) {
+               const double* const* winds, const double* const* weights, int weighed, double* const* angle,
+               double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
-    if (!vwt_is_plain(&parameters[i], &runs[i]) || runs[i].wind_count != 1 || !is_smooth(&parameters[i])) {
+    if (!vwt_is_plain(&parameters[i], &runs[i]) || !is_smooth(&parameters[i])) {
       return -1;
     }
   }
@@ -405,7 +411,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
     const Out out = {.samples = (int)runs[i].samples, .width = width, .angle = &angle[i], .rate = &rate[i],
                      .angle_slopes = &angle_slopes[i], .rate_slopes = weights ? 0 : &rate_slopes[i],
                      .weights = weights ? &weights[i] : 0, .weighed = weighed};
-    const int failed = slopes_of_lanes(together, &parameters[i], &runs[i], width, columns, &out);
+    const int failed = slopes_of_lanes(together, &parameters[i], &runs[i], width, columns, winds ? &winds[i] : 0, &out);
     if (failed) {
       return i + failed;
     }

@@ -7,10 +7,12 @@
 
 #include "lanes.h"
 
-// Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law.
+// Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law; also
+// the changes of a wind of samples.
 typedef struct {
   const Coefficients* c;
   int features;
+  const double* winds[VWT_LANES];
   Lane inverse;
   Lane steepening, thickening, rate, cube, square;
   Lane seen, steep, thick;
@@ -26,6 +28,9 @@ typedef struct {
 // A stage of a step, and the derivatives of the acceleration there.
 typedef struct {
   Lane angle, rate, time, seen;
+  Air air;
+  Lane speed, pressure;  // of a wind of samples, m/s and (m/s)2; 1 in a constant wind
+  Lane by_speed;         // of the acceleration, in a wind of samples
   Powers powers;
   Lane by_angle, by_rate, by_lagged, by_lag;
   Lane level;              // of the friction per unit of its moment
@@ -33,9 +38,17 @@ typedef struct {
 } Stage;
 
 // A small change of the motion by column, per unit of the column's term.
+enum { VWT_MOST_COLUMNS = VWT_TERM_COUNT + VWT_MOST_WINDS };
 typedef struct {
-  Lane angle[VWT_TERM_COUNT], rate[VWT_TERM_COUNT], lagged[VWT_TERM_COUNT];
+  Lane angle[VWT_MOST_COLUMNS], rate[VWT_MOST_COLUMNS], lagged[VWT_MOST_COLUMNS];
 } Change;
+
+static int is_sampled(const Coefficients* c, int k) { return c->run[k]->wind_count > 1; }
+
+// What the air's stiffness and damping have in common with those at any other speed, kg/m; times the model's length.
+static double flow_of(const vwt_parameters* p) {
+  return 0.5 * p->air_density * p->frontal_area * p->reference_length;
+}
 
 static double acting(double exponent, double textbook) { return exponent != 0 ? exponent : textbook; }
 
@@ -119,6 +132,28 @@ INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
   return by_rate;
 }
 
+// The wind's speed at a stage, and the derivative of the acceleration by it.
+INLINE void blow(const Law* law, Stage* at) {
+  const Coefficients* c = law->c;
+  at->speed = at->pressure = (Lane){0} + 1;
+  at->by_speed = (Lane){0};
+  for (int k = 0; k < VWT_LANES; k++) {
+    if (!is_sampled(c, k)) {
+      continue;
+    }
+    const vwt_run* run = c->run[k];
+    const double wind = fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, at->time[k]));
+    const double moment = at->seen[k] * (1 + c->moment_cubic[k] * at->powers.steepening[k]) + c->flow_angle[k];
+    const double loss = (1 + c->damping_quadratic[k] * at->powers.thickening[k]) * c->body[k] * at->rate[k];
+    const double flow = flow_of(c->p[k]), length = c->p[k]->reference_length;
+    at->speed[k] = wind;
+    at->pressure[k] = wind * wind;
+    at->by_speed[k] = wind > 0 ? law->inverse[k] * c->body[k] * flow *
+                                     (2 * wind * c->p[k]->cn_beta * moment + length * c->p[k]->cn_r * loss)
+                               : 0;
+  }
+}
+
 // The acceleration at a stage, and its derivatives by the motion there.
 INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged,
                      Stage* at) {
@@ -128,6 +163,8 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
   at->rate = rate;
   at->time = time;
   at->seen = seen_at(c, features, body, lagged);
+  at->air = air_at(c, features, time);
+  const Air air = at->air;
   set_powers(c, size, size_of(angle), size_of(rate), features & POWERS, &at->powers);
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
@@ -141,10 +178,13 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
   }
   const Lane leads = choose(c->lag < 0, 2 * c->body, c->body);
   const Lane seen_by_angle = features & LAG ? choose(c->lag > 0, none, leads) : c->body;
-  const Lane steep = c->air_stiffness * (1 + c->moment_cubic * p->steepening);
+  if (features & WIND) {
+    blow(law, at);
+  }
+  const Lane steep = air.stiffness * (1 + c->moment_cubic * p->steepening);
   Lane by_angle = c->body * (steep * seen_by_angle +
-                             c->air_stiffness * at->seen * c->moment_cubic * with_sign(steepening, body) * c->body +
-                             c->air_damping * c->damping_quadratic * with_sign(thickening, body) * c->body *
+                             air.stiffness * at->seen * c->moment_cubic * with_sign(steepening, body) * c->body +
+                             air.damping * c->damping_quadratic * with_sign(thickening, body) * c->body *
                                  (c->body * rate));
   by_angle -= c->cubic * cube + c->quadratic * with_sign(square, angle) + c->rod;
   by_angle -= choose(size_of(angle) < c->free_play, none, c->spring);
@@ -153,7 +193,7 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
       by_angle[k] -= c->gravity[k] != 0 ? c->gravity[k] * cos(angle[k] - c->gravity_angle[k]) : 0;
     }
   }
-  Lane by_rate = c->body * c->air_damping * (1 + c->damping_quadratic * p->thickening) * c->body;
+  Lane by_rate = c->body * air.damping * (1 + c->damping_quadratic * p->thickening) * c->body;
   by_rate -= c->quadratic_damping * turning_rate + c->loss + c->damping + slip * slip * rub(law, slip, at);
   at->by_angle = by_angle * law->inverse;
   at->by_rate = by_rate * law->inverse;
@@ -162,7 +202,6 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     at->by_lagged = side * c->body * steep * law->inverse;
   }
   const Lane shed = features & SHEDDING ? shed_at(c, time) : none;
-  const Air air = {c->air_stiffness, c->air_damping};
   return acceleration(c, &air, p, slip, features, angle, rate, shed, lagged);
 }
 
@@ -182,23 +221,42 @@ INLINE Lane sine(const Stage* at, Lane turn, Lane phase, double shift) {
   return out;
 }
 
-// The derivative of the acceleration at a stage by a term.
-INLINE Lane by_term(const Law* law, int term, Lane slip, const Stage* at) {
+// The derivative of the acceleration at a stage along a change of the wind.
+INLINE Lane by_wind(const Law* law, int change, const Stage* at) {
+  Lane out = {0};
+  for (int k = 0; k < VWT_LANES; k++) {
+    const vwt_run* run = law->c->run[k];
+    const int count = (int)run->wind_count;
+    if (is_sampled(law->c, k)) {
+      out[k] = at->by_speed[k] * vwt_series(law->winds[k] + (long)change * count, count, run->wind_interval, at->time[k]);
+    }
+  }
+  return out;
+}
+
+// The derivative of the acceleration at a stage by a term, `features` those of the law.
+INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Stage* at) {
   const Coefficients* c = law->c;
   const Lane none = {0}, angle = at->angle, rate = at->rate;
   const Powers* p = &at->powers;
   const double quarter = 1.5707963267948966192313216916398;
+  const Lane speed = features & WIND ? at->speed : none + 1, pressure = features & WIND ? at->pressure : none + 1;
+  if (term >= VWT_TERM_COUNT) {
+    return by_wind(law, term - VWT_TERM_COUNT, at);
+  }
   switch (term) {
     case VWT_TERM_angle:
       return -angle;
     case VWT_TERM_rate:
       return -rate;
     case VWT_TERM_seen:
-      return at->seen * law->seen;
+      return at->seen * law->seen * pressure;
+    case VWT_TERM_air_rate:
+      return rate * speed;
     case VWT_TERM_steepening:
-      return at->seen * p->steepening * law->steep;
+      return at->seen * p->steepening * law->steep * pressure;
     case VWT_TERM_thickening:
-      return rate * p->thickening * law->thick;
+      return rate * p->thickening * law->thick * speed;
     case VWT_TERM_rate_power:
       return -with_sign(p->rate, rate);
     case VWT_TERM_cube:
@@ -208,7 +266,7 @@ INLINE Lane by_term(const Law* law, int term, Lane slip, const Stage* at) {
     case VWT_TERM_play:
       return taken_up(c, angle);
     case VWT_TERM_constant:
-      return none + 1;
+      return pressure;
     case VWT_TERM_gravity_sine: {
       Lane out;
       for (int k = 0; k < VWT_LANES; k++) {
@@ -230,10 +288,10 @@ INLINE Lane by_term(const Law* law, int term, Lane slip, const Stage* at) {
     case VWT_TERM_shedding_cosine:
       return sine(at, c->shedding_turn, none, quarter);
     case VWT_TERM_steepening_exponent:
-      return law->inverse * c->body * c->air_stiffness * c->moment_cubic * at->seen * p->steepening *
+      return law->inverse * c->body * at->air.stiffness * c->moment_cubic * at->seen * p->steepening *
              logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_thickening_exponent:
-      return law->inverse * c->body * c->body * c->air_damping * c->damping_quadratic * rate * p->thickening *
+      return law->inverse * c->body * c->body * at->air.damping * c->damping_quadratic * rate * p->thickening *
              logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_rate_exponent:
       return -law->inverse * c->quadratic_damping * with_sign(p->rate, rate) *
@@ -266,13 +324,16 @@ INLINE Lane by_term(const Law* law, int term, Lane slip, const Stage* at) {
 static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   const Coefficients* c = law->c;
   const vwt_parameters* p = c->p[k];
-  const double inverse = law->inverse[k], body = c->body[k], air = body * c->air_stiffness[k] * inverse;
-  const int lags = c->lag[k] != 0;
-  out[VWT_TERM_angle] = (c->spring[k] + c->rod[k]) * inverse - (lags ? 0 : air * body);
-  out[VWT_TERM_rate] = (c->damping[k] + c->loss[k] - body * body * c->air_damping[k]) * inverse;
-  out[VWT_TERM_seen] = lags ? air * body : 0;
+  const int lags = c->lag[k] != 0, sampled = is_sampled(c, k);
+  const double inverse = law->inverse[k], body = c->body[k], flow = flow_of(p);
+  const double air = body * (sampled ? flow * p->cn_beta : c->air_stiffness[k]) * inverse;
+  const double air_rate = body * body * (sampled ? flow * p->reference_length * p->cn_r : c->air_damping[k]) * inverse;
+  out[VWT_TERM_angle] = (c->spring[k] + c->rod[k]) * inverse - (lags || sampled ? 0 : air * body);
+  out[VWT_TERM_rate] = (c->damping[k] + c->loss[k]) * inverse - (sampled ? 0 : air_rate);
+  out[VWT_TERM_seen] = lags || sampled ? air * body : 0;
+  out[VWT_TERM_air_rate] = sampled ? air_rate : 0;
   out[VWT_TERM_steepening] = air * c->moment_cubic[k] / law->steep[k];
-  out[VWT_TERM_thickening] = body * body * c->air_damping[k] * c->damping_quadratic[k] * inverse / law->thick[k];
+  out[VWT_TERM_thickening] = air_rate * c->damping_quadratic[k] / law->thick[k];
   out[VWT_TERM_rate_power] = c->quadratic_damping[k] * inverse;
   out[VWT_TERM_cube] = c->cubic[k] * inverse;
   out[VWT_TERM_square] = c->quadratic[k] * inverse;

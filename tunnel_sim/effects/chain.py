@@ -141,11 +141,6 @@ def reads_plainly(effects: Sequence[Effect]) -> bool:
     return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in effects)
 
 
-def reads_linearly(effects: Sequence[Effect]) -> bool:
-    """Whether the reading is the angle, at times of its own, and an oscillation that does not depend on it."""
-    return not any(_overrides(effect, "on_angle", "on_reading") for effect in effects)
-
-
 _SEEN = ("oscillation", "on_angle")
 
 

@@ -20,6 +20,12 @@ def term_places() -> Mapping[str, int]:
     return {library.vwt_term_name(i).decode(): i for i in range(library.vwt_term_count())}
 
 
+@functools.cache
+def most_winds() -> int:
+    """How many changes of a wind of samples there may be derivatives along."""
+    return int(forward_library().vwt_most_winds())
+
+
 def terms(law: Array, runs: NDArray[np.void]) -> Array:
     """Values of the terms of plain runs, in units of kg, m, s and rad, shape (n, terms).
 
@@ -41,10 +47,9 @@ class Slopes:
         angle: of the rod's upper end, rad, shape (n, samples).
         rate: of it, rad/s, shape (n, samples).
         by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where there is
-            none; or of the weighted sums, shape (n, columns, samples − 1).
+            none; or of the weighted sums, shape (n, columns, samples − 1). Along changes of the wind they are last.
         by_rate: derivatives of the rate, of that shape; of weighted sums none.
-        status: as of `integrate`, or −1 where a run is not plain, its wind is sampled, or its friction is a root of
-            the rate.
+        status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
     """
 
     angle: Array
@@ -60,6 +65,7 @@ def slopes(
     samples: int,
     columns: Sequence[int],
     weights: Array | None = None,
+    winds: Sequence[Array] = (),
 ) -> Slopes:
     """Integrate plain runs of equal length, and their derivatives by some terms.
 
@@ -70,10 +76,16 @@ def slopes(
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
             between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
+        winds: changes of the winds of samples, along which there are derivatives too, m/s, by run, shape (changes,
+            samples of the run's wind), `most_winds` changes at most; in a constant wind the derivatives are NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     runs["samples"] = samples
-    chosen = np.ascontiguousarray(columns, dtype=np.intc)
+    changes = len(winds[0]) if winds else 0
+    places = [*columns, *(len(term_places()) + change for change in range(changes))]
+    chosen = np.ascontiguousarray(places, dtype=np.intc)
+    blown = [np.ascontiguousarray(change, dtype=np.float64) for change in winds]
+    at = np.array([change.ctypes.data for change in blown], dtype=np.uintp) if blown else None
     angle, rate = np.empty((len(runs), samples)), np.empty((len(runs), samples))
     weights = None if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
     by_angle = np.empty((len(runs), chosen.size, samples - (weights is not None)))
@@ -81,7 +93,7 @@ def slopes(
     given = [_rows(array) for array in (weights, angle, rate, by_angle, by_rate)]
     status = forward_library().vwt_slopes(
         len(runs), law.ctypes.data, runs.ctypes.data, chosen.size, chosen.ctypes.data,
-        _address(given[0]), 1 if weights is None else weights.shape[2], *map(_address, given[1:]),
+        _address(at), _address(given[0]), 1 if weights is None else weights.shape[2], *map(_address, given[1:]),
     )  # fmt: skip
     return Slopes(angle, rate, by_angle, by_rate, int(status))
 

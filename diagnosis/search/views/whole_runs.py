@@ -156,8 +156,10 @@ class WholeRuns(View):
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
-        if not found.explains_runs:
-            (found,) = with_forms([found], self._scattering_gap, 0.0)
+        gap = self._scattering_gap
+        reach = self.base.settings.search.forms_beside_scatter * np.sum(gap.excess)
+        if not found.explains_runs and np.sum(misfit(found.fit).excess) < reach:
+            (found,) = with_forms([found], gap, 0.0)
         return replace(found, fit=settled(found.fit))
 
     def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:

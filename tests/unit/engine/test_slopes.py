@@ -15,6 +15,8 @@ NOMINAL = {
 }  # fmt: skip
 WIND = np.array([15.0])  # m/s
 SAMPLES = 300
+#: Winds of samples, m/s: a drift, and one that rises from nothing and falls again.
+WINDS = {"drift": np.array([15.0, 17.0]), "gust": np.array([0.0, 9.0, 16.0, 4.0])}
 
 #: Laws, and the parameters by which they are differentiated.
 SMOOTH = {
@@ -88,6 +90,13 @@ def runs(values, steps=2, stride=1, count=1):
     return np.repeat(law, count, axis=0), np.repeat(run, count)
 
 
+def blown(law, run, wind):
+    """The same runs in a wind of samples, over a little less than the motion."""
+    run = run.copy()
+    run["wind"], run["wind_count"], run["wind_interval"] = wind.ctypes.data, wind.size, 2.2 / (wind.size - 1)
+    return law, run
+
+
 def moved(law, run, name, by):
     law, run = law.copy(), run.copy()
     if name in parameter_names():
@@ -103,9 +112,11 @@ def difference(of: Callable[[float], np.ndarray], step: float) -> np.ndarray:
     return (8.0 * near - far) / (12.0 * step)
 
 
-def errors(values, names, relative, **steps):
+def errors(values, names, relative, wind=WIND, **steps):
     """How far the derivatives are from those of differences, relative to their norm, by parameter."""
     law, run = runs(values, **steps)
+    if wind.size > 1:
+        law, run = blown(law, run, wind)
     for name in names:
         value = law[0, parameter_names().index(name)] if name in parameter_names() else run[name][0]
         step = relative * (abs(value) or 1.0)
@@ -135,6 +146,42 @@ def test_derivatives_of_a_smooth_law_are_those_of_the_motion(name, steps):
             assert error < 1e-8, parameter
 
 
+@pytest.mark.parametrize("wind", WINDS)
+@pytest.mark.parametrize(
+    "name", [name for name in SMOOTH if not any(word in name for word in ("lag", "lead", "vort"))]
+)
+def test_derivatives_in_a_wind_of_samples_are_those_of_the_motion(name, wind):
+    for parameter, error in errors(*SMOOTH[name], 1e-4, WINDS[wind]):
+        if parameter != "width":  # it changes nothing
+            assert error < 1e-8, parameter
+
+
+@pytest.mark.parametrize("values", [{}, {"moment_cubic": -2.0, "damping_quadratic": 3.0, "flow_angle": 0.1}])
+@pytest.mark.parametrize(
+    ("friction", "steps"),
+    [(0.0, {"steps": 2}), (0.0, {"steps": 1, "stride": 3}), (0.01, {"steps": 2})],
+    ids=["steps", "stride", "friction"],
+)
+def test_derivatives_along_changes_of_the_wind_are_those_of_the_motion(values, friction, steps):
+    """Beside a run in a constant wind, which has none; the wind does not fall below zero."""
+    wind = WINDS["gust"] + 1.0
+    changes = np.random.default_rng(3).normal(size=(2, wind.size))
+    law, run = runs(values | {"friction_moment": friction}, **steps, count=2)
+    run[1:] = blown(law, run[1:], wind)[1]
+    column = [term_places()["angle"]]
+    found = slopes(law, run, SAMPLES, column, winds=[np.zeros((2, 1)), changes])
+    assert np.isnan(found.by_angle[0, 1:]).all()
+    for change, exact in zip(changes, found.by_angle[1, 1:], strict=True):
+
+        def motion(by, change=change):
+            there = wind + by * change
+            return integrate(law[1:], blown(law, run[1:], there)[1], SAMPLES)[0][0]
+
+        step, tolerance = (1e-6, 1e-6) if friction else (1e-4, 1e-8)
+        expected = difference(motion, step)
+        assert np.linalg.norm(exact - expected) < tolerance * np.linalg.norm(expected)
+
+
 @pytest.mark.parametrize("name", KINKED)
 def test_derivatives_with_a_kink_are_those_of_the_motion(name):
     for parameter, error in errors(*KINKED[name], 1e-6):
@@ -154,6 +201,8 @@ def test_the_motion_is_bit_identical_beside_its_derivatives(name):
     for steps in ({"steps": 2}, {"stride": 3, "steps": 1}):
         law, run = runs(values, **steps, count=11)
         run["angle"] += 0.01 * np.arange(11)
+        if "aero_lag" not in values and "shedding_amplitude" not in values:
+            run[5:] = blown(law, run[5:], WINDS["drift"])[1]
         angle, rate, _ = integrate(law, run, SAMPLES)
         found = slopes(law, run, SAMPLES, [term_places()["angle"], term_places()["start_rate"]])
         assert np.array_equal(found.angle, angle)
@@ -199,6 +248,7 @@ def test_weighted_sums_are_those_of_the_derivatives(blocks, stride):
         ({"friction_moment": 0.01}, "friction_peak_rate"),
         ({}, "lag"),
         ({}, "seen"),
+        ({}, "air_rate"),
         ({}, "turn"),
         ({}, "shedding_sine"),
     ],
