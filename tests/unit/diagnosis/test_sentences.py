@@ -260,7 +260,9 @@ def test_what_could_be_closed(given: Document) -> None:
     assert text(law=law).endswith(
         "The formula k*b^n closes 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
     )
-    flat = law | {"parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}}
+    flat = law | {
+        "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
+    }
     assert text(law=flat).endswith(
         "with k = -0.2457 ± 0.0012 N m, n = 3.000 ± 0.020 and d and q not determined by these runs."
     )

@@ -479,7 +479,12 @@ def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
 def test_what_to_do_about_runs_is_said_once() -> None:
     given = document()
     left = {"outcome": "left out", "what": "it stands still", "remedy": "record it again"}
-    cut = {"outcome": "cut", "runs": ["c"], "what": "begins at 1 s", "remedy": "cut it by hand if that is wrong"}
+    cut = {
+        "outcome": "cut",
+        "runs": ["c"],
+        "what": "begins at 1 s",
+        "remedy": "cut it by hand if that is wrong",
+    }
     given["remarks"] = [left | {"runs": ["a"]}, left | {"runs": ["b"]}, cut]
     steps = next_steps(given)
     assert steps.count("a, b: record it again.") == 1
