@@ -98,7 +98,8 @@ def size_change(before: float, after: float) -> str:
     """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
 
     Args:
-        before: not 0, in the unit of both.
+        before: the value without the causes, not 0, in its unit.
+        after: the value with the causes, in the same unit.
     """
     if before * after < 0.0:
         return "other sign"
