@@ -1,4 +1,4 @@
-"""Which runs of a campaign can be diagnosed together, and with which effects; the rest is refused."""
+"""The runs of a campaign that can be diagnosed together, and the effects for them; the rest is refused."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Diagnosable:
     """The runs to diagnose.
 
     Args:
-        limit_cycles: whether they are all in limit cycles, so that no decay remains.
+        limit_cycles: whether all are in limit cycles, so that no decay remains.
     """
 
     campaign: Campaign
@@ -49,7 +49,7 @@ class Diagnosable:
 def diagnosable(campaign: Campaign) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
-    Where all are in one, their whole records remain.
+    Where all are in one, their whole records are kept.
 
     Raises:
         TunnelError: when the examination refuses the records.
@@ -71,14 +71,14 @@ def diagnosable(campaign: Campaign) -> Diagnosable:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What is diagnosed.
+    """The selection to be diagnosed.
 
     Args:
-        examined: all runs that show the kind of motion diagnosed.
-        campaign: those of them that one model can be fitted to.
+        examined: all runs with the right kind of motion.
+        campaign: those that one model can be fitted to.
         model: that model.
         kinds: the effects to answer with; none where all runs are in limit cycles.
-        left_out: which runs and effects were left out, and why.
+        left_out: runs and effects that were left out, with reasons.
     """
 
     examined: Campaign
@@ -99,7 +99,7 @@ def choose(
     """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
 
     Args:
-        given: a nominal model of one's own; None: that of the campaign's kind.
+        given: your own nominal model; None: that of the campaign's kind.
 
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
@@ -110,7 +110,7 @@ def choose(
     compared, left_out = comparable_runs(found.campaign, settings)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
-        # Their sizes are those of angles, and their ranges too; a mode moves the body.
+        # Their sizes and ranges are those of angles; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
@@ -121,11 +121,12 @@ def choose(
 
 
 def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
-    """Leave out the runs that cannot be fitted together with the others, and say which and why.
+    """Leave out the runs that cannot be fitted together with the others, with reasons.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
-    equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they can
-    have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left out.
+    equal). Among runs that do not state it, those with the same frequency at the same wind speed remain: only they
+    can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left
+    out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -165,8 +166,8 @@ def _ids(runs: Sequence[Run]) -> str:
 def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[Run]:
     """The largest group of runs that may have one spring.
 
-    The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
-    same at each speed. Frequencies at one speed within a ``ratio`` are those of one spring.
+    The air reduces the stiffness of every spring by the same amount, so the order of the frequencies is the same
+    at each speed. Frequencies at one speed within a ``ratio`` belong to one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
@@ -193,7 +194,7 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
     """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
 
     Args:
-        given: a nominal model of one's own; None: that of the campaign's kind.
+        given: your own nominal model; None: that of the campaign's kind.
 
     Raises:
         TunnelError: for the first such run.
@@ -264,10 +265,10 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
 def kinds_for(
     campaign: Campaign, kinds: Sequence[type[Effect]], model: NominalModel
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
-    """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
+    """The effects to answer with that can be fitted to a campaign, and sentences that name the others.
 
-    Where no run is driven, they are those that act on free decays, without a sentence; where no run has a moment as
-    its input, those of a moment are left out likewise.
+    Without driven runs, effects of driven runs are omitted without a sentence. Where no run has a moment as its
+    input, effects of a moment are omitted without one too.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()

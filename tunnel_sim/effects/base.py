@@ -138,7 +138,7 @@ class Effect:
                 remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
             if info.of_input and value != round(value):
-                what = f"{info.name} = {value!r} is none of the cases"
+                what = f"{info.name} = {value!r} is not a valid case"
                 remedy = f"give a whole number from {info.lower:g} to {info.upper:g}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 

@@ -88,7 +88,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         raise TunnelError(what, where=where, remedy=remedy)
     if not np.isfinite(values).all():
         remedy = "give all its values"
-        raise TunnelError(f"the input {name} holds NaN or an infinity", where=where, remedy=remedy)
+        raise TunnelError(f"the input {name} contains NaN or an infinity", where=where, remedy=remedy)
     span = float(np.ptp(values))
     if span <= _CONSTANT * float(np.abs(values).max()):
         remedy = f"leave the column out if the run is a free decay, or record what drives it in {name}"
@@ -116,7 +116,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         stands = int(np.count_nonzero(flat)) * _FLAT > count
         if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
             raise TunnelError(
-                f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
+                f"the input {name} saturates: its extreme value fills {_CLIPPED:.0%} of the record or more",
                 where=where,
                 remedy="record the input in a wider range; where the actuator itself saturates, state "
                 "plausible = false under [sensor] to keep it",

@@ -122,7 +122,7 @@ def read_records(
     kinds = {raw.quantity for raw in raws}
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
-        raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
+        raise TunnelError(f"the runs contain {' and '.join(sorted(kinds))}", remedy=remedy)
     ids, hints = [raw.id for raw in raws], name_hints([source.path for source in sources])
     parts = []
     for at, raw in enumerate(raws):
@@ -156,9 +156,7 @@ def read_records(
         levels = "the readings lie on levels that far apart"
         said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
     if campaign.sensor.zero is not None:
-        said.append(
-            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
-        )
+        said.append("the runs' stated rests differ: every run is fitted with its own zero (zero = 'per_run')")
     said += [] if table is None else table.said
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
