@@ -165,6 +165,10 @@ EQUAL_SWINGS = 0.8
 """Ratio of two swings that count as equal when centres are compared: what depends on the amplitude changes by less
 than half. Judgement."""
 
+GROSS_MISFIT = 0.01
+"""Share of a reading's power in the residual beyond which a fit misses the motion itself: a tenth of the swing.
+Judgement, and that of `tunnel diagnose`."""
+
 LEAST_FOR_SCATTER = 3
 """Values whose scatter is taken for their uncertainty."""
 

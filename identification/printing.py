@@ -423,16 +423,16 @@ def runs_table(document: Document) -> TextTable:
 
 
 def status_lines(document: Document) -> list[str]:
-    """What the estimate and its runs have to say, each status once, with the runs it concerns and the remedy."""
+    """What the estimate and its runs have to say, the gravest first, each once with its runs and the remedy."""
     runs: dict[str, list[str]] = {name: [] for name in document["statuses"] if name != "ok"}
     for run in document["runs"]:
         for name in run["statuses"]:
             if name != "ok":
                 runs.setdefault(name, []).append(run["id"])
-    count = len(document["runs"])
+    count, gravity = len(document["runs"]), [status.name.lower() for status in Status]
     return [
         Status[name.upper()].value + (f" ({', '.join(ids)})" if ids and len(ids) < count else "")
-        for name, ids in runs.items()
+        for name, ids in sorted(runs.items(), key=lambda one: gravity.index(one[0]))
     ]
 
 

@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except SystemExit as error:
         _settle_output()
-        return 0 if _by_typer(error) else _left(error)
+        return 0 if _by_library(error) else _left(error)
     except OSError as error:
         _settle_output()
         return _refuse(
@@ -202,12 +202,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status if isinstance(status, int) else 0
 
 
-def _by_typer(error: SystemExit) -> bool:
-    """Whether Typer itself ends the process, as it does at some closed pipes and after completing a word."""
+def _by_library(error: SystemExit) -> bool:
+    """Whether Typer or Rich itself ends the process, as they do at closed pipes and after completing a word."""
     frame = error.__traceback__
     while frame is not None and frame.tb_next is not None:
         frame = frame.tb_next
-    return frame is not None and frame.tb_frame.f_globals.get("__name__", "").partition(".")[0] == "typer"
+    module = "" if frame is None else frame.tb_frame.f_globals.get("__name__", "")
+    return module.partition(".")[0] in ("typer", "rich")
 
 
 def _left(error: SystemExit) -> int:

@@ -94,6 +94,19 @@ def rounded_up(value: float) -> str:
     return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
 
 
+def size_change(before: float, after: float) -> str:
+    """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
+
+    Args:
+        before: the value without the causes, not 0, in its unit.
+        after: the value with the causes, in the same unit.
+    """
+    if before * after < 0.0:
+        return "other sign"
+    change = 100.0 * (abs(after) / abs(before) - 1.0)
+    return f"{change:+.2g} %" if change else "0 %"
+
+
 def change_up_to(size: float, given: Mapping[str, Any]) -> str:
     """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from diagnosis.facts.remainder import Ceiling
@@ -20,7 +21,7 @@ from diagnosis.words.numbers import (
     unit_shown,
 )
 from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, unit_mark, with_std
+from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 
 
@@ -32,8 +33,11 @@ def rest_words(document: Document) -> str:
     after, named = document["coefficients"]["after"], causes not in ([], ["unknown"])
     moves, excess, misfit = rest["moves"], rest["excess"], misfit_of(document)
     size = left_over(excess) if misfit is None else f"{rms_shown(misfit, excess)} root mean square"
+    larger = excess > 1.0  # than the noise: people see it in the fit, whatever it does to the coefficients
+    if larger and misfit is not None:
+        size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
     left = f"what remains ({size})" if named else "it"
-    explained = f"Explained; {left}" if named else "It"
+    explained = f"{'Not all is explained:' if larger else 'Explained;'} {left}" if named else "It"
     material = [name for name, move in moves.items() if move["material"]]
     known = [name for name, move in moves.items() if move["std"] is not None]
     if not causes:
@@ -110,12 +114,19 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
 
 def _with_values(law: Document) -> str:
     """The numbers of a formula, as a clause; empty where it has none."""
-    stated, said = law["effect"].get("parameters", {}), []
+    stated, said, unknown = law["effect"].get("parameters", {}), [], []
     for name, one in law["parameters"].items():
+        if not 0.0 < one["std"] < _UNKNOWN * abs(one["value"]):
+            unknown.append(name)
+            continue
         unit = stated.get(name, {}).get("unit", "1")
         mark = "" if unit == "1" else f" {unit_mark(unit)}"
         said.append(f"{name} = {with_std(one['value'], one['std'])}{mark}")
-    return f", with {listed(said)}" if said else ""
+    left = f"{listed(unknown)} not determined by these runs" if unknown else ""
+    return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
+
+
+_UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
 
 
 def formula_step(document: Document) -> str:

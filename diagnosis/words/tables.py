@@ -19,6 +19,7 @@ from diagnosis.words.numbers import (
     reading_shown,
     rms_shown,
     share,
+    size_change,
     unit_of,
 )
 from diagnosis.words.remainder import ceiling, closable_line
@@ -129,19 +130,18 @@ def closable_table(document: Document) -> TextTable:
 
 
 def coefficients_table(document: Document) -> TextTable:
-    """The coefficients of the nominal model before and after the causes are added, and their changes."""
+    """The coefficients of the nominal model before and after the causes are added, and how their sizes change."""
     rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in before:
         if name in after:
             one, two = before[name], after[name]
-            change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
             known = all(given.get("determined", True) for given in (one, two))
-            moved = f"{change:+.2g} %" if known else "–"
+            moved = size_change(one["value"], two["value"]) if known and one["value"] else "–"
             rows.append((coefficient_label(name, one["unit"]), estimated(one), estimated(two), moved))
     skewed = any(given.get("interval") for given in after.values())
     title = "Coefficients ± one standard deviation" + " (central 95 %)" * skewed
-    return TextTable(title, ("", "before", "after", "change"), tuple(rows), ("change",))
+    return TextTable(title, ("", "before", "after", "change of size"), tuple(rows), ("change of size",))
 
 
 SOURCES = {

@@ -386,6 +386,15 @@ def run_words(run: Mapping[str, float]) -> str:
     )
 
 
+def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What to do about runs that are left out or refused, each remedy once; a cut run is used and needs nothing."""
+    runs: dict[str, list[str]] = {}
+    for remark in remarks:
+        if remark["outcome"] in ("left out", "refused"):
+            runs.setdefault(remark["remedy"], []).extend(remark["runs"])
+    return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
+
+
 _SUSPECT = "State the effect that you suspect in a file, and diagnose again with --effects-file"
 
 
@@ -396,11 +405,7 @@ def next_steps(document: Document) -> list[str]:
         f"Repeat run {one['run']}, which was disturbed at {one['at_s']:.4g} s."
         for one in document.get("disturbed", ())
     ]
-    steps += [
-        f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
-        for remark in document.get("remarks", ())
-        if remark["outcome"] != "noted"
-    ]
+    steps += _remedies(document.get("remarks", ()))
     steps += repeat_steps(document)
     if causes != _UNKNOWN and document.get("decided", True):
         steps += choice_steps(document)

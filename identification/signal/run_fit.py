@@ -13,7 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, WindowEstimate, by_severity
-from identification.policy import FEW_CYCLES, LEAST_ENERGY, LEAST_WINDOW_ENERGY
+from identification.policy import (
+    FEW_CYCLES,
+    GROSS_MISFIT,
+    LEAST_ENERGY,
+    LEAST_WINDOW_ENERGY,
+    MISFIT_DEVIATIONS,
+)
 from identification.signal.decay_fit import (
     ANGLE,
     ANGULAR_RATE,
@@ -34,6 +40,8 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 CYCLES = 3
 _LEAST_WINDOWS = 4
+# A steady change over n windows is n − 1 standard deviations of their successive differences, and 3.29 are needed.
+_LEAST_TO_SEE_CHANGE = 5
 _LEAST_SAMPLES = 16
 _TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
 NO_WINDOWS = 10**6
@@ -174,6 +182,12 @@ def describe_run(
     statuses = set()
     if noise is not None and noise.departs:
         statuses.add(Status.MODEL_DEPARTS)
+        if omega_n and zeta and windows:
+            departing = _departing_windows(reading, fitted, zero, noise, omega_n, windows)
+            if departing:
+                statuses.add(Status.FREQUENCY_CHANGES)
+                omega_n = _spanning(omega_n, [window.omega_n for window in departing])
+                zeta = _spanning(zeta, [window.zeta for window in departing])
     if noise is not None and noise.disagrees:
         statuses.add(Status.NOISE_DISAGREES)
     if held and fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
@@ -191,6 +205,44 @@ def describe_run(
         noise=noise,
         windows=windows,
     )
+
+
+def _departing_windows(
+    reading: Reading,
+    fitted: RunFit,
+    zero: float,
+    noise: NoiseLevel,
+    omega_n: Quantity,
+    windows: tuple[WindowEstimate, ...],
+) -> tuple[WindowEstimate, ...]:
+    """Windows of a run whose frequency changes so much along it that no oscillation describes it.
+
+    The fit then loses step with the motion, and takes the loss for damping. A random moment leaves as large a
+    residual, but the frequencies of its windows scatter: their successive differences are the measure.
+
+    Returns:
+        The windows, of single cycles where the run has few others; none where one oscillation describes the motion
+        itself, or where frequencies differ along the run, and from its own, by no more than such a scatter.
+    """
+    missed = max(float(np.mean(fitted.residual**2)) - noise.std**2, 0.0)
+    if missed <= GROSS_MISFIT * float(np.var(reading.yaw)):
+        return ()
+    if len(windows) < _LEAST_TO_SEE_CHANGE:
+        windows = fit_windows(reading, fitted.decay, zero, noise, cycles=1)
+    found = np.array([window.omega_n.value for window in windows])
+    if found.size < 2:
+        return ()
+    noisy = float(np.mean([window.omega_n.std**2 for window in windows]))
+    variance = noisy + 0.5 * float(np.mean(np.diff(found) ** 2))
+    along = abs(found[-1] - found[0]) / np.sqrt(2.0 * variance)
+    away = abs(found.mean() - omega_n.value) / np.sqrt(variance / found.size + omega_n.std**2)
+    return windows if max(along, away) > MISFIT_DEVIATIONS else ()
+
+
+def _spanning(value: Quantity, windows: Sequence[Quantity]) -> Quantity:
+    """A quantity of the run whose standard deviation includes its distance from those of its windows."""
+    away = np.array([window.value for window in windows]) - value.value
+    return Quantity(value.value, float(np.hypot(value.std, np.sqrt(np.mean(away**2)))), value.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,6 +352,8 @@ def _window_estimate(time: Array, run: RunFit, noise: NoiseLevel, cycles: int) -
     interval = float(time[-1] - time[0]) / (count - 1)
     duration = count * interval
     decay = run.decay
+    if not decay.stiffness > 0.0:  # a stretch that only creeps
+        return None
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
     power, blocks = slow_power(run.residual, eighth_of_a_cycle(decay.omega_n, interval))
     variance = noise.std**2 * max(1.0, power / max(blocks - 4, 1) / noise.std**2)

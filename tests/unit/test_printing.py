@@ -50,9 +50,9 @@ on     12.340 ± 0.056  0.01230 ± 0.00045  ok
 <off>  –               –                  no oscillation
 
 Note: run on: it starts late; cut it
-Note: no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on
 Note: no decaying motion above the noise: check the sensor, start a free record at its
-release, or check the input of a driven one (<off>)"""
+release, or check the input of a driven one (<off>)
+Note: no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on"""
 
 
 def test_an_estimate_prints_as_tables(estimate: Estimate) -> None:
@@ -151,7 +151,7 @@ def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> 
     assert "coulomb_friction         97 %             99.0 %" in lines
     assert "coulomb_friction  friction_moment  0.003990 ± 0.000060 N m" in lines
     assert any(line.strip() == "ratio            2.000 (at its upper bound)" for line in lines)
-    assert "Cnr [1/rad]  -0.313 ± 0.022  -0.257 ± 0.012   +18 %" in lines
+    assert "Cnr [1/rad]  -0.313 ± 0.022  -0.257 ± 0.012           -18 %" in lines
     assert lines[lines.index("Caveats:") + 1] == "- few runs"
     assert lines[-2:] == ["These runs cannot show:", "- a drift"]
     assert "<p>- few runs</p>" in diagnosis._repr_html_()

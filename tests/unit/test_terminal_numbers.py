@@ -170,11 +170,28 @@ def test_coefficients(given: Document) -> None:
         old, new = before[name], after[name]
         assert_shows(cells[1], [old["value"], old["std"]])
         assert_shows(cells[2], [new["value"], new["std"]])
-        assert_shows(cells[3].replace("+", ""), [100 * (new["value"] - old["value"]) / abs(old["value"])])
+        change = 100 * (abs(new["value"]) / abs(old["value"]) - 1.0)
+        assert_shows(cells[3].replace("+", ""), [change])
     before["cn_r"]["value"] = 0.0
-    assert rows(tables.coefficients_table(given))[1][3] == "+0 %"
+    assert rows(tables.coefficients_table(given))[1][3] == "–"
     del after["cn_beta"]
     assert len(rows(tables.coefficients_table(given))) == 1
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "shown"),
+    [
+        (-0.122, -0.114, "-6.6 %"),  # the size falls, as the verdict says
+        (-0.114, -0.122, "+7 %"),
+        (0.590, 0.537, "-9 %"),
+        (-0.1, 0.02, "other sign"),
+        (0.5, 0.5, "0 %"),
+    ],
+)
+def test_a_coefficient_changes_by_its_size(given: Document, one: float, two: float, shown: str) -> None:
+    given["coefficients"]["before"]["cn_r"]["value"] = one
+    given["coefficients"]["after"]["cn_r"]["value"] = two
+    assert rows(tables.coefficients_table(given))[1][3] == shown
 
 
 def test_the_run_to_make(given: Document) -> None:
@@ -344,3 +361,11 @@ def test_notes_name_the_runs_they_concern() -> None:
     every = tuple(dataclasses.replace(run, statuses=(Status.NO_OSCILLATION,)) for run in calm.runs)
     found = status_lines(dataclasses.replace(calm, runs=every).to_json_dict())
     assert found == [Status.NO_OSCILLATION.value]
+
+
+def test_the_gravest_note_comes_first() -> None:
+    calm = estimate()
+    swings = (Status.FREQUENCY_CHANGES, Status.MODEL_DEPARTS)
+    every = tuple(dataclasses.replace(run, statuses=swings) for run in calm.runs)
+    found = dataclasses.replace(calm, runs=every, statuses=(Status.MODEL_DEPARTS, Status.NO_STIFFNESS))
+    assert status_lines(found.to_json_dict()) == [one.value for one in (*swings, Status.NO_STIFFNESS)]

@@ -40,9 +40,9 @@ _WRITTEN = {
     "calibration": "Angle of a voltage, such as 0.1 + 20*V",
     "start": "Leave out samples before [s]",
     "end": "Leave out samples after [s]",
-    "rest": "Reading at rest of every run, to be subtracted [rad]",
-    "name": "Conditions in the file names: S{spring}_V{wind_speed}_*",
-    "set": "Conditions of all runs, such as wind_speed=0 or wind_speed=V",
+    "rest": "Reading at rest, to be subtracted [rad]",
+    "name": "Conditions in the file names: V{wind_speed}",
+    "set": "Conditions of all runs, such as wind_speed=0",
     "delimiter": "Delimiter of a text file: tab, blank, ; , or |",
     "decimal": "Decimal sign of a text file",
 }

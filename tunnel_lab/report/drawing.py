@@ -16,6 +16,8 @@ from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
@@ -32,6 +34,7 @@ NARROW = 4.4  # inches: legible on a phone without scrolling
 SIGMAS = 3.0
 """Standard deviations within which values count as noise in the figures."""
 _FAINTEST = 0.12
+_STEPS = 48  # of a colour map: an eye sees no steps between them, and a colour bar has as many areas
 _NOT_HTML = (
     re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
     re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
@@ -63,7 +66,14 @@ def faded(*colours: str) -> Colormap:
     else:
         low, high = strong
         ramp = [(0.0, low), (0.5, (*low[:3], 0.0)), (0.5, (*high[:3], 0.0)), (1.0, high)]
-    return LinearSegmentedColormap.from_list("faded", ramp)
+    return LinearSegmentedColormap.from_list("faded", ramp, N=_STEPS)
+
+
+def colour_bar(figure: Figure, shown: ScalarMappable, axes: Axes, **given: Any) -> None:
+    """A colour bar of single areas, in colours that follow the page's theme; arguments of ``Figure.colorbar``."""
+    bar = figure.colorbar(shown, ax=axes, **given)
+    if bar.solids is not None:  # an image otherwise, in the colours of the light page
+        bar.solids.set_rasterized(False)
 
 
 def run_labels(maps: Document) -> list[str]:

@@ -40,6 +40,7 @@ from tunnel_lab.report.drawing import (
     SIGMAS,
     Document,
     array,
+    colour_bar,
     faded,
     misfit_scale,
     run_labels,
@@ -340,5 +341,5 @@ def law_figure(document: Document) -> Figure | None:
     colours = faded(AFTER, BEFORE)
     mesh = axes.pcolormesh(*places, shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest")
     axes.set_ylabel(*others)
-    fig.colorbar(mesh, ax=axes, label=name)
+    colour_bar(fig, mesh, axes, label=name)
     return fig

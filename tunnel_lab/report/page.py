@@ -34,6 +34,7 @@ from identification.printing import COEFFICIENTS, p_text, significant, trade_off
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
+from tunnel_lab.report.symbols import symbol_rows
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -135,6 +136,7 @@ def render_report(
         "set_out": set_out(document),
         "coefficients": view.coefficient_rows(document),
         "coefficients_line": coefficients_line(document),
+        "symbols": symbol_rows(document),
         "trade_off": trade_off_line(document, COEFFICIENTS),
         "next_steps": next_steps(document),
         "place": view.place_rows(document),

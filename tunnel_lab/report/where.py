@@ -20,6 +20,7 @@ from tunnel_lab.report.drawing import (
     SIGMAS,
     Document,
     array,
+    colour_bar,
     faded,
     misfit_scale,
     run_labels,
@@ -75,7 +76,7 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
         axes.set_xticks(range(len(speeds)), [f"{speed:g}" if speed else "off" for speed in speeds])
     axes.set(xlabel="wind speed [m/s]" if speeds else TIME, ylabel="amplitude [°]")
     axes.set(xlim=(columns[0], columns[-1]), ylim=(0.0, rows[-1]))
-    fig.colorbar(mesh, ax=axes, label=f"root mean square misfit [{unit}]")
+    colour_bar(fig, mesh, axes, label=f"root mean square misfit [{unit}]")
     return fig
 
 
@@ -98,7 +99,7 @@ def runs_figure(document: Document) -> Figure:
         axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
     axes.set_yticks(range(len(runs)), [*map(figure_text, run_labels(maps))])
     axes.set_xlabel(TIME)
-    fig.colorbar(image, ax=axes, location="top", label="excess (noise variances)", aspect=50)
+    colour_bar(fig, image, axes, location="top", label="excess (noise variances)", aspect=50)
     return fig
 
 
@@ -197,7 +198,7 @@ def phase_plane_figure(document: Document) -> Figure | None:
         vmin=-reach, vmax=reach, interpolation="nearest",
     )  # fmt: skip
     axes.set(xlabel=_ANGLE, ylabel=_RATE)
-    fig.colorbar(image, ax=axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
+    colour_bar(fig, image, axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
     return fig
 
 

@@ -490,9 +490,9 @@ def step_display() -> Iterator[Callable[[str], None]]:
             nonlocal step, printed, reached
             now = time.perf_counter() - begun
             if text in STEPS:
-                step, reached = STEPS[text], Reached(text, now)
+                again, step, reached = STEPS[text] == step, STEPS[text], Reached(text, now)
                 progress.update(task, description=step)
-                if not terminal.is_terminal:
+                if not again and not terminal.is_terminal:  # a step that is taken twice is one to people
                     terminal.print(f"{now:.1f} s: {step}", markup=False)
             else:
                 progress.update(task, description=f"{step}: {text}")

@@ -98,6 +98,8 @@ def _decaying(swing: Swing) -> _Decaying | None:
     angle, rate, centre, zero = (float(value) for value in solution[[0, 1, -2, -1]])
     quadrature = (rate + decay.rate * angle) / decay.omega_d
     lead = np.arctan2(-quadrature * np.sign(angle), abs(angle)) + np.arctan(decay.rate / decay.omega_d)
+    if squares > policy.GROSS_MISFIT * float(np.sum((yaw - yaw.mean()) ** 2)):
+        return None  # a filter passes an oscillation as one; another motion leads and creeps by chance
     std = np.sqrt(squares / freedom * inverse[-1, -1])
     expected = np.arctan(1.0 / (decay.omega_d * tau))
     return _Decaying(swing.run.id, tau, centre, zero, float(std), float(lead), float(expected))

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.unit.bench.served import Bench, bench, tab
+from tests.unit.bench.served import SETTLED, Bench, bench, tab
 from tests.unit.bench.test_bench_refusals import FULL_DISK
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
@@ -64,6 +64,13 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
         assert page.locator("img").count() == 0
         session = Session(served.folder, "img_src_x_onerror_alert_1")
         assert [path.name for path in session.uploads.iterdir()] == ["img_src_x_onerror_alert_1_.csv"]
+        page.set_viewport_size({"width": 390, "height": 900})
+        page.get_by_text("What the files do not say").click()
+        page.get_by_label("Conditions in the file names").wait_for()
+        page.wait_for_function(SETTLED, polling=300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        assert page.evaluate(CLIPPED_LABELS) == []
+        page.set_viewport_size({"width": 1280, "height": 900})
         mark = page.get_by_role("slider", name="release of")
         mark.focus()
         page.keyboard.press("PageUp")
@@ -372,6 +379,7 @@ def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench) -> N
                 wide, seen = one.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
                 assert wide <= seen, (path, width)
                 assert one.page.evaluate(SIDEWAYS) == [], (path, width)
+                assert one.page.evaluate(BROKEN_WORDS) == [], (path, width)
             assert one.page.evaluate(NAMELESS) == [], path
             for scheme in ("dark", "light"):
                 one.page.emulate_media(color_scheme=scheme)
@@ -386,6 +394,23 @@ DRAWN_AGAIN = "() => new Promise((done) => requestAnimationFrame(() => requestAn
 SIDEWAYS = """() => [...document.querySelectorAll(
   ".printed, .figures figure, .ag-center-cols-viewport")].filter((one) => one.checkVisibility()
   && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""
+CLIPPED_LABELS = """() => [...document.querySelectorAll(".q-field__label")].filter((one) => one.checkVisibility()
+  && (one.scrollWidth > one.clientWidth + 1 || one.scrollHeight > one.clientHeight + 2))
+  .map((one) => one.textContent)"""
+BROKEN_WORDS = """() => [...document.querySelectorAll(".printed th")].filter((one) => one.checkVisibility())
+  .flatMap((one) => {
+    const walker = document.createTreeWalker(one, NodeFilter.SHOW_TEXT), found = [];
+    for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+      for (const word of node.textContent.matchAll(/[A-Za-z]+/g)) {
+        const range = document.createRange();
+        range.setStart(node, word.index);
+        range.setEnd(node, word.index + word[0].length);
+        if (new Set([...range.getClientRects()].map((box) => box.top)).size > 1) found.push(word[0]);
+      }
+    }
+    return found;
+  })"""
+"""Words of a table's heads that are broken over two lines."""
 NAMELESS = """() => [...document.querySelectorAll(
   "button, a, input, textarea, select, [role=slider], [role=img], iframe, nav")].filter((one) => {
   if (!one.checkVisibility() || one.closest(".ag-root-wrapper, .u-legend")) return false;

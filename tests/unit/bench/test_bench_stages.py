@@ -71,6 +71,14 @@ def test_sets_are_printed_where_they_are_asked_for(
         assert diagnosis.progress_of(lines).tried == long.replace("_", " ")
 
 
+def test_a_step_that_is_taken_twice_is_printed_once(capsys: pytest.CaptureFixture[str]) -> None:
+    with outputs.step_display() as show:
+        for name in ("effects", "pruning", "coulomb_friction", "pruning", "polishing"):
+            show(name)
+    said = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert said == [outputs.STEPS[name] for name in ("effects", "pruning", "polishing")]
+
+
 def session(folder: Path) -> Session:
     found = Session(folder, "rig")
     run = Run("a", Record(*decay()), 0.0)

@@ -42,6 +42,14 @@ def test_identify_plot_and_effects_write_before_they_print(
     assert page.exists()
 
 
+@pytest.mark.parametrize("words", [("--help",), ("identify", "--help"), ("effects",)])
+def test_a_reader_that_goes_away_is_not_an_error(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert unheard(*words) == 0  # tunnel --help | head -1
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.slow
 def test_score_writes_before_it_prints(tmp_path: Path) -> None:
     words = ("score", "--estimator", "hilbert", "--jobs", "0", "--trials", "2")

@@ -204,6 +204,10 @@ def test_what_remains(given: Document) -> None:
         "4.6 %."
     )
     rest = given["rest"]
+    large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
+    assert rest_words(large).startswith(
+        "Not all is explained: what remains (0.544° root mean square, 21 times the noise) moves Cnβ by less than"
+    )
     assert rest_words(given | {"causes": ["unknown"]}).startswith("It hardly matters: it moves Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
@@ -255,6 +259,12 @@ def test_what_could_be_closed(given: Document) -> None:
     law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
     assert text(law=law).endswith(
         "The formula k*b^n closes 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
+    )
+    flat = law | {
+        "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
+    }
+    assert text(law=flat).endswith(
+        "with k = -0.2457 ± 0.0012 N m, n = 3.000 ± 0.020 and d and q not determined by these runs."
     )
     with_law = given | {"causes": ["unknown"], "decided": True, "closable": CLOSABLE | {"law": law}}
     assert any(

@@ -474,3 +474,18 @@ def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
     ):
         assert "as given" not in verdict(fits, "")
         assert not any("Correct these" in step for step in next_steps(fits))
+
+
+def test_what_to_do_about_runs_is_said_once() -> None:
+    given = document()
+    left = {"outcome": "left out", "what": "it stands still", "remedy": "record it again"}
+    cut = {
+        "outcome": "cut",
+        "runs": ["c"],
+        "what": "begins at 1 s",
+        "remedy": "cut it by hand if that is wrong",
+    }
+    given["remarks"] = [left | {"runs": ["a"]}, left | {"runs": ["b"]}, cut]
+    steps = next_steps(given)
+    assert steps.count("a, b: record it again.") == 1
+    assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut

@@ -390,7 +390,7 @@ def test_the_uncertainty_budget(given: Document) -> None:
         ({"causes": ["unknown"]}, ["examine the rig", "--effects-file"]),
         ({"ambiguous_with": []}, ["Model the damping that grows", "compare", "with the causes"]),
         ({}, ["spring of 81.5 N m/rad", "Model the damping that grows", "compare", "with the causes"]),
-        ({"causes": [], "rest": None, "remarks": [{"outcome": "cut", "runs": ["beta"], "remedy": "cut it"}]},
+        ({"causes": [], "rest": None, "remarks": [{"outcome": "left out", "runs": ["beta"], "remedy": "cut it"}]},
          ["beta: cut it.", "nominal model"]),
         ({"causes": ["unknown"], "rest": {"material": True}}, ["examine", "--effects-file", "Do not trust"]),
     ],

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from identification import Status, identify
 from identification.datasets import measured_campaign
 from identification.estimators.output_error import OutputError
+from identification.signal.run_fit import identify_run
 from tests.reference.free_decays import Setting, campaign, with_records
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
 
 SETTING = (Setting(16.12, 0.0),)
 
@@ -106,3 +110,61 @@ def test_rotary_pendulum_damps_more_as_it_decays():
     assert all(run.omega_n is not None for run in estimate.runs)
     coarse = identify(measured_campaign("rotary-pendulum"), OutputError(cycles_per_window=3))
     assert all(run.windows for run in coarse.runs)
+
+
+def _pendulum(release: float, damping: float, *, duration: float = 30.0) -> Campaign:
+    """One run of θ̈ + c θ̇ + 25 sin θ = 0, released at rest at an angle in degrees; c in 1/s."""
+    time = np.arange(0.0, duration, 0.005)
+    motion = solve_ivp(
+        lambda _, y: [y[1], -25.0 * np.sin(y[0]) - damping * y[1]],
+        (0.0, duration),
+        [np.radians(release), 0.0],
+        t_eval=time,
+        rtol=1e-8,
+        atol=1e-9,
+    ).y[0]
+    record = Record(time, motion + 0.002 * np.random.default_rng(1).standard_normal(time.size))
+    return Campaign("pendulum", RigProperties(), SensorProperties(), (Run("top", record, 0.0),))
+
+
+@pytest.mark.parametrize(("release", "damping"), [(175.0, 0.05), (170.0, 0.01), (170.0, 0.5)])
+def test_a_pendulum_from_near_the_top_has_no_single_frequency(release: float, damping: float) -> None:
+    run = identify(_pendulum(release, damping)).runs[0]
+    assert Status.FREQUENCY_CHANGES in run.statuses
+    assert Status.FREQUENCY_CHANGES.value.count("windows") == 2  # where the values are that describe it
+    assert abs(run.omega_n.value - run.windows[-1].omega_n.value) < 2.0 * run.omega_n.std
+    assert abs(run.zeta.value - damping / 10.0) < 2.0 * run.zeta.std
+
+
+def test_a_swing_of_60_degrees_is_described_by_one_frequency() -> None:
+    run = identify(_pendulum(60.0, 0.05, duration=10.0)).runs[0]
+    assert Status.MODEL_DEPARTS in run.statuses
+    assert Status.FREQUENCY_CHANGES not in run.statuses
+
+
+def _gusts(size: float, seed: int) -> Run:
+    """A decay at 10 rad/s with a random acceleration, white, of a size in rad/s^1.5."""
+    rng = np.random.default_rng(seed)
+    step, stiffness, rate = 0.01, 100.0, 0.2  # s, 1/s², 1/s
+    kicks = size * step**1.5 * rng.standard_normal(4000)
+    kicks[0] += 0.3
+    motion = lfilter([1.0], [1.0, step * rate + step**2 * stiffness - 2.0, 1.0 - step * rate], kicks)
+    record = Record(step * np.arange(4000.0), motion + 1e-4 * rng.standard_normal(4000))
+    return Run("gusts", record, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_frequencies_that_wander_do_not_change_along_the_swing(seed: int) -> None:
+    """A random moment leaves more than a hundredth of the motion, without a trend of the frequency."""
+    fitted = identify_run(_gusts(1.5, seed), SensorProperties())
+    assert fitted.fit is not None
+    assert np.mean(fitted.fit.residual**2) > 0.02 * np.var(fitted.reading.yaw)
+    assert Status.FREQUENCY_CHANGES not in fitted.estimate.statuses
+
+
+def test_cycles_in_which_nothing_oscillates_are_skipped() -> None:
+    """A random moment holds the body for a cycle, so that the fit to this cycle has no positive stiffness."""
+    run = identify_run(_gusts(0.4, 1), SensorProperties(), cycles_per_window=1).estimate
+    assert run.identified
+    assert len(run.windows) > 20
+    assert all(window.omega_n.value > 0.0 for window in run.windows)

@@ -156,7 +156,9 @@ def read_records(
         levels = "the readings lie on levels that far apart"
         said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
     if campaign.sensor.zero is not None:
-        said.append("the runs' stated rests differ: every run is fitted with its own zero (zero = 'per_run')")
+        said.append(
+            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
+        )
     said += [] if table is None else table.said
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
