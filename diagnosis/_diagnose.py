@@ -59,10 +59,10 @@ def diagnose(
         leave_out: ids of runs to leave out; a remark and ``provenance`` name them.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
-        model: a model of one's own, from `read_model`, whose joint is then the nominal model; or a nominal model
-            of one's own kind.
+        model: your own model, from `read_model`, whose joint is then the nominal model; or a nominal model of your
+            own kind.
         settings: every number that decides.
-        rivals: what is outside the vocabulary and weighed beside it; what is probable of it is probable of
+        rivals: causes from outside the vocabulary, weighed with it; their probability is added to that of
             ``unknown``.
 
     Returns:
@@ -82,7 +82,7 @@ def diagnose(
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
-        say("how far it closes")  # where it is, and the answer without what no effect explains
+        say("how far it closes")  # the place, and the answer without the remainder
         patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
         answer = _assembled(study, chosen, patched, unpatched)
         if chosen.limit_cycles:
@@ -98,7 +98,7 @@ def diagnose(
 def _and_without_outlier(
     answer: Diagnosis, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
 ) -> Diagnosis:
-    """The answer, with that of the other runs beside it; as given where those cannot be diagnosed."""
+    """The answer, with that of the other runs beside it; unchanged where those cannot be diagnosed."""
     others = replace(chosen, campaign=chosen.campaign.without([runs.outlier]))
     try:
         study = _studied(others, None, settings, rivals)
@@ -109,13 +109,13 @@ def _and_without_outlier(
 
 
 def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:
-    """The answer with the runs that were left out as asked."""
+    """The answer with the runs that were left out on request."""
     provenance = {**answer.provenance, "left_out": list(left_out)}
     return replace(answer, remarks=(*left_out_as_asked(left_out), *answer.remarks), provenance=provenance)
 
 
 def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]) -> Study:
-    """Noise, nominal fit, where, search.
+    """Noise, nominal fit, place, search.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.
@@ -141,7 +141,7 @@ def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tupl
 def _assembled(
     study: Study, chosen: Chosen, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
 ) -> Diagnosis:
-    """The answer in the units of the campaign, without what no effect explains and without words."""
+    """The answer in the units of the campaign, without the remainder and without words."""
     in_view = (Fact(study.caution),) if study.caution else ()
     gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
     lead = map(as_stated, study.model.lead_words(study.similarity))
@@ -163,19 +163,19 @@ def _assembled(
 
 
 def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:
-    """The answer with what could be closed of what remains, and what else may explain it."""
+    """The answer with the explainable part of the remainder, and other possible explanations."""
     decided, way = answer.decision.decided, way_for(study)
     caution = (Fact(way.caution),) if way.caution else ()
     say("what no effect explains")
-    # of an undecided diagnosis the whole gap remains
+    # in an undecided diagnosis the whole gap remains
     significant = not decided or (answer.rest is not None and answer.rest.significant)
     try:
         with np.errstate(over="raise"):  # a fitted model that runs away
             left = way.closable(study, significant=significant, decided=decided)
         answer = replace(answer, closable=left)
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without it
         caution = (Fact("remainder not solved"),)
-    # below one half a set of effects comes first, though each of them may be less probable than none
+    # below one half a set of effects comes first, though each may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
     unknown = max(odds, key=odds.__getitem__, default="") in UNKNOWN
     if unknown or not decided:
@@ -190,7 +190,7 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
 
 
 def _rivals(study: Study) -> tuple[Fact, ...]:
-    """What is said of the rivals from outside the vocabulary that would explain the gap."""
+    """The facts about rivals from outside the vocabulary that would explain the gap."""
     said = (one.fact(study.nominal, study.similarity) for one in study.rivals)
     return tuple(fact for fact in said if fact is not None)
 
@@ -203,16 +203,16 @@ def read_model(
     asset_dir: Path | str | None = None,
     actuator: str | None = None,
 ) -> JointModel:
-    """Read a model of one's own for the diagnosis of a campaign.
+    """Read your own model for the diagnosis of a campaign.
 
     Args:
         path: MJCF, or URDF that MuJoCo loads.
         joint: name of the joint recorded, the only one that moves.
-        campaign: whose records say how far the joint moves.
-        free: what is fitted, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: what matters.
-            Where nothing holds the joint, ``rest`` is a constant moment.
-        asset_dir: a further folder in which its includes and meshes may be, beside the model's own.
-        actuator: name of the actuator whose control the column ``drive`` is; None: the joint has only one.
+        campaign: whose records give the range of the joint.
+        free: parameters to fit, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: those that matter.
+            For a joint without a spring, ``rest`` is a constant moment.
+        asset_dir: a further folder for its includes and meshes, beside the model's own.
+        actuator: name of the actuator whose control is the column ``drive``; None: the joint has only one.
 
     Returns:
         The model with the law of its joint.
@@ -237,12 +237,12 @@ def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tupl
         Effect classes in the order of the vocabulary.
 
     Raises:
-        TunnelError: when a name is unknown, or nothing is left.
+        TunnelError: when a name is unknown, or no effect remains.
     """
     wanted = {effect_class(name) for name in include} if include else set(known_effects())
     kinds = tuple(
         kind for kind in known_effects() if kind in wanted - {effect_class(name) for name in exclude}
     )
     if not kinds:
-        raise TunnelError("no effect is left to answer with", remedy="exclude fewer effects")
+        raise TunnelError("no effect is left in the vocabulary", remedy="exclude fewer effects")
     return kinds

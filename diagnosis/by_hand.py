@@ -1,4 +1,4 @@
-"""Causes chosen by hand: how far the gap closes with them, and the run that would distinguish two sets of them."""
+"""Causes chosen by hand: the share of the gap that they close, and the run that distinguishes two sets of them."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
-_ITERATIONS = 6  # of a fit with fewer effects, started from one with more
+_ITERATIONS = 6  # of a fit that starts from one with more effects
 
 
 @dataclass(frozen=True)
 class Closure:
-    """How far the gap closes with causes chosen by hand.
+    """The gap with causes chosen by hand.
 
     Args:
-        before: excess of the nominal model on what is held out, in noise variances of a sample.
-        after: excess with the effects, likewise, in noise variances of a sample.
-        parameters: of the effects, by name; ``effect.parameter`` where there are several effects.
+        before: excess of the nominal model on held-out readings, in noise variances of a sample.
+        after: excess with the effects on the same readings, in noise variances of a sample.
+        parameters: of the effects, by name; ``effect.parameter`` for several effects.
     """
 
     effects: tuple[str, ...]
@@ -71,12 +71,12 @@ class ByHand:
 
         Args:
             effects: names of effects that a fit can find; none: the nominal model.
-            converged: whether the forms of the effects are freed and the fit goes on until it has converged, as for
-                the answer of a diagnosis; that takes ten times as long.
+            converged: whether the forms of the effects are freed and the fit continues to convergence, as for the
+                answer of a diagnosis; that takes ten times as long.
 
         Returns:
-            The excess before and after, and the parameters. Every set is fitted once; a set close to an earlier one
-            starts from it.
+            The excess before and after, and the parameters. Every set is fitted once; a set close to an earlier
+            one starts from it.
 
         Raises:
             TunnelError: when an effect cannot be fitted to these runs.
@@ -91,7 +91,7 @@ class ByHand:
             if one not in self._held_out:
                 self._held_out[one] = predict_held_out(one)
         known = Hypothesis(tuple(sorted(names)), fitted)
-        # Of the one candidate only the parameters are taken: its share and its probability do not matter.
+        # Only the parameters of the one candidate are used: its share and its probability do not matter.
         study = replace(self._study, answers=(Answer(known.names, 0.0, 1.0, known, known),) if names else ())
         ends = both_ends(study, self._base, self._held_out)
         parameters = candidates(study, self._base)[0].parameters if names else {}
@@ -116,7 +116,7 @@ class ByHand:
         return None if found is None else own_next_run(found, self._study.similarity)
 
     def _fit(self, names: frozenset[str]) -> Fit:
-        """Started from the smallest set with more effects that is fitted, or from the largest with fewer."""
+        """Started from the smallest fitted set with more effects, or from the largest with fewer."""
         larger = [known for known in self._fits if known > names]
         if names not in self._fits and larger:
             start = restricted(self._fits[min(larger, key=len)], names)

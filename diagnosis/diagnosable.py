@@ -1,4 +1,4 @@
-"""Which runs of a campaign can be diagnosed together, and with which effects; the rest is refused."""
+"""The runs of a campaign that can be diagnosed together, and the effects for them; the rest is refused."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.inputs import untried_by_inputs
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
@@ -21,11 +22,12 @@ from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.printing import unit_mark
+from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import refuse_untreated
+from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
@@ -36,7 +38,7 @@ class Diagnosable:
     """The runs to diagnose.
 
     Args:
-        limit_cycles: whether they are all in limit cycles, so that no decay remains.
+        limit_cycles: whether all are in limit cycles, so that no decay remains.
     """
 
     campaign: Campaign
@@ -47,7 +49,7 @@ class Diagnosable:
 def diagnosable(campaign: Campaign) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
-    Where all are in one, their whole records remain.
+    Where all are in one, their whole records are kept.
 
     Raises:
         TunnelError: when the examination refuses the records.
@@ -69,14 +71,14 @@ def diagnosable(campaign: Campaign) -> Diagnosable:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What is diagnosed.
+    """The selection to be diagnosed.
 
     Args:
-        examined: all runs that show the kind of motion diagnosed.
-        campaign: those of them that one model can be fitted to.
+        examined: all runs with the right kind of motion.
+        campaign: those that one model can be fitted to.
         model: that model.
         kinds: the effects to answer with; none where all runs are in limit cycles.
-        left_out: which runs and effects were left out, and why.
+        left_out: runs and effects that were left out, with reasons.
     """
 
     examined: Campaign
@@ -97,7 +99,7 @@ def choose(
     """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
 
     Args:
-        given: a nominal model of one's own; None: that of the campaign's kind.
+        given: your own nominal model; None: that of the campaign's kind.
 
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
@@ -108,7 +110,7 @@ def choose(
     compared, left_out = comparable_runs(found.campaign, settings)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
-        # Their sizes are those of angles, and their ranges too; a mode moves the body.
+        # Their sizes and ranges are those of angles; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
@@ -119,11 +121,12 @@ def choose(
 
 
 def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
-    """Leave out the runs that cannot be fitted together with the others, and say which and why.
+    """Leave out the runs that cannot be fitted together with the others, with reasons.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
-    equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they can
-    have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left out.
+    equal). Among runs that do not state it, those with the same frequency at the same wind speed remain: only they
+    can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left
+    out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -163,8 +166,8 @@ def _ids(runs: Sequence[Run]) -> str:
 def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[Run]:
     """The largest group of runs that may have one spring.
 
-    The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
-    same at each speed. Frequencies at one speed within a ``ratio`` are those of one spring.
+    The air reduces the stiffness of every spring by the same amount, so the order of the frequencies is the same
+    at each speed. Frequencies at one speed within a ``ratio`` belong to one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
@@ -187,14 +190,11 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     return max((group for found in groups for group in found), key=len)
 
 
-_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
-
-
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
     """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
 
     Args:
-        given: a nominal model of one's own; None: that of the campaign's kind.
+        given: your own nominal model; None: that of the campaign's kind.
 
     Raises:
         TunnelError: for the first such run.
@@ -203,7 +203,8 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
     for run in driven:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
-        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
+        quantity = campaign.sensor.quantity or "angle"
+        refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
         if run.spring_stiffness == 0.0 and run.wind_on:
             what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")
@@ -214,6 +215,9 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
+        judged = campaign.sensor.plausible is not False
+        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
+    refuse_several_gains([run.drive for run in driven], campaign.name)
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -244,7 +248,7 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
             continue
         found = response_to_input(run, campaign.sensor.derivative)
         known = model.resonance_known
-        if known and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+        if known and (found is None or not found[2] * (run.input_gain or run.drive.kind.scale) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
@@ -261,19 +265,17 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
 def kinds_for(
     campaign: Campaign, kinds: Sequence[type[Effect]], model: NominalModel
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
-    """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
+    """The effects to answer with that can be fitted to a campaign, and sentences that name the others.
 
-    Where no run is driven, they are those that act on free decays, without a sentence; where no run has a moment as
-    its input, those of a moment are left out likewise.
+    Without driven runs, effects of driven runs are omitted without a sentence. Where no run has a moment as its
+    input, effects of a moment are omitted without one too.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
-    moments = any(run.drive is not None and run.drive.on_body for run in campaign.runs)
+    moments = any(run.drive is not None and run.drive.kind.by_actuator for run in campaign.runs)
     kept = tuple(kind for kind in kinds if moments or not kind.of_moment)
-    gone: dict[str, list[type[Effect]]] = {}
-    if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
-        gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
-        kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
+    gone = untried_by_inputs(campaign, kept)
+    kept = tuple(kind for kind in kept if not any(kind in some for some in gone.values()))
     for why, some in model.untried(campaign, kept).items():
         gone[why], kept = some, tuple(kind for kind in kept if kind not in some)
     said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
@@ -287,9 +289,8 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
         return (said,)
     if "drive_gain" not in fit.problem.names:
         return ()
-    known = any(
-        r.drive is not None and (r.drive.column == "moment_nm" or r.drive.gain) for r in campaign.runs
-    )
+    fitted = [r.drive for r in campaign.runs if r.drive is not None and data.model.fits_gain(r.drive)]
+    known = any(drive.gain_stated for drive in fitted)
     unit = "kg m2" if known else "N m"
     value, std = fit.value("drive_gain"), fit.std("drive_gain")
     value, std = (data.similarity.own(1.0, unit) ** (-1 if known else 1) * one for one in (value, std))

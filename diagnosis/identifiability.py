@@ -1,4 +1,4 @@
-"""Whether a campaign of good design could show an effect, and distinguish it from every other."""
+"""Whether a well-designed campaign could show an effect, and distinguish it from every other."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ ALIKE = 0.99
 
 @dataclass(frozen=True)
 class Identifiability:
-    """How an effect shows beside the nominal model and the other effects.
+    """Visibility of an effect beside the nominal model and the other effects.
 
     Args:
         share: of the effect's change of the readings that the nominal model cannot absorb, a ratio of norms.
-        cosines: absolute cosine between that and the same of another effect, by name, greatest first.
+        cosines: absolute cosine between this change and that of another effect, by name, greatest first.
         driven: whether the runs were driven, as an effect of the input needs.
     """
 
@@ -47,7 +47,7 @@ class Identifiability:
 
     @property
     def fault(self) -> str:
-        """Why the effect cannot be identified; empty where it can."""
+        """The reason why the effect cannot be identified; empty where it can."""
         if self.share < ABSORBED:
             return f"the nominal model absorbs all but {100.0 * self.share:.2g} % of it"
         alike = [name for name, cosine in self.cosines.items() if cosine > ALIKE]
@@ -65,10 +65,10 @@ class Identifiability:
 
 
 def identifiability(kind: type[Effect]) -> Identifiability:
-    """Compare what an effect leaves beside the nominal model with what every known effect leaves.
+    """Compare the unabsorbed change by an effect with those of all known effects.
 
-    That is by linear theory at typical sizes. Effects that are not fitted as a motion (random moments, periodic
-    effects, missing samples, coarse steps) are left out.
+    By linear theory at typical sizes. Effects that are not fitted as a motion (random moments, periodic effects,
+    missing samples, coarse steps) are left out.
     """
     base = _nominal(driven=kind.driven)
     own = unabsorbed(base, kind)
@@ -90,7 +90,7 @@ def identifiability(kind: type[Effect]) -> Identifiability:
 def _nominal(*, driven: bool) -> Fit:
     """The nominal fit of a campaign without any effect.
 
-    Where it is driven, there is a moment beside the release: a chirp from 1 to 5 Hz, over all resonances.
+    A driven campaign has a moment beside the release: a chirp from 1 to 5 Hz, over all resonances.
     """
     from tunnel_sim.engine.effect_laws import record  # only here: loads MuJoCo
     from tunnel_sim.engine.virtual_campaign import run_settings, simulate_campaign, stated_run

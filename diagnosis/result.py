@@ -1,4 +1,4 @@
-"""What a diagnosis answers with, and its JSON."""
+"""The result of a diagnosis, and its JSON."""
 
 from __future__ import annotations
 
@@ -45,14 +45,13 @@ class ParameterEstimate:
     """A value with its standard deviation and unit.
 
     Args:
-        value: estimate, in the unit given.
-        std: standard deviation, in the unit given; 0 where the value was given, not fitted; None where it is not
-            known.
+        value: estimate, in ``unit``.
+        std: standard deviation, in ``unit``; 0 where the value was given, not fitted; None where it is not known.
         unit: of both.
-        bound: ``lower`` or ``upper`` where the fit stopped at that end of the range allowed; ``std`` is then None.
-        determined: whether the runs determine it; where not, ``value`` means nothing and ``std`` is None.
+        bound: ``lower`` or ``upper`` where the fit ended at that end of the allowed range; ``std`` is then None.
+        determined: whether the runs determine it; if not, ``value`` is meaningless and ``std`` is None.
         shares: of ``std`` squared by source, fractions; empty where they are not known.
-        interval: ends of the central interval of 0.95, in that unit, where it is not value ± 1.96 std; else None.
+        interval: ends of the central interval of 0.95, in ``unit``, where it is not value ± 1.96 std; else None.
     """
 
     value: float
@@ -81,9 +80,9 @@ class RunGap:
 
     Args:
         before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
-            the other runs where it could be held out.
-        after: likewise with the causes added.
-        held_out: whether it could; else both are those of the fits of all runs.
+            the other runs where the run could be held out.
+        after: the same ratio minus one with the causes added.
+        held_out: whether the run could be held out; else both are those of the fits of all runs.
     """
 
     id: str
@@ -97,11 +96,11 @@ class GapSummary:
     """The gap of the campaign.
 
     Args:
-        excess_before: of the nominal model, in units of the noise variance, on readings that are held out of the
-            fits; where nothing is found, in the fitted runs.
+        excess_before: of the nominal model, in units of the noise variance, on readings held out of the fits; where
+            nothing is found, in the fitted runs.
         excess_after: with the causes added, on the same readings, in units of the noise variance.
-        closed: share of the gap closed, 0 to 1.
-        closed_on: what these are measured on (`diagnosis.facts.closure`).
+        closed: share of the gap that is closed, 0 to 1.
+        closed_on: the readings on which these are measured (`diagnosis.facts.closure`).
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
@@ -129,12 +128,12 @@ class GapSummary:
 
 @dataclass(frozen=True)
 class Where:
-    """Where the gap is.
+    """The place of the gap.
 
     Args:
         channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
         condition: ``always`` or ``wind_on``; None: nowhere.
-        time_s: where in the runs most of it lies, s.
+        time_s: time in the runs at which most of it occurs, s.
         amplitude_rad: amplitudes at which most of it lies, rad.
         frequency_hz: frequencies at which most of it lies, Hz.
     """
@@ -155,9 +154,9 @@ class Candidate:
     Args:
         effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
         probability: that it is the answer, a fraction.
-        excess_after: with it added, in the fitted runs, in units of the noise variance. Instants and phases of the
-            runs' own count as 10 of χ² each.
-        closed: share of the gap it closes there.
+        excess_after: with it added, in the fitted runs, in units of the noise variance. Each instant and phase
+            of a single run counts as 10 of χ².
+        closed: share of the gap that it closes there.
         parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
     """
 
@@ -170,7 +169,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class CauseSize:
-    """What a cause does to three cycles of a swing, by the fitted model with it and without it.
+    """Effect of a cause on three cycles of a swing, by the fitted model with it and without it.
 
     Args:
         run: id of the run whose conditions are taken.
@@ -180,7 +179,7 @@ class CauseSize:
         frequency_change: of the natural frequency by the cause, a fraction.
         zero_change: of the middle of the swing by the cause, in the unit of the readings.
         reading_change: root mean square of the change of the reading, in its unit.
-        stands: angle from rest within which the cause holds a body that has stopped, rad; 0 where it holds none.
+        stands: angle from rest within which the cause stops the body for good, rad; 0 where it does not.
     """
 
     effect: str
@@ -207,7 +206,7 @@ class Hidden:
         effect: its name.
         parameter: name of its severity.
         size: that parameter, of the sign that allows more, with its unit.
-        moves: by coefficient, the size of the change that the effect makes to it, with its unit.
+        moves: by coefficient, the size of its change by the effect, with its unit.
         significance: standard deviations by which its likeliest size differs from zero, a ratio.
     """
 
@@ -223,11 +222,11 @@ class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
-        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's sizes that are not stated
-            (``cn_beta_area_length``, ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or
-            ``yaw_inertia``, ``mechanical_damping`` and ``moment_offset`` of a body that nothing holds.
-        after: likewise.
-        note: how to read them, where a cause changes their meaning (a lag changes what Cnr means).
+        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's unstated sizes (``cn_beta_area_length``,
+            ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or ``yaw_inertia``,
+            ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
+        after: by the same names, with the causes.
+        note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
     """
 
     before: Mapping[str, ParameterEstimate]
@@ -243,27 +242,26 @@ class Diagnosis:
     ``words`` and ``notes`` of its parts.
 
     Args:
-        causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary closes.
+        causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary explains.
         candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
-        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
-        hidden: the effects that could hide, the one that moves a coefficient most against its standard deviation
-            first.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is computed.
+        hidden: the effects that could hide, ordered by their move of a coefficient against its standard deviation.
         trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
         maps: data of the figures, in JSON's types.
-        disturbed: runs that were disturbed; the answer is that without them from then on.
+        disturbed: disturbed runs; the answer excludes them from the disturbance on.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
-        rest: what remains after the causes.
-        repeatability: how the runs repeat; None where there is one run only, or nothing holds the body.
-        model: the model given, with the causes written into it; None where none was given.
-        closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
-        sizes: what each fitted cause does to a swing.
-        found: what the words state beside the numbers.
-        data: the runs, which are no part of the JSON; None for an answer that was not made by `diagnose`.
+        rest: the remaining gap.
+        repeatability: of the runs; None for a single run, or a body without a spring.
+        model: the given model, with the causes written into it; None where none was given.
+        closable: the explainable share of the rest, and its law; None where the rest is within chance.
+        sizes: effect of each fitted cause on a swing.
+        found: facts for the words, beside the numbers.
+        data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
     """
 
     campaign: str
@@ -298,7 +296,7 @@ class Diagnosis:
 
     @property
     def decision(self) -> Decision:
-        """Whether the answer is decided, and what the likely answers have in common."""
+        """Whether the answer is decided, and the common part of the likely answers."""
         chosen = settings_of({"provenance": self.provenance}).answer
         return decision([(c.effect, c.probability) for c in self.candidates], chosen, self.gap.closed)
 
@@ -339,7 +337,7 @@ class Diagnosis:
         return as_text(diagnosis_parts(self.to_json_dict()))
 
     def __repr__(self) -> str:
-        """The answer, the gap, and where to go from here, in three lines."""
+        """The answer, the gap, and the next step, in three lines."""
         return diagnosis_brief(self.to_json_dict())
 
     def _repr_html_(self) -> str:
@@ -352,7 +350,7 @@ class Diagnosis:
         Args:
             what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall``, ``place``
                 or ``repeatability``.
-            runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+            runs: ids of runs for ``fit``, of which two are drawn; empty: those with the largest gap.
 
         Returns:
             A matplotlib figure, made without pyplot.
@@ -360,7 +358,7 @@ class Diagnosis:
         Raises:
             TunnelError: for a figure or a run that this diagnosis does not have.
         """
-        from tunnel_lab.report import draw  # the one way up (decision 0001); matplotlib is slow to load
+        from tunnel_lab.report import draw  # the one upward import (decision 0001); matplotlib is slow
 
         return draw(self.to_json_dict(), what, runs)
 
@@ -372,7 +370,7 @@ class Diagnosis:
             notes: for the head of the page.
 
         Raises:
-            TunnelError: when the page cannot be written, or the answer does not hold its runs.
+            TunnelError: when the page cannot be written, or the answer does not include its runs.
         """
         from tunnel_lab.report import Byline, write_report  # as in `plot`
 

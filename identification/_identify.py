@@ -19,12 +19,13 @@ from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
 from identification.returned import checked_return
+from identification.signal.known_gain import refuse_other_gain
 from identification.statistics import widened_by_contradictions
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import checked_drive, refuse_untreated
+from tunnel_sim.vocabulary.drive import checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -75,7 +76,11 @@ def identify(
             what = f"the run is driven, and {chosen.name} takes free decays only"
             raise TunnelError(what, where=where, remedy=remedy)
         checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
-        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
+        quantity = campaign.sensor.quantity or "angle"
+        refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
+        judged = campaign.sensor.plausible is not False
+        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
+    refuse_several_gains([run.drive for run in campaign.runs], campaign.name)
     examined = examine(campaign).accepted()
     left = examined.campaign
     with shown_by(progress):

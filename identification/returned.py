@@ -152,7 +152,7 @@ def _fault_of_covariance(found: Estimate, of: str) -> Fault | None:
         return f"the covariance with {of} holds {_described(strange)}", "give numbers"
     matrix = found.covariance_matrix
     if not np.isfinite(matrix).all():
-        return f"the covariance with {of} holds NaN or an infinity", "give finite numbers"
+        return f"the covariance with {of} contains NaN or an infinity", "give finite numbers"
     stds = np.array([getattr(found, name).std for name in names])
     return _fault_of_variances(matrix, stds, names, of) or _fault_of_correlations(matrix, stds, of)
 

@@ -57,11 +57,12 @@ class Input:
     """What drives the runs of a campaign; zero in its free decays.
 
     Args:
-        column: ``moment_nm``, ``drive`` or ``base_rad``, the angle of the spring's root.
-        values: at the samples, N m, units or rad, shape (samples, runs).
+        column: ``moment_nm``, ``drive``, ``base_rad``, the angle of the spring's root, or
+            ``base_acceleration_rad_s2``, the angular acceleration of the base from which all angles are counted.
+        values: at the samples, N m, units, rad or rad/s², shape (samples, runs).
         held: whether they are kept between samples, shape (runs,); else they are linear.
         peak: greatest angle of the linear rig's response, rad, shape (runs,); 0 of free decays.
-        gain: N m per unit of a ``drive``; 1 of other columns.
+        gain: N m per unit of a ``drive``, and of the acceleration of a base minus the inertia; 1 of other columns.
         stated: whether the campaign states the gain.
         delay: time by which the input acts later than its samples say, s, shape (runs,) or (1,).
         actuator: that exerts the moment; None where the moment is that written.

@@ -19,8 +19,9 @@ from tunnel_reference.conditions import (
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1
@@ -88,7 +89,10 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     drives: list[Drive | None] = [None] * c.runs
     if c.drive is not None:
         column = cast(InputColumn, c.drive.column)
-        scale = c.moment_scale if column == "moment_nm" else 1.0
+        scale = {
+            "moment_nm": c.moment_scale,
+            "base_acceleration_rad_s2": c.time_scale**-2,
+        }.get(column, 1.0)
         gain = c.drive.gain * c.moment_scale if column == "drive" and c.drive.stated else None
         for run in np.flatnonzero(c.drive.driven).tolist():
             hold: Hold = "zero" if c.drive.held[run] else "linear"

@@ -1,4 +1,4 @@
-"""From a study to the answer: where, the gap on held-out runs, coefficients, rivals and what is said of them."""
+"""From a study to the answer: the place, the gap on held-out runs, coefficients, rivals and facts."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from tunnel_sim.effects import Effect, effect_class
 
 
 def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
-    """Say where the nominal model departs from the runs, and why.
+    """Locate the departure of the nominal model from the runs, with the reason.
 
-    The place is that of the residuals alone. The causes only have to agree with it.
+    The place follows from the residuals alone. The causes only have to agree with it.
     """
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     found = place.survey
@@ -78,9 +78,9 @@ def assemble(
     """Compose the answer.
 
     Args:
-        said: why the gap is there.
+        said: the reasons for the place of the gap.
         left_out: caveats on runs and effects that were left out.
-        patched: the model given with the causes written into it; the share closed is then its own.
+        patched: the given model with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
     """
     chosen, settings, similarity = study.chosen, study.settings, study.similarity
@@ -130,7 +130,7 @@ def assemble(
         waterfall=closes.steps,
         disturbed=study.disturbed,
         rest=_remains(study, found, answers, closes.steps),
-        # of an unknown cause the runs may still differ, as no effect of the vocabulary does
+        # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
         repeatability=repeatability(chosen if study.causes != UNKNOWN else study.between_runs or chosen),
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats),
@@ -139,7 +139,7 @@ def assemble(
 
 @dataclass(frozen=True)
 class _Closes:
-    """How far the gap closes on what is held out of the fits."""
+    """How far the gap closes on held-out readings."""
 
     gap: GapSummary
     steps: Waterfall
@@ -165,7 +165,7 @@ def _closes(study: Study, patched: PatchedModel | None) -> _Closes:
 
 
 def _remains(study: Study, found: Coefficients, answers: Answers, steps: Waterfall) -> Remainder:
-    """What the answer leaves of the gap, and how far that may move the coefficients."""
+    """The residual gap of the answer, and its possible influence on the coefficients."""
     similarity, chosen = study.similarity, study.chosen
     stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
     moved = {
@@ -176,7 +176,7 @@ def _remains(study: Study, found: Coefficients, answers: Answers, steps: Waterfa
 
 
 def _rivals(study: Study) -> list[Answer]:
-    """The probable answers beside the first that are not it with more causes; none where nothing is named."""
+    """The probable answers beside the first that do not contain it; none where nothing is named."""
     return [
         answer
         for answer in study.answers[1:]

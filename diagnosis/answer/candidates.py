@@ -1,4 +1,4 @@
-"""The answers with their probabilities and parameters, and what each cause does to a swing."""
+"""The answers with their probabilities and parameters, and the effect of each cause on a swing."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from tunnel_sim.vocabulary.record import Array
 def meant_parameter(
     found: ParameterEstimate, info: ParameterInfo, swing: float, undetermined: float
 ) -> ParameterEstimate:
-    """A fitted parameter, without its standard deviation where that says nothing.
+    """A fitted parameter, its standard deviation omitted where it is meaningless.
 
     Args:
         swing: largest angle of the motion, rad.
-        undetermined: standard deviation over value and usual size from which it says nothing, a ratio.
+        undetermined: standard deviation over value and usual size from which it is meaningless, a ratio.
 
     Returns:
         The estimate; not determined where its standard deviation exceeds that of a uniform distribution over the
-        range allowed, or that multiple of the parameter's value and usual size.
+        allowed range, or that multiple of the parameter's value and usual size.
     """
     lower, upper = info.fit_range(swing)
     uniform = (upper - lower) / math.sqrt(12.0)
@@ -46,7 +46,7 @@ def meant_parameter(
 
 
 def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
-    """A coefficient, without its standard deviation where that says nothing.
+    """A coefficient, its standard deviation omitted where it is meaningless.
 
     Args:
         name: ``cn_beta``, ``cn_r``, ``omega_n``, ``zeta`` or a parameter of a joint's law.
@@ -81,15 +81,15 @@ def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
     return replace(found, std=None, determined=False)
 
 
-_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it was stopped by the bound
+_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it is at the bound
 
 
 def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
-    """The answers, with what they leave of the gap in the fitted runs by the fits' own integrator.
+    """The answers, with their residual gap in the fitted runs by the fits' own integrator.
 
     Returns:
-        Answers, ``none`` and ``unknown`` among them: the answer, then the most probable ones. Their probabilities
-        sum to 1.
+        Answers, ``none`` and ``unknown`` among them: the answer first, then the most probable ones. Their
+        probabilities sum to 1.
     """
     block, rate = study.nominal.problem.data.mean_block, study.settings.gap.detection_rate
     excess = study.nominal.excess / block
@@ -122,11 +122,11 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
 
 
 def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:
-    """For every effect of the vocabulary the probability that it is among the causes.
+    """Probability of every effect of the vocabulary to be among the causes.
 
     Returns:
-        The sum of the probabilities of the answers that name the effect; of a cause read off the records 1 minus
-        the rate at which a campaign without a gap is said to have one.
+        The sum of the probabilities of the answers that name the effect; for a cause detected in the records, 1
+        minus the rate at which a campaign without a gap is said to have one.
     """
     found = {
         kind.name: min(sum(c.probability for c in answers if kind.name in c.effect.split(" + ")), 1.0)
@@ -136,7 +136,7 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
 
 
 def _parameters(study: Study, answer: Answer | None = None) -> dict[str, ParameterEstimate]:
-    """Parameters of the causes read off the records, and of an answer; without the name of a single effect."""
+    """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect."""
     found: dict[str, ParameterEstimate] = {}
     prepared, hum = study.prepared, study.prepared.hum
     if hum is not None:
@@ -206,9 +206,9 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     """Simulate the fitted model with each cause and without it.
 
     Returns:
-        The size of every fitted cause, in the measured campaign's units. A cause that was read off the records or
-        is random has none, and neither has one that stops the motion at once, acts on driven runs only, or acts
-        on a body that nothing holds: the runs simulated are free decays.
+        The size of every fitted cause, in the measured campaign's units. The simulated runs are free decays, so a
+        cause has none if it was detected in the records, is random, stops the motion at once, acts on driven runs
+        only, or acts on a body without a spring.
     """
     fit, data = study.chosen, study.chosen.problem.data.undriven()
     if not data.model.restored:
@@ -226,11 +226,11 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0
         both = problem.predict([Point(fit.point.common, release), Point(without, release)])
-        # of one spring or one wind only some runs show it
+        # only some runs show a cause in one spring or one wind
         shown = [i for i in windy or runs if not np.array_equal(both[0][i], both[1][i])]
         if not shown:
             continue
-        # the softest spring, where a moment of any size does most
+        # the softest spring, on which a moment acts most
         index = min(shown, key=lambda i: data.runs[i].spring_stiffness or 0.0)
         run, frequency = data.runs[index], resonance(fit, index)
         count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
@@ -254,7 +254,7 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
 
 def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:
-    """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are no decay."""
+    """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are not a decay."""
     if curve.size < _FEWEST or not np.all(np.isfinite(curve)):
         return None
     reading = Reading(interval * np.arange(curve.size, dtype=np.float64), curve)

@@ -1,4 +1,4 @@
-"""Coefficients before and after the causes are added: averages over the answers, with their intervals."""
+"""Coefficients before and after the causes are added: averages over the answers, with intervals."""
 
 from __future__ import annotations
 
@@ -102,10 +102,10 @@ class Possible:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """The answers that coefficients are averaged over.
+    """The answers over which coefficients are averaged.
 
     Args:
-        unknown: probability (a fraction) of ``unknown`` where an answer with names is the chosen one.
+        unknown: probability (a fraction) of ``unknown`` where an answer with named effects is chosen.
         hidden: the effects that could hide beside the chosen answer.
     """
 
@@ -116,13 +116,13 @@ class Answers:
 
 
 def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
-    """The answers of a study, without what is spread evenly in their probabilities.
+    """The answers of a study, without the evenly spread part of their probabilities.
 
-    That stands for causes not considered, not for an answer that the runs refute.
+    That part represents causes not considered, not an answer that the runs refute.
 
     Args:
         kinds: the effects that may act unnamed. They are considered beside the chosen answer and every probable
-            answer, and only where there is a gap.
+            answer, if there is a gap.
     """
     chosen = study.stated
     even = study.settings.weighing.even_share / max(len(study.answers), 1)
@@ -150,7 +150,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
 def _by_choice(
     answer: Answer, fit: Fit, probability: float, kinds: Sequence[type[Effect]]
 ) -> tuple[float, list[Possible]]:
-    """The share of the fit among the choices of an answer that the runs cannot exclude, and the other choices."""
+    """The fit's share among the choices of an answer that the runs cannot exclude, and the other choices."""
     share, others = 1.0, []
     for choice in answer.choices:
         if choice.hypothesis.fit is fit:
@@ -170,21 +170,28 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
     Returns:
         By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. The
         value is the mean over the answers and over the sets of small causes beside them
-        (`diagnosis.answer.linear_theory`), with their probabilities. The variance is that within and that between
-        them (the law of total variance). Within, it is the fit's own, what is left (the scatter of the runs where
-        it is beyond chance, or half the difference between two halves of the data, `coefficient_move`, if that is
-        greater), the rounding of air density, the part of the causes' forms that no free decay shows, and half the
-        change made by freeing the forms: another family of forms may change as much. By the same rule ``unknown``
-        adds half the change from the nominal model. The effect that could hide and would move the coefficient most
-        (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size is two standard
-        deviations. The central interval is given where it is not that of a normal distribution
-        (`interval_beside`). No standard deviation is given at a bound and where the runs do not determine the
+        (`diagnosis.answer.linear_theory`), with their probabilities. The variance is the sum of those within and
+        between them (the law of total variance).
+
+        The variance within is the sum of
+
+        - the fit's own;
+        - the scatter of the runs where it exceeds chance, or half the difference between two halves of the data
+          (`coefficient_move`) if that is greater;
+        - the rounding of the air density;
+        - the part of the causes' forms that no free decay shows;
+        - half the change by freeing the forms, since another family of forms may change as much.
+
+        ``unknown`` also adds half the change from the nominal model. The effect that could hide and would move
+        the coefficient most (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size
+        is two standard deviations. The central interval is given where it is not that of a normal distribution
+        (`interval_beside`). No standard deviation is given at a bound, or where the runs do not determine the
         coefficient.
     """
     fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
-            continue  # held
+            continue  # fixed
         move = max((hidden.moves[name].value for hidden in answers.hidden), default=0.0)
         each = [
             of
@@ -217,11 +224,11 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
 
 
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
-    """The central interval of a mixture that is stated beside its mean and standard deviation.
+    """The central interval of a mixture to be stated beside its mean and standard deviation.
 
-    Rivals too improbable to reach the interval may still be most of the variance, where their means are far away.
-    The interval is then shorter than value ± one standard deviation, and depends on whether each of them has more
-    or less than half the probability outside it, which is not known as well as that.
+    Rivals too improbable to reach the interval may still contribute most of the variance, where their means are
+    distant. The interval is then shorter than value ± one standard deviation, and depends on whether each rival
+    has more or less than half the probability outside it, which is not known that precisely.
 
     Returns:
         Its ends; None where value and standard deviation give the interval, as for a normal distribution.
@@ -239,7 +246,8 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
     """The coefficients of the nominal model.
 
     Args:
-        after: the averages over the answers; the variance adds the squared difference from these to theirs.
+        after: the averages over the answers; their squared difference from the nominal ones is added to the
+            variance.
     """
     found = {}
     for place, name in enumerate(coefficients_of(nominal)):
@@ -258,7 +266,7 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
 def _of_answer(
     answer: Possible, campaign: Campaign, name: str, hidden: float
 ) -> tuple[float, Mixture, dict[str, float]] | None:
-    """Probability, distribution and variances by source of a coefficient, if an answer is right.
+    """Probability, distribution and variances by source of a coefficient under one answer.
 
     ``hidden`` is its standard deviation due to effects that could hide.
     """
@@ -300,7 +308,7 @@ def _of_answer(
 
 
 def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> ParameterEstimate:
-    """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
+    """A coefficient, marked where the fit ends at a bound or the runs do not determine it."""
     whole = sum(parts.values())
     shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}
     model = fit.problem.data.model

@@ -1,4 +1,4 @@
-"""Friction against rate: the fitted law with its band, and what the records give by their energy balance."""
+"""Friction against rate: the fitted law with its band, and points from the energy balance of the records."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _law(fit: Fit, place: int, rates: Array) -> tuple[Array, Array]:
     """The law of an effect at some rates with its standard deviation, by the covariance of its parameters.
 
     Args:
-        place: of the effect among those of the fit.
+        place: index of the effect among those of the fit.
         rates: rad/s, shape (n,).
 
     Returns:
@@ -104,7 +104,7 @@ class _Passed:
     Args:
         rate: mean over the distance, rad/s, shape (n,).
         travel: rad, shape (n,).
-        missed: energy that they lose beyond the fitted model, J, shape (n,).
+        missed: their energy loss beyond the fitted model, J, shape (n,).
         error: standard deviation of the energy at every reversal by the noise, J, shape (n + 1,).
     """
 
@@ -115,10 +115,10 @@ class _Passed:
 
 
 def _strokes(fit: Fit) -> list[_Passed]:
-    """The strokes of every run that shows some.
+    """The strokes of every run that has some.
 
-    What a stroke loses in the records and in the fitted model differs by what the friction law misses. All other
-    losses are the same in both, and so are the errors of the reversals.
+    A stroke's loss in the records differs from that in the fitted model by the error of the friction law. All
+    other losses are equal in both, as are the errors of the reversals.
     """
     problem, found = fit.problem, []
     prediction = problem.predict([fit.point])[0]
@@ -179,7 +179,7 @@ def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:
 
 
 def _point(group: Array) -> FrictionPoint:
-    """The mean by the inverse variances; its error is that of the noise, or the scatter's where that is greater."""
+    """The mean by the inverse variances; its error is that of the noise or of the scatter, whichever is greater."""
     rate, moment, error, count = group.T
     weight = np.maximum(error, 1e-300) ** -2.0
     total, mean = float(weight.sum()), float(weight @ moment / weight.sum())

@@ -1,4 +1,4 @@
-"""How far the gap closes with each cause, on runs or stretches of time that no fit has seen (decision 0016)."""
+"""How far the gap closes with each cause, on held-out runs or stretches of time (decision 0016)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Prediction of runs left out of the fit.
+    """Predictions of runs held out of the fit.
 
     Args:
-        residuals: by run id: reading minus prediction in noise standard deviations, only the run's own
-            parameters refitted.
+        residuals: by run id: reading minus prediction in noise standard deviations; only the run's own parameters
+            are refitted.
         points: by run id: the common parameters found without it, and its own.
     """
 
@@ -39,7 +39,7 @@ class HeldOut:
 
 
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, starting from the fit of all, and predict it."""
+    """Refit without each group of runs, starting from the fit of all, and predict the group."""
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}
@@ -68,12 +68,12 @@ Turns = Sequence[NDArray[np.int64]]
 
 
 def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
-    """In which turn every block of every run is left out of the fit.
+    """The turn in which every block of every run is held out of the fit.
 
     See docs/decisions/0016-held-out-cause-by-cause.md.
 
     Returns:
-        By run, shape (n,): the turn, or −1 in the other runs. Every third stretch is left out in the same turn.
+        By run, shape (n,): the turn, or −1 in the other runs. Every third stretch has the same turn.
     """
     found = []
     for index, run in enumerate(nominal.problem.data.runs):
@@ -86,11 +86,11 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
 
 def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
-    """Refit without each turn's stretches, and predict them. No parameter sees the readings left out.
+    """Refit without each turn's stretches, and predict them. No parameter uses the held-out readings.
 
     Returns:
-        By id of the runs that are divided: reading minus prediction in noise standard deviations, every block
-        predicted by the fit that has not seen it, unless that fit failed.
+        By id of the divided runs: reading minus prediction in noise standard deviations, every block predicted by
+        the fit that has not used it, unless that fit failed.
     """
     runs = whole.problem.data.runs
     found = {
@@ -110,7 +110,7 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Base:
-    """The noise that an excess is measured against.
+    """The reference noise of an excess.
 
     Args:
         variance: of one sample, rad²: noise and stated resolution.
@@ -127,8 +127,8 @@ def excess_base(study: Study) -> Base:
     """The noise that would remain with a perfect model.
 
     Returns:
-        The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
-        noise estimated from the records.
+        The stated noise, where the records or the step of the readings contradict it; else the noise estimated
+        from the records.
     """
     estimated = float(np.mean(list(study.prepared.noise.variance.values())))
     stated = study.prepared.noise.stated_variance
@@ -142,8 +142,8 @@ def excess_base(study: Study) -> Base:
     return Base(estimated, 0.0, hum)
 
 
-_ITERATIONS = 6  # the fit of all causes is close for the parameters that are left
-_NO_GAIN = 0.999  # of the χ² of a fit of fewer causes: another start may do better
+_ITERATIONS = 6  # the fit of all causes is close for the other parameters
+_NO_GAIN = 0.999  # share of the χ² of fewer causes above which another start is tried
 
 Names = frozenset[str]
 
@@ -162,8 +162,8 @@ class Subsets:
         """The best fit found with these causes.
 
         Returns:
-            The study's own fit, or else one started from the fit of all causes. Where a fit of fewer of them is
-            better, the missing cause is added to that; a cause that gains nothing leaves the fit as it was.
+            The study's own fit, or one started from the fit of all causes. Where a fit of fewer causes is better,
+            the missing cause is added to it; a cause without gain leaves the fit unchanged.
         """
         key = frozenset(names)
         if key not in self._fits:
@@ -189,7 +189,7 @@ class Subsets:
 
 
 def one_more(base: Fit, kind: type[Effect]) -> Fit | None:
-    """A fit with one more effect, the better from its first two starting points; None where none succeeds."""
+    """A fit with one more effect, the better from its first two starting points; None where both fail."""
     tried = (_finite(try_fit(start.problem, start.point)) for start in starting_points(base, kind)[:2])
     return min((found for found in tried if found), key=lambda found: found.total, default=None)
 
@@ -199,11 +199,11 @@ def _finite(found: Fit | None) -> Fit | None:
 
 
 def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
-    """Add the causes one after another in their best order, and take each alone out of the whole.
+    """Add the causes one after another in their best order, and remove each alone from the whole.
 
-    ``known`` holds what is held out of fits already. The excesses are those of the fits' own integrator. The order
-    is greedy: each cause is the one that closes most next in the fitted readings. A random moment comes last, since
-    it absorbs what the others would explain.
+    ``known`` has the held-out predictions of some fits already. The excesses come from the fits' own integrator.
+    The order is greedy: each next cause is the one that explains most of the fitted readings. A random moment
+    comes last, since it absorbs the other causes.
     """
     models = _Models(study, base, known)
     names: Names = frozenset()
@@ -222,7 +222,7 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     else:
         last = models.random_excess(random)
         without = {name: last + size for name, size in models.read_off.items()}
-        acting = [kind.name for kind in random.kinds]  # one may act steadily, too, and be among the steps
+        acting = [kind.name for kind in random.kinds]  # a cause may act steadily too, and be among the steps
         moment = " + ".join([name for name in acting if name not in names] or acting)
         without[moment] = steps[-1].excess
         steps.append(Step(moment, last))
@@ -238,13 +238,13 @@ def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
 
 
 class _Models:
-    """The model with some of the causes: what it leaves of the gap."""
+    """Residual gaps of the model with some of the causes."""
 
     def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
         self._study, self._base, self._known = study, base, dict(known)
         powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
-        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # and what each adds
-        self._ratio = 1.0 + base.extra  # of the estimated noise to the base
+        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # contributions
+        self._ratio = 1.0 + base.extra  # estimated noise over the base
         self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)
         self.causes: Names = self._fit.causes | self.read_off.keys()
@@ -255,14 +255,14 @@ class _Models:
 
     @property
     def words(self) -> str:
-        """What is held out of the fits."""
+        """The kind of readings held out of the fits."""
         runs = len(self._held_out(self._study.nominal).residuals)
         if runs == len(self._ids):
             return ON_RUNS
         return ON_STRETCHES if runs == 0 else ON_BOTH
 
     def first_steps(self) -> list[Step]:
-        """What the nominal model leaves, and what it leaves where the runs differ by chance, if they do."""
+        """The nominal model, and its residual gap where the runs differ by chance, if they do."""
         none: Names = frozenset()
         steps = [Step(None, self._excess_of(self._study.nominal) + self._left(none))]
         if self._study.scattering:
@@ -270,18 +270,18 @@ class _Models:
         return steps
 
     def repeating(self) -> float:
-        """What the causes leave where the runs repeat exactly, in noise variances of a sample."""
+        """Residual gap of the causes where the runs repeat exactly, in noise variances of a sample."""
         problem, point = without_deviations(self._study.chosen)
         fitted = _finite(try_fit(problem, point)) or self._study.nominal
         return self._excess_of(fitted) + self._left(self.causes)
 
     def fitted_excess(self, names: Names) -> float:
-        """What the causes leave in the readings they are fitted to, in noise variances of a sample."""
+        """Residual gap of the causes in the fitted readings, in noise variances of a sample."""
         fitted = self._fit(names - self.read_off.keys())
         return self._in_samples(dict(zip(self._ids, fitted.residuals, strict=True))) + self._left(names)
 
     def excess(self, names: Names) -> float:
-        """What the causes leave in readings held out of the fit, in noise variances of a sample."""
+        """Residual gap of the causes in held-out readings, in noise variances of a sample."""
         return self._excess_of(self._fit(names - self.read_off.keys())) + self._left(names)
 
     def _excess_of(self, fitted: Fit) -> float:
@@ -290,7 +290,7 @@ class _Models:
         return self._excess[fitted]
 
     def random_excess(self, random: RandomAnswer) -> float:
-        """What all causes and a random moment leave: the moment's innovations where it acts."""
+        """Residual gap of all causes and a random moment: the moment's innovations where it acts."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)
         acts = random.process.runs
@@ -301,14 +301,14 @@ class _Models:
         return self._weighted(by_run) + self._left(self.causes)
 
     def _left(self, names: Names) -> float:
-        """What the causes read off the records, as far as not among the names, add to the excess."""
+        """Excess added by the causes detected in the records that are not among the names."""
         return self._always + sum(size for name, size in self.read_off.items() if name not in names)
 
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))
         found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
         still = {run.id: run.scaled(run.reading) for run in fitted.problem.data.runs}
-        # a prediction that grows without bound is as good as none
+        # a prediction that diverges counts as no prediction
         return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
 
     def _held_out(self, fitted: Fit) -> HeldOut:

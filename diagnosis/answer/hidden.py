@@ -1,8 +1,8 @@
-"""What could hide: how large every effect may be that the runs do not exclude, and what it does to coefficients.
+"""Effects that could hide: the largest size of every effect that the runs do not exclude, and its influence.
 
-An effect that is too small to be named still moves the coefficients, since the fit absorbs a part of it. Most moves
-are small against the noise. A lag of the aerodynamic moment is not: to first order it is a change of Cnr, so that
-only its second order, or the comparison of springs and speeds, limits it.
+An effect too small to be named still moves the coefficients, since the fit absorbs a part of it. Most moves are
+small against the noise. A lag of the aerodynamic moment is not: to first order it is a change of Cnr, so only its
+second order, or the comparison of springs and speeds, limits it.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ from tunnel_sim.vocabulary.record import Array
 def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
     """The largest sizes of effects beside those of a fit, two standard deviations from the likeliest size.
 
-    The change of the readings that the other parameters cannot absorb is a polynomial of second order in the size
-    where the effect says that its first order is absorbed, and of first order else. χ² at every size follows from
+    The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
+    where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
     that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
-    (`diagnosis.answer.linear_theory.beside`), 1 where the fit leaves noise.
+    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains.
 
     Args:
         fit: with or without effects.
         starts: the effects that may act beside those of the fit.
-        left: scaled residuals of which the dispersion is taken, by run, where small causes beside the fit explain a
-            part of its own; each of shape (n,).
+        left: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of its
+            own; each of shape (n,).
 
     Returns:
-        In the order given, without those that the runs cannot show at all.
+        In the given order, without those that the runs cannot show.
     """
     chosen = fit.settings.answer
     total = fit.total if left is None else sum(float(r @ r) for r in left)
@@ -81,21 +81,21 @@ class _Size:
 
     size: float
     moves: Array  # of the coefficients there, shape (coefficients,)
-    drop: float  # of χ² at the likeliest size, less what the runs' own numbers gain by chance
+    drop: float  # of χ² at the likeliest size, less the chance gain of parameters per run
 
 
 def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
     """The largest size of an effect within ``reach`` of the least χ², and the moves of the coefficients there.
 
-    Of a polynomial in the size that is fitted far from that size, higher orders spoil the first one. So where the
-    first order is absorbed, it is fitted again at the size found.
+    Higher orders spoil the first order of a polynomial that is fitted far from the size. Where the first order is
+    absorbed, it is therefore fitted again at the size found.
     """
     if start.scaled is None:
         return None
     found, least = None, fit.settings.answer.hidden_absorbed
     for number in range(_ROUNDS if start.second_order else 1):
         size = float(start.point.common[start.scaled])
-        # at the size of a trial a small share tells that the runs cannot show the effect; later the size is small
+        # at a trial's size, a small share means that the runs cannot show the effect; later the size is small
         found = _within(fit, start, influence, reach, least if number == 0 else 0.0)
         if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
             break
@@ -112,7 +112,7 @@ def _within(
     assert start.scaled is not None
     size = float(start.point.common[start.scaled])
     least, greatest = size_range(start)
-    if start.second_order:  # of the other sign the effect has another law
+    if start.second_order:  # with the opposite sign the effect follows another law
         least = 0.0
     parts = [1.0, 0.5] if start.second_order else [1.0]
     seen = [_profiled(fit, start, part, influence, least_share) for part in parts]
@@ -145,16 +145,16 @@ def _real_roots(polynomial: Array) -> list[float]:
 
 
 _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
-_LEAST_PART = 1e-3  # of the way to a trial
+_LEAST_PART = 1e-3  # least step towards a trial, as a share of it
 _REAL = 1e-6  # share of a root that its imaginary part may be
 
 
 def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
-    """How far coefficients are from those of a fit where an effect is beside it, shape (coefficients,).
+    """Change of a fit's coefficients with an effect beside it, shape (coefficients,).
 
     Args:
         there: the common parameters of the start's problem, shape (common,). Where a trial of gravity is so large
-            that nothing would swing, a part of the way there is looked at.
+            that nothing would swing, a part of that step is evaluated.
     """
     assert start.scaled is not None
     model, names = fit.problem.data.model, start.problem.names
@@ -174,14 +174,14 @@ def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
 def _profiled(
     fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
 ) -> tuple[Array, Array] | None:
-    """The change of all readings at a part of an effect's size that the fit cannot absorb, and its moves.
+    """The change of all readings by a part of an effect's size that the fit cannot absorb, and its moves.
 
-    The other parameters are moved first, and the change is that from there: what they absorb exactly, as Cnβ and
-    Cnr absorb an offset of the only wind speed, linear theory alone would absorb to first order.
+    The other parameters are moved first. Linear theory alone would absorb to first order what they absorb exactly,
+    as Cnβ and Cnr absorb an offset of the only wind speed.
 
     Returns:
         The change, scaled, shape (n,), and the moves of the coefficients, shape (coefficients,); None where the
-        share of the change that the fit cannot absorb is no more than ``least_share``.
+        unabsorbed share of the change is at most ``least_share``.
     """
     assert start.scaled is not None
     common = start.point.common.copy()

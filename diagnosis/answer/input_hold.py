@@ -1,8 +1,8 @@
-"""A delay of the input that is what a wrong hold between samples looks like: one cause with two readings.
+"""A delay of the input that a wrong hold between samples would explain too: one cause with two readings.
 
-An input that keeps its value between samples acts as one that is linear between them and half a sample late, but
-for terms of second order in the sample interval. The fit with the other hold and without a delay says whether the
-records tell them apart.
+An input held between samples acts as one that is linear between them and half a sample late, except for terms of
+second order in the sample interval. A fit with the other hold and without a delay shows whether the records
+distinguish them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def other_hold(study: Study) -> OtherHold | None:
     fitted = try_fit(tried, start)
     if fitted is None:
         return None
-    # without a delay the fit has one number less, by which it leaves more even where it is right
+    # without a delay the fit has one parameter less, so its χ² is larger even where it is right
     chance = chdtri(1.0, study.settings.words.hold_rate) * (1.0 + max(fit.excess, 0.0))
     if fitted.unlikelihood - fit.unlikelihood > chance:
         return None

@@ -1,4 +1,4 @@
-"""What is judged of an answer: caveats, what nearly explains a gap, springs that may be off, and what remains."""
+"""Judgements on an answer: caveats, near explanations of the gap, springs that may be off, and the remainder."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cautions(
     """The caveats of an answer.
 
     Args:
-        runs: the gap by run, which says whether the run could be held out of the fit.
+        runs: the gap by run, with whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
@@ -64,7 +64,7 @@ def cautions(
 
 
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
-    """The parts of the records that no fit uses, and the effects that no half of them shows."""
+    """The parts of the records that no fit uses, and the effects that no half of the records confirms."""
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
         *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
@@ -73,11 +73,11 @@ def outside_the_fits(study: Study) -> tuple[Fact, ...]:
 
 
 def zeros_apart(study: Study) -> tuple[Fact, ...]:
-    """That zeros of the runs' own would close most of a gap that is not explained; empty where they would not."""
+    """The fact that a zero per run would explain most of an unexplained gap; empty where it would not."""
     nominal, chosen = study.nominal, study.settings.words
     if nominal.problem.data.model.own_zeros or study.campaign.sensor.zero == "common":
         return ()
-    # the mean of a run is what a zero of its own takes out, and nothing else does
+    # a zero of its own removes exactly the mean of a run
     means = np.array([float(left.sum()) ** 2 / left.size for left in nominal.residuals])
     whole = float(sum(left @ left - left.size for left in nominal.residuals))
     by_chance = float(chdtrc(means.size, means.sum()))
@@ -90,7 +90,7 @@ def zeros_apart(study: Study) -> tuple[Fact, ...]:
 def beside_the_numbers(
     study: Study, place: PlaceFound | Nowhere, before: Estimates, after: Estimates, caveats: tuple[Fact, ...]
 ) -> Found:
-    """What is said of an answer and is no number of it.
+    """Facts about an answer that are not numbers of it.
 
     Args:
         before: the coefficients without the causes.
@@ -111,7 +111,7 @@ def beside_the_numbers(
 
 
 def nearly(study: Study) -> Nearly | None:
-    """The effects that explain most of a gap without being named; None where none do."""
+    """The effects that explain most of a gap without being named; None where there are none."""
     chosen = study.settings.words
     sets = [answer for answer in study.answers if answer.effects not in ((), UNKNOWN)]
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
@@ -133,7 +133,7 @@ def nearly(study: Study) -> Nearly | None:
 
 
 def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> dict[str, float]:
-    """By coefficient, the share by which the causes change it; empty where they change one materially."""
+    """By coefficient, the relative change by the causes; empty where any change is material."""
     known = {name: given for name, given in after.items() if given.std and given.value and name in before}
     moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
     limits = {
@@ -157,18 +157,18 @@ def spring_choices(study: Study) -> tuple[SpringError, ...]:
 def remainder(
     study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
 ) -> Remainder:
-    """Judge what the answer leaves of the gap; what chance explains is never material.
+    """Judge the residual gap of the answer; a remainder within chance is never material.
 
-    The tests of bands do not see what coloured noise takes up. A further effect that is significant shows it.
+    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
 
     Args:
         stated: the coefficients of the answer's fit with their standard deviations.
-        moved: by the same names, how far what remains moves them (`coefficient_move`), in their units.
-        excess: left on readings held out of the fit, in noise variances of a sample.
+        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
+        excess: on readings held out of the fit, in noise variances of a sample.
         hidden: the effects that could hide beside the answer.
     """
     random, chosen = study.random, study.settings.answer
-    if random is not None:  # where it acts it leaves innovations
+    if random is not None:  # its runs have innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if run.id not in random.process.runs]
         both = np.concatenate([*random.process.innovations, *still])

@@ -1,4 +1,4 @@
-"""Linear theory of the coefficients: gradients, how far what remains moves them, and what small causes may do."""
+"""Linear theory of the coefficients: gradients, moves by the remainder, and possible small causes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tunnel_sim.vocabulary.record import Array
 
 _DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
 _SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
-_OWN_SIZE = 3.0  # factor by which linear theory may change the size that was found in the records' lines
+_OWN_SIZE = 3.0  # factor by which linear theory may change a size found in the records' lines
 
 
 def wind_on_runs(fit: Fit) -> list[WindOnRun]:
-    """Stiffnesses, frequencies and loads of the wind-on runs that a spring holds, in SI units."""
+    """Stiffnesses, frequencies and loads of the wind-on runs on a spring, in SI units."""
     data = fit.problem.data
     found = []
     for i, run in enumerate(data.runs):
@@ -42,7 +42,7 @@ def wind_on_runs(fit: Fit) -> list[WindOnRun]:
 
 
 def coefficients_of(fit: Fit) -> tuple[str, ...]:
-    """Names of the coefficients that a diagnosis states of a fit."""
+    """Names of the coefficients stated for a fit."""
     return fit.problem.data.model.coefficient_names(fit.problem.names)
 
 
@@ -50,19 +50,20 @@ def coefficient_move(fit: Fit, name: str) -> float:
     """Half the difference between the coefficients of two halves of the data, beyond chance.
 
     The data are halved by amplitude, by time, by wind speed and by spring, and the halves that differ most count.
-    The difference is that of one Gauss–Newton step from the fit: the scores of a fit sum to zero, and what one half
-    pulls up the other pulls down. Were the model right, the pull would be the noise's alone. This is the test of
-    Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an ordering, in the parameter's
-    unit; a refit of each half would answer the same, but is undetermined where one half shows only some causes.
+    The difference is that of one Gauss–Newton step from the fit: the scores of a fit sum to zero, so the two
+    halves pull in opposite directions. If the model were right, the pull would be due to noise alone. This is the
+    test of Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an ordering, in the
+    parameter's unit. Refitting each half would give the same answer, but is undetermined where one half shows only
+    some causes.
 
     Returns:
-        The move in the coefficient's unit, reduced by what the noise alone gives (2 standard deviations, in
-        quadrature); 0 where it gives as much.
+        The move in the coefficient's unit, less the contribution of noise (2 standard deviations, in quadrature);
+        0 where noise explains it.
     """
     gradient = fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name)
     chosen = fit.settings.answer
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
-    # the step is what the fit had still to go
+    # the remaining step of the fit itself
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
     rows: list[tuple[float, ...]] = []  # of pieces of one cycle
     for index, (run, (common, release), residual, solution) in enumerate(
@@ -88,9 +89,9 @@ def coefficient_move(fit: Fit, name: str) -> float:
         rank = np.argsort(order, kind="stable")
         at = int(np.searchsorted(np.cumsum(weight[rank]), 0.5 * total))
         middle = order[rank[min(at, rank.size - 1)]]
-        for low in (order < middle, order <= middle):  # runs of one condition are not divided
+        for low in (order < middle, order <= middle):  # runs of equal order are not divided
             share = float(weight[low].sum()) / max(total, 1e-300)
-            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half says nothing
+            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half has no information
                 both = 2.0 * share * (1.0 - share)
                 moved = float(pull[low].sum()) / both
                 chance = chosen.move_stds**2 * total / (2.0 * both)
@@ -100,16 +101,16 @@ def coefficient_move(fit: Fit, name: str) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A fit and the same with sets of small causes added, by linear theory.
+    """A fit, and the fit with sets of small causes added, by linear theory.
 
     Args:
         weights: probability of each set, the empty one first, shape (sets,).
-        moves: how far each set moves the coefficients of the nominal model, shape (sets, coefficients).
+        moves: change of the nominal model's coefficients by each set, shape (sets, coefficients).
         noise: variances due to the noise of the readings, of that shape.
         forms: further variances due to the forms of the small causes, of that shape.
-        left: scaled residuals that the sets leave on the average, by run.
-        scatter: standard deviations from the scatter of the runs in these, where they are beyond chance, shape
-            (coefficients,); else 0.
+        left: mean scaled residuals over the sets, by run.
+        scatter: standard deviations from the scatter of the runs in these residuals, where it exceeds chance,
+            shape (coefficients,); else 0.
     """
 
     weights: Array
@@ -131,7 +132,7 @@ class _Cause:
     )
     least: float  # multiple of the size that is allowed
     greatest: float  # multiple of the size that is allowed
-    by_chance: float  # χ² by which the numbers of the runs' own may lower it
+    by_chance: float  # chance gain of χ² by parameters per run
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +147,7 @@ class _Step:
 
 
 def alone(fit: Fit) -> Beside:
-    """A fit with no set of small causes added."""
+    """A fit without added small causes."""
     formal = _formal(fit, coefficient_gradients(fit))[None, :]
     return Beside(
         np.ones(1), np.zeros_like(formal), formal, np.zeros_like(formal), fit.residuals, 0.0 * formal[0]
@@ -158,7 +159,7 @@ Starts = Sequence[tuple[type[Effect], Sequence[StartingPoint]]]
 
 
 def starts_beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Starts:
-    """The starting points of the effects that a fit does not have; none where the fit misses the motion."""
+    """The starting points of the effects that a fit does not include; none where the fit misses the motion."""
     if misses_motion(fit):
         return ()
     present, found = {kind.name for kind in fit.problem.effects}, []
@@ -170,13 +171,13 @@ def starts_beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Starts:
 
 
 def beside(fit: Fit, starts: Starts) -> Beside:
-    """Add sets of effects that a fit does not have, up to three at a time, by one Gauss–Newton step.
+    """Add sets of effects that a fit does not include, up to three at a time, by one Gauss–Newton step.
 
-    An effect that acts but is not named changes the coefficients, because the fit absorbs a part of it. The other
-    part is in the residuals and gives its size. A set has the weight exp(−(χ²/φ + price)/2). The price is
-    the same for each effect. φ is the dispersion of what the best set leaves beyond chance, over the six
-    effective degrees of freedom that the error of a real model has (decisions 0007 and 0028). An effect
-    that the readings do not show therefore has no part in the average, however far it could move a coefficient.
+    An unnamed effect changes the coefficients, because the fit absorbs a part of it. The other part is in the
+    residuals and gives its size. A set has the weight exp(−(χ²/φ + price)/2), with the same price for each effect.
+    φ is the dispersion of the best set's residual beyond chance, over the six effective degrees of freedom of a
+    real model's error (decisions 0007 and 0028). An effect that the readings do not show therefore has no part in
+    the average, however far it could move a coefficient.
 
     Args:
         fit: with or without effects.
@@ -189,7 +190,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
         with suppress(np.linalg.LinAlgError):
             start = next(iter(points), None)  # the most promising one
             cause = None if start is None else _cause(fit, start, influence)
-            # not every effect is linear in its size, so each is taken at about the size that its own step gives
+            # not every effect is linear in its size, so each is evaluated near the size of its own step
             for _ in range(_SECANTS):
                 if start is None or cause is None or start.scaled is None:
                     break
@@ -238,7 +239,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
 
 
 def influences(fit: Fit) -> list[Array]:
-    """What a unit of every scaled residual adds to the coefficients, by run, shape (n, coefficients)."""
+    """Change of the coefficients per unit of every scaled residual, by run, shape (n, coefficients)."""
     _, _, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     directions = fit.covariance @ coefficient_gradients(fit).T
     return [
@@ -248,7 +249,7 @@ def influences(fit: Fit) -> list[Array]:
 
 
 def size_range(start: StartingPoint) -> tuple[float, float]:
-    """Least and greatest multiple of the size at which an effect starts that its parameter allows."""
+    """Least and greatest multiple of an effect's starting size that its parameter allows."""
     assert start.scaled is not None
     value = start.point.common[start.scaled]
     least, greatest = sorted(bound[start.scaled] / value for bound in start.problem.bounds)
@@ -258,7 +259,7 @@ def size_range(start: StartingPoint) -> tuple[float, float]:
 def coefficient_gradients(fit: Fit) -> Array:
     """Derivatives of the coefficients with respect to the common parameters, shape (coefficients, common).
 
-    Zero for a coefficient that a model of one's own holds.
+    Zero for a coefficient that the user's own model fixes.
     """
     names, model = fit.problem.names, fit.problem.data.model
     return np.array(
@@ -275,9 +276,9 @@ def _formal(fit: Fit, gradients: Array) -> Array:
 def _step(
     gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int], form_std: float
 ) -> _Step | None:
-    """Add the effects of some places; None where they change the readings alike, or a size would leave its range.
+    """Add the effects with some indices; None where they change the readings alike, or a size is out of range.
 
-    ``gram`` holds products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
+    ``gram`` has the products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
     ``form_std`` is the standard deviation of a move due to the form, as a share of it.
     """
     own = gram[np.ix_(chosen, chosen)]
@@ -304,7 +305,7 @@ def _step(
 
 
 def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
-    """Standard deviations from the scatter of the runs; 0 where chance explains what is left."""
+    """Standard deviations from the scatter of the runs; 0 where chance explains the residual."""
     names, runs = coefficients_of(fit), fit.problem.data.runs
     excess = sum(float(residual @ residual) for residual in residuals) - fit.count
     if excess <= fit.settings.answer.scatter_stds * math.sqrt(2.0 * fit.count):

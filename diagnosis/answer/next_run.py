@@ -19,16 +19,16 @@ _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
 _DURATIONS = (10.0, 30.0)  # s
 _PHASES = 8  # of the true model's periodic effect, to average over
-_PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
+_PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, one or two), to fit
 
 
 def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
-    """The feasible run whose readings two models, fitted to the same runs, predict most differently.
+    """The feasible run for which two models, fitted to the same runs, predict the most different readings.
 
     Returns:
-        Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected
-        separation (see `separation`) in standard deviations of the noise; None where no stiffness is known. The
-        spring is one of the campaign's, unless no run with these would distinguish the models.
+        Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected separation
+        (see `separation`) in standard deviations of the noise; None where no stiffness is known. The spring is one
+        of the campaign's, unless no run with these would distinguish the models.
     """
     data = first.problem.data
     known = _best_run(first, second, [k for k in data.model.planned_springs(data) if k in data.springs])
@@ -40,7 +40,7 @@ def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
 
 
 def _best_run(first: Fit, second: Fit, springs: Sequence[float]) -> dict[str, Any] | None:
-    """The run with one of some springs that separates the models most; None without any."""
+    """The run with one of some springs that separates the models most; None without a spring."""
     data = first.problem.data
     density = max((run.air_density for run in data.runs), default=0.0) or 1.2
     speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
@@ -60,7 +60,7 @@ def _best_run(first: Fit, second: Fit, springs: Sequence[float]) -> dict[str, An
 def planned_run(
     fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: float
 ) -> RunData:
-    """A run not yet made, with the sampling and the noise of the runs made.
+    """A future run, with the sampling and the noise of the existing runs.
 
     Args:
         spring_stiffness: Kr, N m/rad.
@@ -85,18 +85,18 @@ def planned_run(
 
 
 def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
-    """How far apart two models predict one run's readings, after the run's own parameters are refitted.
+    """Difference between two models' predictions of one run, after its own parameters are refitted.
 
     Args:
-        run: its conditions and length; the reading in it is not used.
+        run: its conditions and length; its reading is not used.
         angle: of the release, rad.
 
     Returns:
         The misfit of the rival in standard deviations of the noise, after its release and the phases of its
-        periodic effects are refitted, in root mean square over the phases of the true model, which cannot be
+        periodic effects are refitted, as the root mean square over the phases of the true model, which cannot be
         chosen. Each model is taken as the true one in turn, and the smaller misfit counts. None where a model's
-        motion grows without bound. Half the square is the expected log-likelihood ratio of the run, in nats, if
-        one of the two models is right.
+        motion diverges. Half the square is the expected log-likelihood ratio of the run, in nats, if one of the
+        two models is right.
     """
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
@@ -106,10 +106,10 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """A run as a model predicts it."""
+    """A model's prediction of a run."""
 
     reading: Array  # mean over the phases of its periodic effects, rad, shape (n,)
-    waves: Array  # what the cosine and the sine of each phase add, rad, shape (n, 2 × effects)
+    waves: Array  # contributions of the cosine and the sine of each phase, rad, shape (n, 2 × effects)
     slopes: Array  # derivatives to the release, shape (n, 2)
 
 
@@ -118,7 +118,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
     The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
-    # one instant, however many the runs made had, and no deviation: it may be of either sign
+    # one instant, whatever the number in existing runs, and no deviation: it may have either sign
     data = fit.problem.data.with_runs((run,))
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
     turns = np.array([bool(kind.line) for kind in problem.effects if kind.own_numbers(1)], bool)
@@ -141,7 +141,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
 
 def _missed(true: _Prediction, rival: _Prediction) -> float:
-    """Root of the sum of squares of what the rival, refitted, misses of the true model, rad."""
+    """Root sum of squares of the refitted rival's misfit to the true model, rad."""
     change = np.column_stack([true.reading - rival.reading, true.waves])
     left, waves = project_release(change, rival.slopes), project_release(rival.waves, rival.slopes)
     count = waves.shape[1] // 2

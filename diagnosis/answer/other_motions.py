@@ -1,4 +1,4 @@
-"""What no effect of one degree of freedom explains: a second mode, and a limit cycle in every run."""
+"""Motions beyond effects of one degree of freedom: a second mode, and a limit cycle in every run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
-_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
+_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a quickly decaying mode is lost in the whole
 _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
 
 
@@ -39,10 +39,9 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
     """Find a second mode in each run that shows one.
 
     Returns:
-        One for each run in which two decaying oscillations leave far less than one, and are farther apart than the
-        sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or its
-        first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
-        out.
+        One for each run in which two decaying oscillations leave far less than one does, and are farther apart
+        than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first
+        half or its first quarter. A motion that decays before it reverses is not a mode. Driven runs are left out.
     """
     found = []
     for run in campaign.runs:
@@ -92,7 +91,7 @@ def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _M
 
 
 def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
-    """The answer without effects replaced by ``unknown`` without coefficients, for runs in a limit cycle."""
+    """The answer without effects, replaced by ``unknown`` without coefficients, for runs in a limit cycle."""
     excess = nominal.gap.excess_before
     return replace(
         nominal,
@@ -109,7 +108,7 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
 
 
 def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
-    """The refusal where not even the nominal model can be fitted to runs in a limit cycle."""
+    """The error for runs in a limit cycle to which not even the nominal model can be fitted."""
     what = ". ".join(f"{remark.runs[0]}: {remark.what}" for remark in _recognised(remarks))
     return TunnelError(f"no run is a free decay: {what}", remedy="add decays at a lower wind speed")
 

@@ -1,4 +1,4 @@
-"""How the runs repeat under the answer: widths with intervals, and every run against the model of all."""
+"""Repeatability of the runs under the answer: widths with intervals, and every run against the common model."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from tunnel_sim.physics.settings_table import SettingsTable
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
-_FEWEST = 5  # runs among which one may deviate far beyond the others, or which may show a drift
+_FEWEST = 5  # fewest runs for an outlier or a drift
 _OF_TREND = 2  # numbers of a straight line
 
 
 def repeatability(fitted: Fit) -> Repeatability | None:
-    """How the runs repeat.
+    """Repeatability of the runs.
 
     Args:
         fitted: the fit of the answer.
 
     Returns:
-        None of a single run, of a body that nothing holds, and where the model's sensitivities are not finite.
+        None for a single run, for a body without a spring, and where the model's sensitivities are not finite.
     """
     found = _Runs.of(fitted)
     if found is None:
@@ -51,13 +51,13 @@ def repeatability(fitted: Fit) -> Repeatability | None:
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """The runs of a fit with deviations of their own.
+    """The runs of a fit, each with its own deviations.
 
     Args:
         fitted: the fit of the answer.
-        scatter: all differences that the runs could show, those of the fit with its widths.
+        scatter: all differences that the runs could show; those of the fit have its widths.
         columns: of the fit with all of them.
-        kept: places of the fit's own differences among them.
+        kept: indices of the fit's own differences among them.
     """
 
     fitted: Fit
@@ -85,18 +85,18 @@ class _Runs:
 
     @property
     def products(self) -> RunProducts:
-        """Of the columns of the fit's own differences."""
+        """Products of the columns of the fit's own differences."""
         deviations = [one[:, self.kept] for one in self.columns.deviations]
         return RunProducts.of(deviations, self.columns.common, self.columns.seen)
 
     @property
     def prior(self) -> WidthPrior:
-        """Of the widths of the fit's own differences."""
+        """Prior of the widths of the fit's own differences."""
         return width_prior(self.fitted.problem)
 
     @property
     def alone(self) -> tuple[int, int]:
-        """Places of the differences of which one is a run's own stiffness, and one its own damping."""
+        """Indices of the differences in a run's own stiffness and in its own damping."""
         numbers = [one.kind.scatters for one in self.scatter]
         return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
 
@@ -119,10 +119,10 @@ class _Runs:
         return tuple(spreads)
 
     def trends(self) -> tuple[Trend, ...]:
-        """Numbers that the runs show to differ, and that follow the order of the runs.
+        """Parameters that differ between the runs and follow their order.
 
-        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its place
-        in the campaign. Widths are those beside it.
+        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
+        place in the campaign. Widths are those beside the drift.
         """
         tried = [place for place in self.kept if self.scatter[place].shown]
         rate = self.fitted.settings.scatter.trend_rate
@@ -130,7 +130,7 @@ class _Runs:
         return tuple(one for one in found if one is not None and one.p_value < rate)
 
     def _trend(self, place: int, tried: int) -> Trend | None:
-        """The drift of one number; None where too few runs have it."""
+        """The drift of one parameter; None where too few runs have it."""
         runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
         count = sum(run.wind_on or kind.condition == "always" for run in runs)
         if count < _FEWEST:
@@ -142,9 +142,9 @@ class _Runs:
         widths = likeliest_widths(products, self.prior)
         beside = marginal(products, widths)
         slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
-        if std <= 0.0:  # nothing but the common parameters changes along the campaign
+        if std <= 0.0:  # only the common parameters change along the campaign
             return None
-        # the width is known by the runs alone
+        # only the runs determine the width
         p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
         left = float(widths[list(self.kept).index(place)])
         known = [one.name for one in self.fitted.problem.scatter]
@@ -160,7 +160,7 @@ class _Runs:
         table = SettingsTable.of([stated])
         # of its stiffness and its damping
         changes = np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
-        # a change of the run's own spring and damper is one of its frequency and its damping
+        # a change of the run's own spring and damper is a change of its frequency and its damping
         per = np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
         deviation = self.columns.deviations[index][:, pair]
         covariance = np.linalg.pinv(deviation.T @ deviation)
@@ -187,7 +187,7 @@ class _Runs:
         )
 
     def _p_value(self, index: int) -> float:
-        """That a run deviates as far by chance, by what the others do, times the number of runs."""
+        """P-value of a run's deviation given the others, times the number of runs."""
         count = len(self.columns.seen)
         if not self.kept or count < _FEWEST:
             return 1.0
@@ -205,5 +205,5 @@ class _Runs:
         away = covariance @ (own.T @ left)
         whole = covariance + by_chance @ by_chance.T + by_common @ found.covariance @ by_common.T
         distance = float(away @ np.linalg.solve(whole, away)) / _NUMBERS
-        # the widths are known by the other runs alone
+        # only the other runs determine the widths
         return min(1.0, count * float(fdtrc(_NUMBERS, max(count - 2, 1), distance)))

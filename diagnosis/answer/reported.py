@@ -1,4 +1,4 @@
-"""The gap by run, before and after: residuals of the fitted and the held-out runs from the MuJoCo model."""
+"""The gap by run, before and after: residuals of fitted and held-out runs from the MuJoCo model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_FINER = 4  # steps in place of one, where the input is delayed
+_FINER = 4  # times as many steps where the input is delayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,11 @@ class Comparison:
 
     Args:
         ids: of the runs.
-        residuals: reading minus the MuJoCo model's block means, in noise standard deviations, by run; those of
-            the forward integrator where MuJoCo could not integrate the motion.
+        residuals: reading minus the MuJoCo model's block means, in noise standard deviations, by run; those of the
+            forward integrator where MuJoCo could not integrate the motion.
         differences: MuJoCo's block means minus the forward integrator's, rad, by run.
         noise: standard deviation of a block mean's noise, rad, by run.
-        failure: why MuJoCo could not predict the runs; empty where it did.
+        failure: why MuJoCo could not predict the runs; empty where it could.
         shifts: the differences in noise standard deviations, whitened like the residuals, by run.
     """
 
@@ -55,8 +55,8 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     """Predict runs with both models.
 
     Args:
-        common: common parameters, shape (common,), or (runs, common) where each run has its own, as runs
-            held out of different fits do.
+        common: common parameters, shape (common,), or (runs, common) where each run has its own, as for runs held
+            out of different fits.
         release: every run's own parameters, shape (runs, own).
     """
     runs = problem.data.runs
@@ -68,7 +68,7 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
         predicted, failure = mujoco_blocks(problem, each, release), ""
     except TunnelError as error:
         predicted, failure = before, error.what
-    # a run held out of a fit may grow without bound in both models
+    # a held-out run may diverge in both models
     apart = [np.zeros_like(p) if failure else p - f for p, f in zip(predicted, before, strict=True)]
     return Comparison(
         ids=tuple(run.id for run in runs),
@@ -103,10 +103,10 @@ def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation
 
 
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
-    """Block means of the reading that the MuJoCo model predicts.
+    """Block means of the reading from the MuJoCo model.
 
-    Effects of the sensor act on every sample before it is averaged; the fits, which average first,
-    only approximate that.
+    Effects of the sensor act on every sample before averaging; the fits, which average first, only approximate
+    that.
 
     Args:
         common: common parameters of every run, shape (runs, common).
@@ -116,7 +116,7 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         By run, rad, of the shape of the run's ``reading``.
 
     Raises:
-        TunnelError: when the motion grows without bound.
+        TunnelError: when the motion diverges.
     """
     from tunnel_sim.engine.simulate import simulate_motions  # only here: MuJoCo is slow to load
 
@@ -151,7 +151,7 @@ class Reported:
         before_out: of the nominal model, for the runs that could be held out of its fit.
         after: of the answer's model, held out where possible, else from its fit to all runs.
         held_out: ids of the runs that could be held out.
-        confirmation: how far MuJoCo and the fits' integrator agree on these.
+        confirmation: agreement of MuJoCo and the fits' integrator on these.
     """
 
     before: Mapping[str, Array]
@@ -162,11 +162,11 @@ class Reported:
 
 
 def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
-    """Predict what is reported with the MuJoCo model, each fit once.
+    """Predict the reported runs with the MuJoCo model, each fit once.
 
     Returns:
-        The residuals. Those of the nominal model's held-out runs are the fits' own, corrected by MuJoCo's
-        difference in the fit of all runs, which is close to it.
+        The residuals. Those of the nominal model's held-out runs are from the fits' integrator, corrected by the
+        difference to MuJoCo in the similar fit of all runs.
     """
     before = compare(nominal.problem, nominal.point.common, nominal.point.release)
     before_out = {
@@ -197,7 +197,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample."""
-    ratio = base.extra + 1.0  # of the estimated noise to the base
+    ratio = base.extra + 1.0  # estimated noise over the base
     random = study.random
     explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
     predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
@@ -234,9 +234,9 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
 
 
 def held_out_totals(gap: GapSummary, held_out: Waterfall) -> GapSummary:
-    """The summary with the totals of the waterfall, so that every figure and sentence states the same gap.
+    """The summary with the totals of the waterfall, so that all figures and sentences state the same gap.
 
-    Nothing changes where nothing is found.
+    Unchanged where nothing is found.
     """
     if not gap.detected:
         return gap

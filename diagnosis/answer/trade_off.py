@@ -1,4 +1,4 @@
-"""The two parameters of a fit that the runs separate least: those of the nominal model and of the effects."""
+"""The two parameters of a fit that the runs separate least, among those of the nominal model and the effects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.units import angle_power, dimension
 def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
     """The trade-off among the common parameters of a fit; None where the runs separate all of them.
 
-    A parameter at the end of its range is not free, and has no part in it.
+    A parameter at the end of its range is not free, and is excluded.
     """
     free = [place for place, name in enumerate(fit.problem.names) if fit.bound(name) is None]
     names = [fit.problem.names[place] for place in free]

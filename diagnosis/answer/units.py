@@ -1,4 +1,4 @@
-"""The answer in the units of the measured campaign, and what unstated sizes leave open."""
+"""The answer in the units of the measured campaign, and the influence of unstated sizes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
     """The unit of an effect's parameter as identified.
 
     Returns:
-        The parameter's own unit; over that of Izz where the nominal model is per unit inertia, and times those of
-        the frontal area, the reference length and the air density where these are not stated.
+        The parameter's own unit, divided by that of Izz where the nominal model is per unit inertia, and
+        multiplied by those of the frontal area, the reference length and the air density where these are not
+        stated.
     """
     effect, _, parameter = name.partition(".")
     info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
@@ -41,7 +42,7 @@ def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
     return model.identified_unit(info.unit)
 
 
-#: By whether area and length are not stated: name and unit of the product identified in place of a coefficient.
+#: By whether area and length are unstated: name and unit of the product identified in place of a coefficient.
 _PRODUCTS = {
     (True, False): {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")},
     (False, True): {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")},
@@ -52,13 +53,13 @@ _PRODUCTS = {
 def sized_coefficients(
     found: Mapping[str, ParameterEstimate], rig: RigProperties
 ) -> dict[str, ParameterEstimate]:
-    """Coefficients under the names of what was identified.
+    """Coefficients under the names of the identified quantities.
 
     Args:
-        found: ``cn_beta`` and ``cn_r``, with 1 in place of every size that is not stated; or other coefficients.
+        found: ``cn_beta`` and ``cn_r``, with 1 in place of every unstated size; or other coefficients.
 
     Returns:
-        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, which their names say:
+        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, given in their names:
         ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
     """
     products = _PRODUCTS.get((rig.frontal_area is None, rig.reference_length is None), {})
@@ -79,7 +80,7 @@ _STEPS = {
 
 
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
-    """The answer with the parameters of the measured rig; what remains (`Remainder`) has its units already."""
+    """The answer with the parameters of the measured rig; the remainder (`Remainder`) has its units already."""
 
     def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
         return {name: own_estimate(value, similarity) for name, value in values.items()}
@@ -121,8 +122,8 @@ def own_parameters(
         given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
 
     Returns:
-        The same quantities, in the units of `parameter_unit`. The coefficient of another power of the rate than the
-        textbook's changes with that power of time.
+        The same quantities, in the units of `parameter_unit`. The coefficient of a power of the rate that differs
+        from the textbook's scales with that power of time.
     """
     found = {}
     for name, value in given.items():
@@ -134,7 +135,7 @@ def own_parameters(
         own = own_estimate(value, similarity)
         factor = similarity.time**-beyond
         std = None if own.std is None else own.std * factor
-        # A size, density or inertia that is not stated is 1 in own units: only the name of the unit changes.
+        # An unstated size, density or inertia is 1 in own units: only the name of the unit changes.
         unit = parameter_unit(name, campaign, model)
         found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
     return found
@@ -147,10 +148,10 @@ def own_hidden(
     similarity: Similarity,
     model: NominalModel,
 ) -> tuple[Hidden, ...]:
-    """The effects that could hide in the measured campaign's units, the one that moves a coefficient most first.
+    """The effects that could hide, in the measured campaign's units, by their influence on a coefficient.
 
     Args:
-        coefficients: the estimates with whose standard deviations the moves are compared, of the similar campaign.
+        coefficients: estimates of the similar campaign, whose standard deviations are the reference of the moves.
     """
 
     def greatest(one: Hidden) -> float:
@@ -168,7 +169,7 @@ def own_hidden(
 
 
 def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
-    """An estimate in the measured campaign's units, its value and standard deviation changed alike."""
+    """An estimate in the measured campaign's units, its value and standard deviation scaled alike."""
 
     def own(value: float) -> float:
         return similarity.own(value, estimate.unit)
@@ -183,7 +184,7 @@ def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> Paramet
 
 
 def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
-    """A run to make (`separating_run`) in the measured campaign's units, rounded to what an operator can set."""
+    """A proposed run (`separating_run`) in the measured campaign's units, rounded to adjustable values."""
     own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
     for name, step in _STEPS.items():
         if name in own:  # a whole number of steps, or two digits where it is only a few steps

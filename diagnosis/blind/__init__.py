@@ -1,7 +1,7 @@
-"""Blind tests: campaigns whose truth is in a sealed key, answers that are hashed, and their score.
+"""Blind tests: campaigns with their truth in a sealed key, hashed answers, and the score.
 
 `make_blind` draws campaigns with the reference simulator (another integrator and other forms of the effects than
-the fits use), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
+in the fits), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
 """
 
 from diagnosis.blind.score import Score, score_set

@@ -1,4 +1,4 @@
-"""A campaign's truth beside the answer to it, and the causes found and false."""
+"""A campaign's truth and answer, and the causes found and false."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.between_runs import SCATTERED
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)
-"""Excess of a moderate gap: 1 to 10 times the noise power."""
+"""Excess of a moderate gap: 1 to 10 noise variances."""
 
 
 _Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -26,7 +26,7 @@ _Width = Annotated[float, Field(ge=0.0)]
 
 
 class _Read(BaseModel):
-    """The part of a document that is scored; the rest is ignored."""
+    """The scored part of a document; the rest is ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -100,18 +100,18 @@ class _Answer(_Read):
 
 
 SCATTERING = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
-"""The number that each effect between runs scatters. They are beside the causes, and are scored by themselves."""
+"""The quantity that each effect scatters between runs. It is not a cause, and is scored separately."""
 
 
 @dataclass(frozen=True)
 class TrueScatter:
-    """How the runs of a campaign differ.
+    """Differences between the runs of a campaign.
 
     Args:
-        widths: standard deviation between runs by number, relative; empty where the runs repeat.
-        level: of the widths, such as ``small``; empty where the truth does not say.
+        widths: standard deviation between runs by quantity, relative; empty where the runs repeat.
+        level: of the widths, such as ``small``; empty where the truth does not state it.
         form: of the distribution.
-        stated: what the campaign states, relative, by number; empty for nothing.
+        stated: by the campaign, relative, by quantity; empty for nothing.
     """
 
     widths: Mapping[str, float] = field(default_factory=dict)
@@ -127,7 +127,8 @@ class Case:
     Args:
         truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
-        severity: excess of the nominal model as a ratio to the noise power; None where the truth does not say.
+        severity: excess of the nominal model as a ratio to the noise variance; None where the truth does not state
+            it.
         coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
         answer: the diagnosis' document.
         small: effects that act but need not be found, sorted.
@@ -135,7 +136,7 @@ class Case:
         few_runs: whether the protocol has few springs and speeds.
         coloured: whether the sensor's noise is coloured.
         stamps: ``even``, ``rounded`` or ``jittered``.
-        scatter: how its runs differ, beside the causes.
+        scatter: differences between its runs, beside the causes.
     """
 
     name: str
@@ -159,7 +160,7 @@ class Case:
 
     @property
     def named_scatter(self) -> frozenset[str]:
-        """The numbers of the runs that are said to scatter."""
+        """The quantities said to scatter between the runs."""
         return frozenset(
             {SCATTERING[name] for name in self.answer["causes"] or () if name in SCATTERING}
             | {number for number, spread in self.spreads.items() if spread["shown"]}
@@ -167,7 +168,7 @@ class Case:
 
     @property
     def spreads(self) -> dict[str, Mapping[str, Any]]:
-        """What is said of the scatter of each number: its ``width``, ``interval`` and whether it is ``shown``."""
+        """The answer on the scatter of each quantity: its ``width``, ``interval`` and whether it is ``shown``."""
         said = (self.answer.get("repeatability") or {}).get("spreads", ())
         return {SCATTERING[one["effect"]]: one for one in said if one["effect"] in SCATTERING}
 
@@ -197,7 +198,7 @@ class Case:
 
     @property
     def severity_class(self) -> str:
-        """``below 1``, ``1 to 10``, ``above 10`` or, where it is not known, empty."""
+        """``below 1``, ``1 to 10``, ``above 10`` or, where unknown, empty."""
         if self.severity is None:
             return ""
         if self.severity < MODERATE[0]:
@@ -211,7 +212,7 @@ class Case:
 
     @property
     def probability(self) -> float | None:
-        """Of the answer that was given; None where it is not among the candidates."""
+        """Probability of the answer given; None where it is not among the candidates."""
         wanted = " + ".join(self.answer["causes"] or ()) or "none"
         for candidate in self.answer.get("candidates", ()):
             if candidate["effect"] == wanted:
@@ -228,7 +229,7 @@ class Case:
 
     @property
     def stated_wrongly(self) -> bool:
-        """Whether a set of effects is stated that is not the true one; an undecided answer states none."""
+        """Whether the answer states a wrong set of effects; an undecided answer states none."""
         found = self.decision
         return bool(self.named) and not self.right and (found is None or found.decided)
 
@@ -243,7 +244,7 @@ class Case:
 
     @property
     def rival(self) -> bool:
-        """Whether the true effects were not the answer, but were named as possible confusions."""
+        """Whether the true effects were not the answer, but were named as a possible confusion."""
         mentioned = {*(self.causes or ()), *self.answer.get("ambiguous_with", ())}
         return not self.right and set(self.truth) <= mentioned
 
@@ -263,13 +264,13 @@ class Case:
 def case(
     name: str, truth: Mapping[str, Any], answer: Mapping[str, Any], excluded: Sequence[str] = ()
 ) -> Case:
-    """Put a truth, from the key, and an answer, the diagnosis' document, together.
+    """Combine a truth, from the key, and an answer, the diagnosis' document.
 
     Args:
-        excluded: effects that were withheld from the vocabulary; the truth is ``unknown`` where it has one of them.
+        excluded: effects withheld from the vocabulary; a truth with one of them is ``unknown``.
 
     Raises:
-        ValueError: when truth or answer is malformed (pydantic's, which says where).
+        ValueError: when truth or answer is malformed (pydantic's, with the place).
     """
     stated = _Truth.model_validate(truth)
     _Answer.model_validate(answer)
@@ -338,13 +339,13 @@ GROUPS: dict[str, Callable[[Case], bool]] = {
 
 @dataclass(frozen=True)
 class Found:
-    """How well the causes of some campaigns were found.
+    """Success in finding the causes of some campaigns.
 
     Args:
-        group: which campaigns.
+        group: of campaigns.
         exact: campaigns whose causes are exactly right.
-        found: of the true causes that matter, those named.
-        false: of the causes named, those that do not act. Small ones that act are not counted at all.
+        found: proportion of the relevant true causes that are named.
+        false: proportion of the named causes that do not act. Small causes that act do not count.
         stated_wrongly: campaigns with a decided answer that names a wrong set.
         covered: campaigns whose true causes are in the smallest set of answers that together have 0.9.
         credible_size: mean number of answers in these sets; 0 where there are none.
@@ -391,7 +392,7 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
 def inclusions(cases: Sequence[Case]) -> list[tuple[list[float], list[bool]]]:
     """By campaign, the stated probability that each effect is among the causes, and whether it is.
 
-    Small effects and scatter between runs are left out, and so are campaigns without these probabilities.
+    Small effects, scatter between runs, and campaigns without these probabilities are left out.
     """
     result = []
     for c in cases:

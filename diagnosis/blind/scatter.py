@@ -1,4 +1,4 @@
-"""What is found of the scatter between runs, beside the causes: named or not, rightly or falsely, and how wide."""
+"""Success in finding scatter between runs: named or not, rightly or falsely, and how wide."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from identification.statistics import Proportion
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 FACTOR = 1.5
-"""Within which a width counts as right: a convention."""
+"""Factor within which a width counts as right: a convention."""
 
 ALL = "all"
 
 
 @dataclass(frozen=True)
 class FoundScatter:
-    """What is found of the scatter of one number, or of all of them together.
+    """Success in finding the scatter of one quantity, or of all together.
 
     Args:
         number: ``wind_speed``, ``spring_stiffness``, ``mechanical_damping`` or ``all``.
-        named: where it scatters and nothing is stated, how often that is said.
-        false: where it is said to scatter, how often it does not.
-        within: where it scatters and nothing is stated, how often the width is right within a factor of 1.5.
-        covered: where the width has an interval of 90 % as well, how often that holds the true one.
+        named: share of the cases with unstated scatter in which it is named.
+        false: share of the cases with named scatter in which there is none.
+        within: share of the cases with unstated scatter in which the width is right within a factor of 1.5.
+        covered: share of the widths with an interval of 90 % in which it includes the true width.
     """
 
     number: str
@@ -41,16 +41,15 @@ class FoundScatter:
 
 @dataclass(frozen=True)
 class ScatterScore:
-    """How scatter between runs is dealt with in a set.
+    """Success with scatter between runs in a set.
 
     Args:
-        by_number: for each number, then for all of them together.
-        named_alone: of campaigns without a cause whose runs scatter unstated, those of which that is said, and no
-            cause named.
-        no_gap: of campaigns without a cause whose scatter is as stated, those in which nothing is named.
-        false_alarms: of campaigns whose runs repeat, those of which scatter is named.
-        exact: of campaigns whose runs scatter, those whose causes are exactly right; scatter may be named.
-        exact_repeating: of campaigns whose runs repeat, those whose causes are exactly right.
+        by_number: for each quantity, then for all together.
+        named_alone: of campaigns without a cause and with unstated scatter: those with scatter and no cause named.
+        no_gap: of campaigns without a cause and with scatter as stated: those in which nothing is named.
+        false_alarms: of campaigns whose runs repeat: those with scatter named.
+        exact: of campaigns whose runs scatter: those whose causes are exactly right; scatter may be named.
+        exact_repeating: of campaigns whose runs repeat: those whose causes are exactly right.
     """
 
     by_number: tuple[FoundScatter, ...]
@@ -63,16 +62,16 @@ class ScatterScore:
     SHARES = ("named_alone", "no_gap", "false_alarms", "exact", "exact_repeating")
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The shares by name, and those of the numbers."""
+        """The shares by name, and those of the quantities."""
         shares: dict[str, Any] = {name: getattr(self, name).to_json_dict() for name in self.SHARES}
         return shares | {"by_number": {one.number: one.to_json_dict() for one in self.by_number}}
 
 
 def scatter_score(cases: Sequence[Case]) -> ScatterScore:
-    """Count what is found of the scatter.
+    """Count the scatter found.
 
-    A distribution that is not the one of the vocabulary, such as a drift, is no part of what is asked of campaigns
-    without a cause, or of the widths: what of it is scatter is a matter of taste.
+    Distributions outside the vocabulary, such as a drift, are excluded from campaigns without a cause and from the
+    widths: which part of them is scatter is a matter of convention.
     """
     scattering = [c for c in cases if c.scatter.widths]
     repeating = [c for c in cases if not c.scatter.widths]

@@ -1,4 +1,4 @@
-"""Checks the hashes of a blind set and of its answers, opens the key and counts; calibration of probabilities."""
+"""Check the hashes of a blind set and its answers, open the key and count; calibration of probabilities."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ _WITHIN = 3.0  # standard deviations within which errors of coefficients are cou
 
 @dataclass(frozen=True)
 class CalibrationBin:
-    """Answers of about one probability.
+    """Answers of similar probability.
 
     Args:
         low: end of the bin, probability.
         high: other end, probability.
         mean: their mean probability.
-        right: how many are right.
+        right: number of right answers.
     """
 
     low: float
@@ -74,7 +74,7 @@ _POINTS = 401
 _WIDTHS = (0.005, 1.0)
 _HALVINGS = 20
 _RESAMPLES = 500
-_LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel holds at least one statement
+_LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel covers at least one statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +84,9 @@ class SmoothCalibration:
     Args:
         error: smooth calibration error, a probability.
         interval: of 95 %, by resampling campaigns at the width found.
-        width: standard deviation of the kernel, the one that equals the error it gives, a probability.
+        width: standard deviation of the kernel, equal to the resulting error, a probability.
         stated: probabilities of the curve, shape (points,).
-        observed: share that is true there, shape (points,).
+        observed: share of true statements there, shape (points,).
         low: lower end of its interval of 95 %, shape (points,).
         high: upper end, shape (points,).
         statements: number of statements.
@@ -104,7 +104,7 @@ class SmoothCalibration:
     campaigns: int
 
     def to_json_dict(self) -> dict[str, Any]:
-        """All figures but the curve."""
+        """All figures except the curve."""
         return {
             "error": self.error, "interval_95": list(self.interval), "width": self.width,
             "statements": self.statements, "campaigns": self.campaigns,
@@ -112,7 +112,7 @@ class SmoothCalibration:
 
 
 def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]]) -> SmoothCalibration | None:
-    """Smooth calibration error of statements that come in groups; None without any.
+    """Smooth calibration error of statements in groups; None without any.
 
     Args:
         groups: by campaign, stated probabilities and whether each is true.
@@ -126,7 +126,7 @@ def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]])
         at = np.rint(p * (_POINTS - 1)).astype(int)
         counts[row] = np.bincount(at, minlength=_POINTS)
         surplus[row] = np.bincount(at, weights=y - p, minlength=_POINTS)
-    # The error falls with the width, so that exactly one width equals its error.
+    # The error falls with the width, so exactly one width equals its error.
     low, high = _WIDTHS
     for _ in range(_HALVINGS):
         width = float(np.sqrt(low * high))
@@ -165,7 +165,7 @@ def _error(kernel: Array, surplus: Array, number: float) -> float:
 
 
 def _curve(kernel: Array, counts: Array, surplus: Array, grid: Array) -> Array:
-    """Share that is true by kernel regression: the probability plus the mean surplus there."""
+    """Share of true statements by kernel regression: the probability plus the mean surplus there."""
     return np.clip(grid + kernel @ surplus / np.maximum(kernel @ counts, 1e-300), 0.0, 1.0)
 
 
@@ -174,10 +174,10 @@ class CoefficientErrors:
     """Errors of one coefficient over some campaigns.
 
     Args:
-        group: which campaigns.
+        group: of campaigns.
         name: ``cn_beta`` or ``cn_r``.
         when: ``before`` or ``after`` the causes are added.
-        within: how many lie within 3 standard deviations of the truth.
+        within: number within 3 standard deviations of the truth.
         median: median absolute error as a share of the truth.
     """
 
@@ -197,8 +197,8 @@ class Score:
         excluded: effects withheld from the vocabulary.
         key_sha256: hash of the key, as published before; empty for an open set.
         answers_sha256: hash over the answers, as published before the key was opened.
-        made_with: arguments the set was made with; empty where unknown.
-        sealed: whether the truth was sealed; else it was beside the data, and this is not a blind test.
+        made_with: arguments of `make_blind`; empty where unknown.
+        sealed: whether the truth was sealed; else it was beside the data, and the test is not blind.
     """
 
     cases: tuple[Case, ...]
@@ -209,7 +209,7 @@ class Score:
     sealed: bool
 
     def exact(self) -> dict[str, Proportion]:
-        """Exact match of the causes, by kind of campaign and severity (times the noise power)."""
+        """Exact match of the causes, by kind of campaign and severity (in noise variances)."""
         found = {}
         for kind in ("single", "pair", "three", "four", "none", "outside", "withheld"):
             cases = [c for c in self.cases if c.kind == kind]
@@ -223,7 +223,7 @@ class Score:
         return {name: share for name, share in found.items() if share.total}
 
     def confusion(self) -> dict[str, dict[str, int]]:
-        """Numbers by truth and answer; pairs and ``no answer`` are rows and columns of their own."""
+        """Numbers by truth and answer; pairs and ``no answer`` have their own rows and columns."""
         found: dict[str, dict[str, int]] = {}
         for c in self.cases:
             row = found.setdefault(_truth(c), {})
@@ -231,7 +231,7 @@ class Score:
         return found
 
     def right_by_truth(self) -> dict[str, Proportion]:
-        """How many answers are right, by truth as in the rows of `confusion`."""
+        """Proportion of right answers, by truth as in the rows of `confusion`."""
         found: dict[str, list[bool]] = {}
         for c in self.cases:
             found.setdefault(_truth(c), []).append(c.right)
@@ -270,29 +270,29 @@ class Score:
         return found_by_group(self.cases)
 
     def inclusion(self) -> SmoothCalibration | None:
-        """Calibration of the probabilities that each effect is among the causes; None where they are not stated."""
+        """Calibration of the probability of each effect to be among the causes; None where not stated."""
         return smooth_calibration(inclusions(self.cases))
 
     def false_alarms(self) -> Proportion:
-        """How many campaigns without a gap were given a cause, ``unknown`` included."""
+        """Proportion of campaigns without a gap whose answer has a cause, ``unknown`` included."""
         return Proportion.of([not c.right for c in self.cases if c.kind == "none"])
 
     def missed(self) -> Proportion:
-        """How many campaigns with a gap were answered with ``none``."""
+        """Proportion of campaigns with a gap whose answer is ``none``."""
         return Proportion.of([c.causes == () for c in self.cases if c.kind != "none"])
 
     def rivals(self) -> Proportion:
-        """Of wrong answers where known effects act, how many name the truth as a possible confusion."""
+        """Proportion of wrong answers to known effects that name the truth as a possible confusion."""
         wrong = [c for c in self.cases if c.number and not c.right]
         return Proportion.of([c.rival for c in wrong])
 
     def scatter(self) -> ScatterScore | None:
-        """What is found of the scatter between runs; None where no campaign has any and none is named."""
+        """Scatter between runs found; None where no campaign has any and none is named."""
         asked = any(c.scatter.widths or c.named_scatter for c in self.cases)
         return scatter_score(self.cases) if asked else None
 
     def closure(self) -> tuple[Proportion, float, float]:
-        """Of campaigns named rightly: how many close 0.95 on held-out runs; median and 5th percentile closed."""
+        """For rightly named campaigns: proportion that closes 0.95 on held-out runs; median and 5th percentile."""
         closed = [float(c.answer["gap"]["closed"]) for c in self.cases if c.named_rightly]
         if not closed:
             return Proportion(0, 0), 0.0, 0.0
@@ -303,7 +303,7 @@ class Score:
         )
 
     def coefficients(self) -> list[CoefficientErrors]:
-        """Errors of Cnβ and Cnr before and after, by what became of the answer."""
+        """Errors of Cnβ and Cnr before and after, by the outcome of the answer."""
         groups: dict[str, Callable[[Case], bool]] = {
             "named rightly": lambda c: c.named_rightly,
             "none, rightly": lambda c: c.kind == "none" and c.right,
@@ -372,17 +372,17 @@ class Score:
 def score_set(
     folder: Path, *, excluded: Sequence[str] = (), key: Path | None = None, effects_file: Path | None = None
 ) -> Score:
-    """Check a set and its answers against their hashes, open the key and put both together.
+    """Check a set and its answers against their hashes, open the key and combine them.
 
     A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
 
     Args:
-        excluded: effects that were withheld when it was answered.
+        excluded: effects withheld when the set was answered.
         key: file of the key; the set's own when None.
-        effects_file: with which it was answered; None: none.
+        effects_file: file of added effects with which the set was answered; None: none.
 
     Raises:
-        TunnelError: when a campaign is not answered, key, campaign or answer is not what its hash says, or one of
+        TunnelError: when a campaign is not answered, key, campaign or answer does not match its hash, or one of
             them is malformed.
     """
     campaigns = campaign_folders(folder)

@@ -1,7 +1,7 @@
 """A blind set: campaigns without their truth, a sealed key, answers without the key, and the hashes of all.
 
-A set is a folder: a folder for each campaign, ``seal.json`` (published: hashes of the key and of the campaigns) and
-``key.json`` (the truth; may be elsewhere). Answers are in a folder of their own, which has a ``seal.json`` too.
+A set is a folder with one folder per campaign, ``seal.json`` (published: hashes of the key and of the campaigns)
+and ``key.json`` (the truth; may be elsewhere). Answers have their own folder, with a ``seal.json`` too.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ _CAMPAIGN = "campaign.toml"
 
 
 def write_document(path: Path, document: Mapping[str, Any]) -> str:
-    """Write JSON whole or not at all, as `tunnel_sim.files.writing.json_text` makes it; its SHA-256 in hexadecimal.
+    """Write JSON whole or not at all, as `tunnel_sim.files.writing.json_text` does; its SHA-256 in hexadecimal.
 
     Raises:
         TunnelError: when the file cannot be written.
-        ValueError: when the document holds NaN or infinity.
+        ValueError: when the document contains NaN or infinity.
     """
     content = json_text(document).encode()
     write_whole(path, content)
@@ -65,7 +65,7 @@ def file_hash(path: Path) -> str:
 
 
 def folder_hash(folder: Path) -> str:
-    """SHA-256, in hexadecimal, over names and contents of a folder's files, but for hidden ones."""
+    """SHA-256, in hexadecimal, over names and contents of a folder's files, except hidden ones."""
     found = hashlib.sha256()
     for path in sorted(p for p in folder.rglob("*") if p.is_file() and not p.name.startswith(".")):
         found.update(f"{path.relative_to(folder).as_posix()}\0{file_hash(path)}\n".encode())
@@ -73,7 +73,7 @@ def folder_hash(folder: Path) -> str:
 
 
 def campaign_folders(folder: Path) -> list[Path]:
-    """Subfolders of a set that hold a campaign, by name.
+    """Subfolders of a set with a campaign, by name.
 
     Raises:
         TunnelError: when there are none.
@@ -87,7 +87,7 @@ def campaign_folders(folder: Path) -> list[Path]:
 
 
 CHUNK = 100
-"""Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""
+"""Campaigns simulated together: their runs advance in one array, so fewer at a time would cost as much."""
 
 MakeProgress = Callable[[int, int], None]
 
@@ -105,24 +105,24 @@ def make_blind(
 ) -> Path:
     """Draw, simulate and write campaigns whose truth is only in the key, and return the key's file.
 
-    The key begins with 32 random bytes (the salt), so that the truth cannot be found by trying guesses against the
-    published hash; the hash shows that the key was not changed later. The seed is in the key too, since the truth
-    follows from it.
+    The key begins with 32 random bytes (the salt), so that the truth cannot be guessed from the published hash;
+    the hash proves that the key was not changed later. The seed is in the key too, since the truth follows from
+    it.
 
     Args:
-        seed: of everything drawn; the same arguments give the same campaigns.
+        seed: of all random draws; the same arguments give the same campaigns.
         shares: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
-        mixture: how often other forms, other circumstances and small effects are drawn.
+        mixture: shares of other forms, other circumstances and small effects.
         key: file of the key; inside the folder, beside the campaigns, when None.
-        progress: called with the number of campaigns written and the number in all.
-        show_steps: report on standard error how the sizing of the effects proceeds.
+        progress: called with the number of campaigns written and the total.
+        show_steps: report the sizing of the effects on standard error.
 
     Raises:
         TunnelError: when the folder or the key exists already, or the count is not above zero.
     """
     if count < 1:
         raise TunnelError(f"{count} is not a number of campaigns", where="--count", remedy="give 1 or more")
-    clear_leftovers(out.resolve().parent)  # what a killed command set aside is there again
+    clear_leftovers(out.resolve().parent)  # restores the files that a killed command had moved aside
     target = out / KEY if key is None else key
     for path in (out, target):
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
@@ -168,9 +168,9 @@ def make_blind(
 
 
 def written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
-    """Write a simulated campaign to a folder of its name, and return it.
+    """Write a simulated campaign to a folder with its name, and return it.
 
-    One that the reader refuses, as for too few cycles, is drawn again.
+    A campaign that the reader refuses, as for too few cycles, is drawn again.
 
     Raises:
         TunnelError: when the reader refuses several draws in turn.
@@ -190,9 +190,9 @@ AnswerProgress = Callable[[int, int, str], None]
 
 
 def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
-    """Where the answers to a set go: ``answers`` in it, or ``answers-without-…-with-…``.
+    """The folder of the answers to a set: ``answers`` in it, or ``answers-without-…-with-…``.
 
-    The latter ends with a hash of the file of effects added to the vocabulary.
+    The latter ends with a hash of the file of added effects.
     """
     without = ["without", *sorted(set(excluded))] if excluded else []
     names = sorted(kind.name for kind in _own_effects(effects_file))
@@ -215,18 +215,18 @@ def answer_set(
     """Diagnose every campaign of a set that has no answer yet.
 
     An interrupted run leaves only complete answers, and the next run continues from there. A campaign that cannot
-    be diagnosed gets an answer that says why; it counts as wrong.
+    be diagnosed gets an answer with the reason; it counts as wrong.
 
     Args:
         excluded: effects withheld from the vocabulary.
-        progress: called with the number of campaigns answered, the number in all, and the name of the last.
-        effects_file: of effects added to the vocabulary; None: none.
+        progress: called with the number of campaigns answered, the total, and the name of the last.
+        effects_file: file of effects added to the vocabulary; None: none.
 
     Returns:
         SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
 
     Raises:
-        TunnelError: when the set holds no campaign, an effect is unknown, or an answer was changed afterwards.
+        TunnelError: when the set has no campaign, an effect is unknown, or an answer was changed afterwards.
     """
     campaigns = campaign_folders(folder)
     vocabulary(exclude=excluded)
@@ -278,8 +278,8 @@ def answer_campaign(
         with answering_with(_own_effects(effects_file)):
             found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
         answer = found.to_json_dict()
-        answer.pop("maps", None)  # pictures' data: larger than the records, and nothing is scored by them
-    except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
+        answer.pop("maps", None)  # data of the figures: larger than the records, and not scored
+    except Exception as error:  # one bad campaign must not end the whole set; the score counts it as wrong
         said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
         answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}
     answer["data_sha256"] = folder_hash(folder)

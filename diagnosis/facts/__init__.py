@@ -1,1 +1,1 @@
-"""What a diagnosis finds, as frozen values with their units: its document and its words are made of them."""
+"""Findings of a diagnosis, as frozen values with units: the source of its document and its words."""

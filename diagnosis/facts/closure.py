@@ -1,4 +1,4 @@
-"""How large a gap is, what it is measured with, and how far it closes with each cause."""
+"""The size of a gap, its measure, and how far it closes with each cause."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ ON_STRETCHES = "on stretches of time held out of the fit"
 ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
 PATCHED = "simulated with the patched model"
 FITTED = "in the fitted runs (none could be held out)"
-"""What a gap before and after is measured on, as the document states it."""
+"""The readings on which a gap before and after is measured, as in the document."""
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """What turns an excess into a misfit.
+    """Conversion from an excess to a misfit.
 
     Args:
         noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
@@ -32,7 +32,7 @@ class Misfit:
     unit: str
 
     def rms(self, excess: float) -> float:
-        """Root mean square in ``unit`` of an excess in noise variances of a sample, which is chance below zero."""
+        """Root mean square in ``unit`` of an excess in noise variances of a sample; below zero it is chance."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
 
@@ -65,8 +65,8 @@ class Waterfall:
 
     Args:
         steps: the nominal model first; then the cause that closes most, and so on.
-        without: excess by cause, when it alone is taken out and the others are refitted, likewise held out. A cause
-            beside a random moment has none: the random moment would absorb it.
+        without: held-out excess by cause, with only that cause removed and the others refitted. A cause beside a
+            random moment has none: the random moment would absorb it.
     """
 
     steps: tuple[Step, ...] = ()
@@ -84,7 +84,7 @@ class Waterfall:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """How far the fits' integrator and the MuJoCo model agree on what is reported.
+    """Agreement of the fits' integrator and the MuJoCo model on the reported runs.
 
     Args:
         agrees: whether every run's difference is within the tolerance, and MuJoCo could predict them all.
@@ -92,7 +92,7 @@ class Confirmation:
         run: id of the run that is closest to its tolerance, or farthest beyond it.
         rms_difference: root mean square of that run's differences, rad.
         tolerance: of it, a tenth of a block mean's noise, rad.
-        failure: why MuJoCo could not predict the runs; empty where it did.
+        failure: why MuJoCo could not predict the runs; empty where it could.
     """
 
     agrees: bool
@@ -110,12 +110,12 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class NoiseSummary:
-    """The noise the gap is measured against.
+    """The reference noise of the gap.
 
     Args:
         std: of one sample, quantisation included, rad.
-        stated_std: likewise as the campaign states it, rad; None where it does not.
-        source: ``stated``, ``estimated`` or ``floor``: whose ``std`` is; the floor is the accuracy of the fits.
+        stated_std: of one sample, as stated by the campaign, rad; None where it is not stated.
+        source: origin of ``std``: ``stated``, ``estimated`` or ``floor``, the accuracy of the fits.
         reason: for it, in words; empty until they are written.
     """
 

@@ -1,4 +1,4 @@
-"""How decided an answer is, and what the likely answers have in common."""
+"""Whether an answer is decided, and the common part of the likely answers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tunnel_sim.effects import known_effects
 
 @dataclass(frozen=True)
 class Decision:
-    """What the probabilities of the answers allow to be said.
+    """The decision that the probabilities of the answers allow.
 
     Args:
         decided: whether the answer is probable enough, and predicts the readings held out of the fit.
         credible: the fewest answers that together are credible, with their probabilities, most probable first.
-        effects: effects that the likely answers have in common, with their probabilities.
-        channels: channels on which the likely answers act in common, with their probabilities.
-        unpredictive: the answer, where it is probable enough and does not predict them; else empty.
+        effects: effects common to the likely answers, with their probabilities.
+        channels: channels on which all likely answers act, with their probabilities.
+        unpredictive: the answer, where it is probable enough but does not predict them; else empty.
     """
 
     decided: bool
@@ -41,12 +41,12 @@ class Decision:
 def decision(
     answers: Sequence[tuple[str, float]], chosen: AnswerSettings, closed: float | None = None
 ) -> Decision:
-    """Judge the answers by their probabilities, and the first of them by what it predicts.
+    """Judge the answers by their probabilities, and the first of them by its predictions.
 
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
-        closed: share of the gap that the answer closes on readings held out of the fit; None: not known.
+        closed: share of the gap that the answer explains on readings held out of the fit; None: not known.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):
@@ -75,7 +75,7 @@ def decision(
 
 
 def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
-    """What answers of ``least`` of the probability hold, with that probability, the most probable first."""
+    """Elements common to answers of ``least`` of the probability, with that probability, most probable first."""
     found: dict[str, float] = {}
     for names, value in held:
         for name in sorted(names):

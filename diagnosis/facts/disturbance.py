@@ -1,4 +1,4 @@
-"""A run that was disturbed, as a fact."""
+"""A disturbed run, as a fact."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ class Disturbance:
     Args:
         run: id of the run.
         at_s: the instant, by the time stamps of the run, s.
-        kept_until_s: up to when the run is used, by the same stamps, s; None where the run is left out, or used
+        kept_until_s: end of the part that is used, by the same stamps, s; None where the run is left out, or used
             as a whole.
-        p_value: probability of as large a jump among all runs and instants, if chance and what acts in all runs
-            were all, a fraction.
+        p_value: probability of as large a jump among all runs and instants, by chance and by causes that act in
+            all runs, a fraction.
         used: whether the run is used as a whole, since the other runs do not determine the model.
     """
 

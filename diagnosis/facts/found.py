@@ -1,4 +1,4 @@
-"""What is found beside the numbers of an answer and has to be said, as kinds with figures and without a sentence.
+"""Facts beside the numbers of an answer, as kinds with figures and without sentences.
 
 `diagnosis.words` has the sentence of each.
 """
@@ -16,10 +16,10 @@ from tunnel_sim.vocabulary.drive import Hold
 
 @dataclass(frozen=True)
 class Fact:
-    """One thing found, whose sentence is in `diagnosis.words` under its kind.
+    """One finding, whose sentence is in `diagnosis.words` under its kind.
 
     Args:
-        figures: what the sentence states, by name, in JSON's types; numbers have their units in their names.
+        figures: the quantities in the sentence, by name, in JSON's types; numbers have their units in their names.
     """
 
     kind: str
@@ -31,13 +31,13 @@ class Fact:
 
 
 def as_stated(words: str) -> Fact:
-    """A sentence that a nominal model or a rival brings, as a fact."""
+    """A sentence from a nominal model or a rival, as a fact."""
     return Fact("stated", {"words": words})
 
 
 @dataclass(frozen=True)
 class Noted:
-    """A fact about the noise of some runs, which is said among the remarks on the records.
+    """A fact about the noise of some runs, stated among the remarks on the records.
 
     Args:
         runs: ids of the runs.
@@ -53,12 +53,12 @@ class Noted:
 
 @dataclass(frozen=True)
 class PlaceFound:
-    """Why a gap is placed where it is.
+    """The reasons for the place of a gap.
 
     Args:
         runs: number of the runs compared.
         share: of the gap, in the runs that show it, a fraction.
-        false_alarm_rate: at which a run is said to show a gap falsely, all runs together, a fraction.
+        false_alarm_rate: of a gap in any run, all runs together, a fraction.
         wind: excess by state of the wind, ``on`` and ``off``, a ratio; empty without runs of both.
         narrow: the intervals that locate the gap: ``time_s``, ``amplitude_rad``, ``frequency_hz``.
         bands: share of the gap by band beyond chance, fractions.
@@ -97,15 +97,15 @@ class Nowhere:
 
 @dataclass(frozen=True)
 class Nearly:
-    """Effects that explain most of a gap and are not named.
+    """Effects that explain most of a gap but are not named.
 
     Args:
         closes: share of the gap in the fitted runs, a fraction.
-        probability: that they are the answer, a fraction.
-        noisy: whether the noise misbehaves and may be all of the gap.
-        rival: effects that explain as much; empty where none do.
+        probability: of being the answer, a fraction.
+        noisy: whether misbehaving noise may be the whole gap.
+        rival: effects that explain as much; empty where there are none.
         rival_probability: of those, a fraction.
-        misfit: channels in which a significant misfit is left.
+        misfit: channels with a significant misfit.
     """
 
     effects: tuple[str, ...]
@@ -123,7 +123,7 @@ class SpringError:
 
     Args:
         stiffness: as stated, N m/rad.
-        error: of it, a fraction.
+        error: relative error of the stiffness, a fraction.
         std: standard deviation of the error, a fraction.
         probability: among the springs that may be off, a fraction; None for one of several that are all off.
     """
@@ -157,7 +157,7 @@ class TwoModes:
         run: id of the run.
         main: the mode that one free decay fits.
         second: the mode beside it.
-        closes: share of what one free decay leaves that falls away with it, a fraction.
+        closes: share of the residual of one free decay that the second mode explains, a fraction.
     """
 
     run: str
@@ -186,22 +186,22 @@ class OtherHold:
 
 @dataclass(frozen=True)
 class Found:
-    """Everything that is said of an answer and is no number of it.
+    """All facts of an answer that are not numbers of it.
 
     Args:
-        place: why the gap is where it is; None where there is none, or no place.
+        place: reasons for the place of the gap; None where there is no gap, or no place.
         nowhere: the residuals of a campaign without a gap; else None.
         both_winds: whether the wind is off in some runs and on in others.
-        nearly: what nearly explains an unexplained gap; None where nothing does.
-        immaterial: by coefficient, the share by which the causes change it, where they change none materially.
+        nearly: effects that nearly explain an unexplained gap; None where there are none.
+        immaterial: by coefficient, the relative change by the causes, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
         hold: a delay of the input that another hold between samples explains as well; None: none.
-        rivals: what is outside the vocabulary and would explain a gap whose cause is not known.
+        rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
         second_modes: by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
-        noise: why the noise is taken as it is.
+        noise: reasons for the noise used.
         cautions: caveats.
-        noted: what is noted of the noise.
+        noted: facts about the noise.
     """
 
     place: PlaceFound | None = None

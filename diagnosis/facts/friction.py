@@ -1,4 +1,4 @@
-"""Friction against rate, as a curve with a band and as points, in figures."""
+"""Friction against rate, as a curve with a band and as points."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tunnel_sim.files.writing import as_json
 
 @dataclass(frozen=True)
 class FrictionPoint:
-    """The friction of the strokes of similar rates, by the energy that they lose.
+    """The friction of the strokes of similar rates, from their energy losses.
 
     Args:
         rate_rad_s: mean over the distance, rad/s.
         moment: mean of the strokes, in the unit of the curve.
         std: its standard error by their scatter, in that unit.
-        strokes: how many they are.
+        strokes: their number.
     """
 
     rate_rad_s: float
@@ -33,7 +33,7 @@ class FrictionCurve:
         effect: its name.
         unit: of the moments: N m, or rad/s² per unit inertia.
         rate_rad_s: ascending, rad/s.
-        moment: by the fitted law, at these rates, in the unit.
+        moment: of the fitted law, at these rates, in the unit.
         std: its standard deviation by the covariance of the fit, in the unit.
         points: by the energy balance, of ascending rates; none where the records give none.
     """

@@ -1,4 +1,4 @@
-"""A model of one's own with the causes written into it, and how far it closes the gap by itself."""
+"""The user's model with the causes written into it, and the share of the gap that it closes by itself."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class NativeClosure:
     """How far the gap closes on readings held out of the fit.
 
     Args:
-        before: mean squared residual of the nominal model, in units of the noise power of a block mean.
+        before: mean squared residual of the nominal model, in units of a block mean's noise variance.
         fit: of the fits' own integrator with the causes, in the same unit.
         native: of the patched model, simulated by the engine, in the same unit.
     """
@@ -51,7 +51,7 @@ class PatchedModel:
 
     Args:
         written: attributes that changed.
-        differences: where the native element is not the same law, and what is left out.
+        differences: where the native element follows another law, and causes left out.
         zero: the reading less the joint's position, rad; the median of the runs.
         notes: the differences in sentences; empty until they are written.
     """

@@ -1,4 +1,4 @@
-"""What remains of a gap, and how much of that could be closed by what."""
+"""The remainder of a gap, and the share of it that each kind of law could explain."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tunnel_sim.files.writing import as_json
 KINDS = (
     "angle", "rate", "state", "wind", "time", "reading", "line", "between", "event", "wander", "noise",
 )  # fmt: skip
-"""Kinds of what may be missing; ``noise`` where none of the others closes much."""
+"""Kinds of missing law; ``noise`` where none of the others explains much."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """How far what remains moves a coefficient.
+    """Move of a coefficient by the remainder.
 
     Args:
         value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
-        relative: the same over the coefficient's absolute value, a fraction; None where the coefficient is zero.
+        relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
         std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
-        material: whether what remains is significant and moves the coefficient by more than its standard deviation
-            or by 1 %.
+        material: whether the remainder is significant and moves the coefficient by more than its standard
+            deviation or by 1 %.
     """
 
     value: float
@@ -36,15 +36,15 @@ class Move:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What remains after the named causes; the whole gap where none is named.
+    """The gap that remains after the named causes; the whole gap where none is named.
 
     Args:
         significant: whether it is beyond chance, by the tests of the gap.
         excess: on readings held out of the fit, in noise variances of a sample.
         p_value: of the strongest test, corrected for the number of tests.
         material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
-        words: it in sentences; empty until they are written.
-        further: an effect that is significant beside the causes and too small to be named; empty where none is.
+        words: the remainder in sentences; empty until they are written.
+        further: a significant effect beside the causes that is too small to be named; empty where there is none.
     """
 
     significant: bool
@@ -58,11 +58,11 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Ceiling:
-    """How much one kind could close at most.
+    """The greatest share that one kind could explain.
 
     Args:
         kind: of `KINDS`.
-        closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
+        closed: share of the residual, on readings held out of the fit; negative where the prediction is worse.
         std: its standard deviation from the scatter of the runs, a share.
     """
 
@@ -72,18 +72,18 @@ class Ceiling:
     held_out: str
 
     def determined(self, chosen: RemainderSettings) -> bool:
-        """Whether the share is known well enough; of a small excess, laws may close more than all."""
+        """Whether the share is known well enough; laws may explain more than all of a small excess."""
         return self.std < chosen.known_to and self.closed < chosen.closes_at_most
 
 
 @dataclass(frozen=True)
 class Curve:
-    """The missing moment, or error of the reading, where it depends on one quantity or two.
+    """The missing moment, or error of the reading, as a function of one quantity or two.
 
     Args:
         over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
-        values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or rate
-            belongs to the model's own coefficients, and is taken out.
+        values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or
+            rate is removed, because it belongs to the model's own coefficients.
         std: their standard deviations, in ``unit``.
         unit: of values and standard deviations.
     """
@@ -118,12 +118,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Law:
-    """A formula that explains what is missing, fitted like any other effect.
+    """A formula that explains the residual, fitted like any other effect.
 
     Args:
         effect: table of an effects file that states it.
         parameters: value and standard deviation by name, in the unit that the table states.
-        closed: share of what is left that it closes, on runs held out of the fit.
+        closed: share of the residual that it explains, on runs held out of the fit.
         std: its standard deviation from the scatter of the runs, a share.
     """
 
@@ -141,16 +141,16 @@ class Law:
 
 @dataclass(frozen=True)
 class Closable:
-    """What could be closed of what the answer leaves.
+    """The part of the answer's residual that could be explained.
 
     Args:
-        excess: that the answer leaves in the fitted runs, in noise variances of a sample.
-        kind: the simplest that closes about as much as any, of `KINDS`.
-        words: it in sentences; empty until they are written.
-        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
+        excess: of the answer in the fitted runs, in noise variances of a sample.
+        kind: the simplest that explains about as much as any, of `KINDS`.
+        words: the result in sentences; empty until they are written.
+        events: places of a kind that differs from run to run: ``run``, its ``share``, ``from_s`` and ``to_s``.
         curve: of that kind; None where it has none.
-        alike: other kinds that close about as much, measured in the same way.
-        next_most: share that the other kinds close at most, measured in the same way; None without others.
+        alike: other kinds that explain about as much, measured in the same way.
+        next_most: greatest share of the other kinds, measured in the same way; None without others.
         line: of the kind ``line``; else None.
     """
 

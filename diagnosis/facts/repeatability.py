@@ -1,4 +1,4 @@
-"""How the runs repeat: by how much they differ from each other by chance, and every run against the model."""
+"""Repeatability of the runs: their chance differences, and every run against the model."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Spread:
-    """By how much a number of the runs differs from run to run by chance.
+    """Chance difference of a quantity between the runs.
 
     Args:
         effect: name of the scatter.
         width: standard deviation of the runs' relative deviations, the likeliest, dimensionless.
         interval: its central interval of 0.90, dimensionless.
-        stated: what the campaign states of it, dimensionless; None: nothing.
-        shown: whether the runs show it beyond what is stated; it is then among the causes.
+        stated: value stated by the campaign, dimensionless; None: not stated.
+        shown: whether the runs show it beyond the stated value; it is then among the causes.
         deviations: of every run that it acts on, by id, relative, dimensionless.
     """
 
@@ -28,15 +28,15 @@ class Spread:
 
 @dataclass(frozen=True)
 class Trend:
-    """A number that drifts over the campaign, run by run in the order of the runs.
+    """A quantity that drifts over the campaign, in the order of the runs.
 
     Args:
-        effect: name of the scatter of that number.
-        change: of the number from the first run to the last one, relative, dimensionless.
+        effect: name of the scatter of that quantity.
+        change: of the quantity from the first run to the last one, relative, dimensionless.
         std: its standard deviation, dimensionless.
-        p_value: that the order of the runs shows as much by chance, times the number of trends sought.
+        p_value: probability of such an order by chance, times the number of trends sought.
         left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
-        only: whether the runs show no scatter of the number beside the drift.
+        only: whether the runs show no scatter of the quantity beside the drift.
     """
 
     effect: str
@@ -54,15 +54,15 @@ class RunRepeat:
     Args:
         id: of the run.
         windy: whether the wind is on.
-        frequency_hz: of small swings, as the model predicts it without a deviation of the run, Hz.
-        damping_ratio: likewise, dimensionless.
+        frequency_hz: of small swings, predicted without a deviation of the run, Hz.
+        damping_ratio: of small swings, predicted without a deviation of the run, dimensionless.
         frequency: the run's own over the predicted one minus one, a fraction.
         frequency_std: its standard deviation by the noise, a fraction.
-        damping: the same of the damping ratio, a fraction.
+        damping: the run's own damping ratio over the predicted one minus one, a fraction.
         damping_std: its standard deviation by the noise, a fraction.
         frequency_band: standard deviation of the frequency between runs, a fraction; 0 where they repeat.
-        damping_band: likewise of the damping ratio, a fraction.
-        p_value: that a run deviates as far by chance, by what the other runs do, times the number of runs.
+        damping_band: standard deviation of the damping ratio between runs, a fraction.
+        p_value: probability of such a deviation by chance, given the other runs, times the number of runs.
     """
 
     id: str
@@ -80,10 +80,10 @@ class RunRepeat:
 
 @dataclass(frozen=True)
 class AnswerWithout:
-    """The answer of the other runs, without one that deviates far beyond them.
+    """The answer from the other runs, without a run that deviates far beyond them.
 
     Args:
-        causes: names, sorted; empty: no gap, or none is needed; ``unknown`` alone: no effect explains it.
+        causes: names, sorted; empty: no gap, or none is needed; ``unknown`` alone: no effect explains the gap.
         probability: of that answer (a probability); 1 where there is no gap.
     """
 
@@ -93,7 +93,7 @@ class AnswerWithout:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """How the runs repeat under the answer.
+    """Repeatability of the runs under the answer.
 
     Args:
         spreads: chance differences between the runs; empty where they repeat.

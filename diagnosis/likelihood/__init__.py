@@ -1,1 +1,1 @@
-"""The likelihood of a campaign: its runs in similar units, the model of them, and the fits."""
+"""The likelihood of a campaign: its runs in similar units, their model, and the fits."""

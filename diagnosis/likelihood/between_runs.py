@@ -1,8 +1,7 @@
-"""What chance differences between runs make of a fit: their widths, and what they cost and gain.
+"""Chance differences between runs in a fit: their widths, their cost and their gain in likelihood.
 
-The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such
-as its release, is projected out of them run by run, and the deviations of the runs are integrated out
-(`identification.campaign.between_runs`).
+A run's other parameters, such as its release, are projected out run by run, and the deviations of the runs
+are integrated out (`identification.campaign.between_runs`).
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ from identification.campaign.between_runs import (
 )
 from tunnel_sim.vocabulary.record import Array
 
-#: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
-#: differences, which would pin a parameter that the runs do not determine. The errors are 1e-11 at most. What a
-#: true difference is worth may be 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
+#: Share of a column's power that deviations of the runs must fail to explain. Smaller differences are
+#: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may
+#: be as small as 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
 _APART = 1e-9
 _NARROWER = 0.3  # factor on widths from which their maxima are sought
 _USUAL = UsualWidths()
@@ -40,7 +39,7 @@ Kept = NDArray[np.bool_]
 
 
 def width_prior(problem: Problem) -> WidthPrior:
-    """What is known of the widths before the runs; where the campaign states them, they are at least that."""
+    """The prior of the widths; where the campaign states them, a lower bound."""
     known = problem.data.repeatability
     usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
@@ -51,13 +50,13 @@ def width_prior(problem: Problem) -> WidthPrior:
 
 @dataclass(frozen=True, eq=False)
 class RunColumns:
-    """The columns of a fit with chance differences between runs, what else a run has of its own projected out.
+    """The columns of a fit with chance differences between runs, the run's other parameters projected out.
 
     Args:
-        bases: orthonormal columns of what else a run has of its own, by run, shape (n, m).
+        bases: orthonormal columns of a run's other parameters, by run, shape (n, m).
         deviations: by run, shape (n, kinds).
         common: by run, shape (n, common).
-        seen: scaled residuals without the deviations of the fit, by run, shape (n,).
+        seen: scaled residuals without the fitted deviations, by run, shape (n,).
     """
 
     bases: list[Array]
@@ -73,7 +72,7 @@ class RunColumns:
 
         Args:
             residuals: scaled, by run.
-            jacobian: as a fit has it.
+            jacobian: as in `Fit`.
         """
         places = problem.parameters.places(problem.scatter)
         bases, deviations, common, seen = [], [], [], []
@@ -94,7 +93,7 @@ class RunColumns:
         return RunProducts.of(self.deviations, self.common, self.seen)
 
     def with_column(self, change: Sequence[Array]) -> tuple[RunColumns, float]:
-        """The columns with one more common one, and its norm, to which it is scaled.
+        """Add a common column; also returns its norm, by which it is scaled.
 
         Args:
             change: of the scaled prediction, by run, shape (n,).
@@ -111,21 +110,21 @@ class RunColumns:
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
     def with_drift(self, place: int) -> tuple[RunColumns, float]:
-        """The columns with a drift of one number: its deviation is in proportion to a run's place in the campaign.
+        """Add a drift of one parameter, whose deviation is proportional to a run's place in the campaign.
 
         Args:
-            place: of the number among the deviations.
+            place: of the parameter among the deviations.
 
         Returns:
-            The columns, and the norm of that of a drift by 1 from the first run to the last.
+            The columns, and the norm of the column for a drift of 1 from the first run to the last.
         """
         order = np.linspace(-0.5, 0.5, len(self.seen))
         return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
 
     def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
-        """The likeliest widths and what they make of the runs."""
+        """The likeliest widths, and the runs with them."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
-        # what a width does, a further parameter may do as well: there are several maxima then
+        # a further parameter may act like a width: there are then several maxima
         narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
         tries = [np.array(one) for one in product(*zip(*narrower, strict=True))]
         costs = [marginal(self.products, one).restricted + prior.cost(one) for one in tries]
@@ -134,7 +133,7 @@ class RunColumns:
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 
     def wider(self, prior: WidthPrior, widths: Array) -> float:
-        """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio.
+        """P-value of the observed differences if the given widths are true, by the likelihood ratio.
 
         Args:
             widths: relative, shape (kinds,).
@@ -143,7 +142,7 @@ class RunColumns:
         return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
     def at(self, widths: Array, prior: WidthPrior) -> Between:
-        """What given widths make of the runs.
+        """The runs with given widths.
 
         Args:
             widths: relative, shape (kinds,).
@@ -154,14 +153,14 @@ class RunColumns:
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """What widths of chance differences make of the runs.
+    """The runs with given widths of chance differences.
 
     Args:
         widths: relative, shape (kinds,).
         found: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
-        most: the deviations integrated out where the runs may differ most, so that all is known from what happens
-            within runs.
+        most: the deviations integrated out with the greatest widths, so that all knowledge comes from within
+            runs.
     """
 
     widths: Array
@@ -176,30 +175,29 @@ class Between:
 
     @property
     def restricted(self) -> float:
-        """The same with the common parameters integrated out, which compares widths."""
+        """−2 ln of the likelihood with the common parameters integrated out; compares widths."""
         return self.found.restricted + self.prior_cost
 
     def shown(self, values: Array, stds: float) -> Kept:
-        """Which common parameters the runs show not to be zero by themselves, without their comparison.
+        """Which common parameters differ from zero by the evidence within runs alone.
 
         Args:
             values: of the common parameters, in their units, shape (common,).
-            stds: distance from zero that shows it, in standard deviations where the runs may differ most,
-                dimensionless.
+            stds: least distance from zero, in standard deviations at the greatest widths, dimensionless.
 
         Returns:
-            True where it is shown, shape (common,).
+            True where the parameter differs from zero, shape (common,).
         """
         return np.asarray(values**2 >= stds**2 * np.diag(self.most.covariance), np.bool_)
 
     def cost(self, known: Array) -> float:
-        """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much.
+        """−2 ln of the evidence without the residuals' χ²: the cost of letting the runs differ so much.
 
-        It is that of the deviations found, were they known as well as the runs show them under one model for all
-        sets, up to a constant; runs that repeat exactly have 0. Otherwise vortices, whose phase shows the speed of
-        a run, would pay or be paid for that knowledge. Common parameters that only the comparison of runs
-        determines are integrated out over what greatest widths allow: else an effect that makes a few runs agree
-        by chance would shrink their width to nothing.
+        It is 0 for runs that repeat exactly. The deviations count as if they were known as well as under one
+        model for all sets; otherwise vortices, whose phase shows the speed of a run, would pay or be paid for
+        that knowledge. Common parameters that only the comparison of runs determines are integrated out with
+        the greatest widths; otherwise an effect that aligns a few runs by chance would reduce their width to
+        zero.
 
         Args:
             known: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
@@ -227,7 +225,7 @@ def _columns(by_run: Sequence[Array]) -> list[list[Array]]:
 
 
 def _inside(deviations: Sequence[Array], column: list[Array]) -> list[Array]:
-    """A column of all runs; its part that deviations of the runs do where the rest is an error of differences."""
+    """A column of all runs; its projection on the deviations where the rest is a finite-difference error."""
     inside = []
     for chance, one in zip(deviations, column, strict=True):
         size = np.sqrt(np.sum(chance**2, axis=0)) + 1e-300

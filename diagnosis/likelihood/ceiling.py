@@ -1,4 +1,4 @@
-"""How much of what is left each kind of law could close, on readings held out of the fit.
+"""Share of the residual that each kind of law could explain, on readings held out of the fit.
 
 A law is a sum of the columns of a basis, fitted by regularised least squares with the noise known.
 """
@@ -40,7 +40,7 @@ class Normal:
     free: int
 
     def __sub__(self, other: Normal) -> Normal:
-        """Without the other rows."""
+        """The normal equations without the given rows."""
         return Normal(
             self.matrix - other.matrix, self.gradient - other.gradient, self.power - other.power, self.free
         )
@@ -51,7 +51,7 @@ class Normal:
 
 
 def normal(residual: Array, basis: Array, free: Array | None = None) -> Normal:
-    """The normal equations of one unit (a run), its own release taken out.
+    """The normal equations of one unit (a run), its release projected out.
 
     Args:
         residual: shape (rows,).
@@ -103,7 +103,7 @@ class Ridge:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the coefficients, shape (c + k, c + k)."""
+        """Covariance of the coefficients, shape (c + k, c + k)."""
         size, scaled = self._scaled
         return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
 
@@ -127,7 +127,7 @@ def _log_evidence(values: Array, along: Array, precision: float) -> float:
 
 
 def best_ridge(whole: Normal) -> Ridge:
-    """The width of the prior that the readings make most probable."""
+    """The prior width of greatest evidence."""
     values, along = _spectrum(whole)
     if not values.size:
         return Ridge(whole, 1e300)
@@ -137,7 +137,7 @@ def best_ridge(whole: Normal) -> Ridge:
 
 
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
-    """χ² of every unit predicted without its group, or of the fit to all where it is in none, shape (units,).
+    """χ² of every unit, predicted without its group; units in no group are fitted. Shape (units,).
 
     Args:
         groups: indices of the units left out together.
@@ -162,7 +162,7 @@ def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision
 
 
 def ratio(drop: Array, left: Array) -> tuple[float, float]:
-    """Share of what was left that is closed, and its standard deviation from the scatter of the units.
+    """Share of the residual that is explained, and its standard deviation from the scatter of the units.
 
     Args:
         drop: of χ², by unit, shape (units,).
@@ -175,14 +175,14 @@ def ratio(drop: Array, left: Array) -> tuple[float, float]:
 
 
 GAPS = "short gaps"
-_STRETCHES = 6  # in a run, where no run can be left out
+_STRETCHES = 6  # in a run, where no run can be held out
 _GAP = 3  # rows: an eighth of a cycle
 _TURNS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """What has a release of its own: a run, or a stretch of its rows."""
+    """A part with a release of its own: a run, or a stretch of its rows."""
 
     path: Path
     rows: slice
@@ -192,7 +192,7 @@ class Unit:
         return np.asarray(np.linalg.qr(self.path.release[self.rows])[0])
 
     def left(self, columns: Array) -> Array:
-        """Rows of the unit without what its release absorbs.
+        """Rows of the unit, its release projected out.
 
         Args:
             columns: of the whole run, shape (rows, k) or (rows,).
@@ -203,12 +203,12 @@ class Unit:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the runs say of a kind.
+    """Evidence of the runs for a kind of law.
 
     Args:
-        drop: of χ² on what was held out, dimensionless.
+        drop: of χ² on held-out readings, dimensionless.
         precision: one over the variance of a coefficient in its prior, in the basis' units.
-        solution: the coefficients, where one set holds in all runs.
+        solution: the coefficients, where one set applies to all runs.
     """
 
     ceiling: Ceiling
@@ -218,7 +218,7 @@ class Evidence:
 
 
 class Unexplained:
-    """What the fit of an answer leaves, and how much of it could be closed."""
+    """The residual of an answer's fit, and the share of it that could be explained."""
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
@@ -268,9 +268,10 @@ class Unexplained:
 
     @cached_property
     def _left(self) -> Array:
-        """Excess that could be closed in every unit, shape (units,).
+        """Excess that could be explained in every unit, shape (units,).
 
-        Averaged rows have less noise than the residuals but all of the misfit; a stretch's own release takes some.
+        Averaged rows have less noise than the residuals but the whole misfit; a stretch's release absorbs
+        some.
         """
         over, power = [], []
         for unit in self.units:
@@ -283,7 +284,7 @@ class Unexplained:
         return np.asarray(np.array(over) + (self.before - np.array(power)), np.float64)
 
     def common(self, kind: str) -> Evidence:
-        """A kind whose law holds in every run; the scatter of the units gives the standard deviation."""
+        """A kind whose law is common to all runs; the scatter of the units gives the standard deviation."""
         parts = self.normals(self.columns(kind))
         ridge = best_ridge(total(parts))
         drop = (self.before - held_out(parts, self.groups, ridge.precision))[self.seen]
@@ -291,7 +292,7 @@ class Unexplained:
         return Evidence(ceiling, float(drop.sum()), ridge.precision, ridge)
 
     def single(self, kind: str) -> Evidence:
-        """A kind that is different in every run: short gaps are predicted from what is around them."""
+        """A kind that differs from run to run: short gaps are predicted from their surroundings."""
         columns = [unit.left(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)]
         residuals = [unit.left(unit.path.residual) for unit in self.runs]
         # one precision of the prior, as in `Ridge`, for units with coefficients of their own
@@ -312,5 +313,5 @@ class Unexplained:
 
 
 def gaps(size: int, group: int = 1) -> NDArray[np.int_]:
-    """The set of short gaps left out in turn to which each of ``size`` samples, ``group`` in a row, belongs."""
+    """The set of short gaps, left out in turn, of each of ``size`` samples, ``group`` in a row."""
     return np.arange(size) // (_GAP * group) % _TURNS

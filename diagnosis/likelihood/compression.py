@@ -1,8 +1,8 @@
-"""Runs in wider blocks, which hold all of the motion in fewer numbers.
+"""Runs in wider blocks, which keep the motion in fewer numbers.
 
-What is slower than the motion, or a few times as fast, carries the information on its causes. Means over a
-block T at a frequency f keep (sin πfT / πfT)² of it: at 24 blocks in a cycle all but 0.6 %. What is much faster is
-noise, unless the residuals of the nominal model show otherwise.
+Information on the causes is at or below a few times the frequency of the motion. Means over a block T at a
+frequency f keep (sin πfT / πfT)² of it: with 24 blocks in a cycle all but 0.6 %. Faster content is noise,
+unless the residuals of the nominal model show otherwise.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ _FAST = 0.4  # cycles in a wider block, above which its mean hides most of a lin
 
 
 def compressed(nominal: Fit) -> Fit:
-    """The nominal model fitted to its runs in wider blocks; as given where they would lose anything.
+    """The nominal model fitted to its runs in wider blocks; unchanged where these would lose information.
 
-    They lose something where a run is driven, its samples are not evenly spaced, it reads a derivative of the
-    angle, its noise has a colour, or its residuals hold a motion that is too fast for wider blocks.
+    They do so where a run is driven, its samples are not evenly spaced, it reads a derivative of the angle,
+    its noise is coloured, or its residuals contain a motion that is too fast for wider blocks.
 
     Args:
         nominal: in the blocks in which the noise was tested.
@@ -45,9 +45,9 @@ def compressed(nominal: Fit) -> Fit:
 
 
 def in_shorter_blocks(found: Fit) -> Fit:
-    """A fit with its residuals in the blocks that those of its runs were made of; its sensitivities are the same.
+    """A fit with its residuals in the original, shorter blocks; its sensitivities are the same.
 
-    The fit itself where its runs are in no wider blocks.
+    Returns the fit itself where its runs are not in wider blocks.
     """
     data = found.problem.data
     runs = tuple(run.fine for run in data.runs)
@@ -60,7 +60,7 @@ def in_shorter_blocks(found: Fit) -> Fit:
 
 
 def _joined(run: RunData, frequency: float, blocks: int) -> int:
-    """How many blocks of a run become one, a power of 2, so that runs alike in this are integrated together.
+    """How many blocks of a run become one: a power of 2, so that similar runs are integrated together.
 
     Args:
         frequency: of the run's motion, Hz.
@@ -73,7 +73,7 @@ def _joined(run: RunData, frequency: float, blocks: int) -> int:
 
 
 def slow(residuals: list[Array], counts: list[int], chosen: SelectionSettings) -> bool:
-    """Whether wider blocks keep what residuals hold: nearly all that is not noise, and every fast line.
+    """Whether wider blocks keep nearly all of the residuals beyond noise, and every fast line.
 
     Args:
         residuals: of the blocks, in noise standard deviations, by run, shape (n,).

@@ -1,4 +1,4 @@
-"""Weighted least squares of a campaign: Gauss–Newton with the releases eliminated run by run."""
+"""Weighted least squares of a campaign: Gauss–Newton, with the releases eliminated run by run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Products of the sensitivities, which every step from one point shares.
+    """Products of the sensitivities, computed once per point.
 
     Args:
         own: of every run's own with themselves, and the precision of their priors, shape (runs, own, own).
@@ -53,7 +53,7 @@ def normal_equations(
     products: Products | None = None,
     pull: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Normal matrix and gradient of the common parameters, each run's release eliminated; arguments as in `by_run`.
+    """Normal matrix and gradient of the common parameters, releases eliminated; arguments as in `by_run`.
 
     Returns:
         Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
@@ -84,9 +84,7 @@ def by_run(
         `normal_equations`.
     """
     columns = list(zip(jacobian, residuals, strict=True))
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # of a run that grew without bound; its step is refused
+    with np.errstate(over="ignore", invalid="ignore"):  # a run diverged; its step is refused
         known = Products.of(jacobian) if products is None else products
         seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
         seen = seen if pull is None else seen + pull[:, :, None]
@@ -109,7 +107,7 @@ def damped_step(
     *,
     linear: bool = False,
 ) -> Point:
-    """Where a Gauss–Newton step leads, the common parameters inside their bounds.
+    """The end of a Gauss–Newton step, the common parameters inside their bounds.
 
     Args:
         residuals: scaled, by run.
@@ -133,7 +131,7 @@ def damped_step(
 
 
 def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> Array:
-    """The solution of the normal equations, those parameters held at a bound that would leave their range.
+    """The solution of the normal equations; parameters that would leave their range are fixed at its end.
 
     Args:
         matrix: symmetric, shape (n, n).
@@ -165,14 +163,14 @@ def project_release(change: Array, slopes: Array) -> Array:
 
 
 _MAX_ITERATIONS = 25
-_HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
+_HOPELESS = 5  # steps after which a fit must be better than without the added effect
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _CORRECTIONS = 2  # of the runs' own parameters after a step
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
 class FitError(ArithmeticError):
-    """A fit left the range in which the model can be integrated."""
+    """A fit is outside the range in which the model can be integrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,9 +183,9 @@ class Fit:
         covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
         jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
             (n, common), and to the run's release, shape (n, 2).
-        converged: whether the last step no longer paid.
-        spread: variances and covariances that other minima of χ² add to those, of that shape; None where none does.
-            Linear theory from the fit's own minimum takes ``covariance`` alone.
+        converged: whether the last step reduced χ² negligibly.
+        spread: covariance to be added for other minima of χ², of that shape; None: there are none. Linear
+            theory from the fit's own minimum uses ``covariance`` alone.
     """
 
     problem: Problem
@@ -211,7 +209,7 @@ class Fit:
 
     @cached_property
     def linear(self) -> Array:
-        """Of every run inertia, damping and stiffness, air and gravity included, shape (runs, 3).
+        """Inertia, damping and stiffness of every run, air and gravity included, shape (runs, 3).
 
         In kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
         """
@@ -224,7 +222,7 @@ class Fit:
 
     @property
     def widths(self) -> Array:
-        """Of the chance differences between the runs in the fit, relative, shape (kinds,)."""
+        """Relative widths of the chance differences between the runs, shape (kinds,)."""
         return np.array([one.width for one in self.problem.scatter])
 
     @cached_property
@@ -235,16 +233,17 @@ class Fit:
         return self.columns.likeliest(width_prior(self.problem), self.widths)
 
     def scatter_cost(self, known: Array) -> float:
-        """−2 ln of the evidence of the chance differences between the runs, beside χ²; 0 without any.
+        """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 without any.
 
         Args:
-            known: how well the runs show them, as `Between.cost` has it, shape (runs, kinds, kinds).
+            known: precision of these differences as the runs show them, as in `Between.cost`, shape
+                (runs, kinds, kinds).
         """
         return 0.0 if self.between is None else self.between.cost(known)
 
     @property
     def compared(self) -> int:
-        """How many effects chance differences between runs could do: no run shows them by itself."""
+        """Number of effects that chance differences between runs could imitate: no single run shows them."""
         if self.between is None:
             return 0
         shown = self.between.shown(self.point.common, self.settings.scatter.shown_stds)
@@ -256,7 +255,7 @@ class Fit:
     def unlikelihood(self) -> float:
         """−2 ln L up to a constant: χ² where the runs repeat, else with their deviations integrated out.
 
-        It is that of the point and the widths of the fit: linear theory far from a minimum promises anything.
+        It uses the fit's own point and widths, because linear theory is unreliable far from a minimum.
         """
         if not self.problem.scatter:
             return self.total
@@ -265,7 +264,7 @@ class Fit:
 
     @property
     def total(self) -> float:
-        """χ² of the campaign, and how far the runs' own parameters are from their priors."""
+        """χ² of the campaign, with the priors of the runs' own parameters."""
         return float(self.chi2.sum()) + self.problem.parameters.surprise(self.point)
 
     @property
@@ -280,7 +279,7 @@ class Fit:
 
     @property
     def gap(self) -> float:
-        """What shares are of: the excess, at least 0.001."""
+        """The unit of shares: the excess, at least 0.001."""
         return max(self.excess, 1e-3)
 
     @property
@@ -299,21 +298,21 @@ class Fit:
         return self.problem.data.model.fitted_spring(named)
 
     def zero(self, index: int) -> float:
-        """The sensor's zero in the run of an index."""
+        """The sensor's zero in the run with an index."""
         return self.problem.zero(self.point.common, self.point.release[index])
 
     def std(self, name: str) -> float:
-        """Its standard deviation, if the model is right."""
+        """Standard deviation of a common parameter, if the model is right."""
         i = self.problem.names.index(name)
         return float(np.sqrt(max(self.stated_covariance[i, i], 0.0)))
 
     @property
     def stated_covariance(self) -> Array:
-        """Of the common parameters, other minima included, shape (common, common)."""
+        """Covariance of the common parameters, other minima included, shape (common, common)."""
         return self.covariance if self.spread is None else self.covariance + self.spread
 
     def bound(self, name: str) -> str | None:
-        """``lower`` or ``upper`` where a common parameter lies at that end of its range; None inside it."""
+        """``lower`` or ``upper`` where a common parameter is at that bound; None inside its range."""
         i = self.problem.names.index(name)
         value = self.point.common[i]
         for end, limits in zip(("lower", "upper"), self.problem.bounds, strict=True):
@@ -334,9 +333,9 @@ def fit(
     """Minimise χ² from a starting point.
 
     Args:
-        base: a fit of the same runs with fewer effects. While progress is good, its sensitivities are used for
-            the parameters that both have, which saves most of the simulations.
-        tolerance: the fit goes on while a step lowers χ² by this share, or by 0.1.
+        base: a fit of the same runs with fewer effects. While the fit converges quickly, the sensitivities of
+            shared parameters are taken from it, which saves most of the simulations.
+        tolerance: the fit continues while a step lowers χ² by this share, or by 0.1.
 
     Raises:
         FitError: when the model cannot be integrated at the start.
@@ -355,23 +354,23 @@ def fit(
             else gain < max(0.1, tolerance * state.here.cost)
         )
         if poor and borrowed:
-            borrowed = False  # once more with its own sensitivities
+            borrowed = False  # repeat with its own sensitivities
         elif poor:
             converged = True
         if base is not None and iterations >= _HOPELESS and state.here.cost > base.total:
-            break  # more parameters, and still worse than without them
+            break  # worse than without its further parameters
     return state.result(converged)
 
 
 def try_fit(problem: Problem, start: Point, **options: Any) -> Fit | None:
-    """The fit, its arguments as in `fit`; None where it fails."""
+    """The fit, with arguments as in `fit`; None where it fails."""
     with suppress(FitError, np.linalg.LinAlgError):
         return fit(problem, start, **options)
     return None
 
 
 def fit_at(problem: Problem, point: Point) -> Fit:
-    """The fit that stands at a point found by other means.
+    """The fit at a point found by other means.
 
     Raises:
         FitError: when the model cannot be integrated there.
@@ -383,7 +382,7 @@ def fit_at(problem: Problem, point: Point) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """A point, what is predicted there, the scaled residuals by run, and χ² with the priors'."""
+    """A point with its prediction, scaled residuals by run, and χ² including the priors."""
 
     point: Point
     prediction: list[Array]
@@ -392,14 +391,14 @@ class _Place:
 
     @classmethod
     def of(cls, problem: Problem, point: Point) -> _Place:
-        """What a problem makes of a point."""
+        """Evaluate a problem at a point."""
         prediction = problem.predict([point])[0]
         residuals = _scaled(problem, prediction)
         return cls(point, prediction, residuals, _cost(problem, point, residuals))
 
 
 class _State:
-    """Where a minimisation stands."""
+    """The state of a minimisation."""
 
     def __init__(self, problem: Problem, point: Point) -> None:
         self.problem = problem
@@ -411,7 +410,7 @@ class _State:
         self.products: Products | None = None
 
     def linearise(self, base: Fit | None) -> None:
-        """Compute sensitivities, those of a smaller fit borrowed where given."""
+        """Compute sensitivities, reusing those of a smaller fit where given."""
         self.jacobian = sensitivities(self.problem, self.here.point, base, self.here.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
@@ -436,8 +435,8 @@ class _State:
     def _corrected(self, trial: _Place) -> _Place:
         """A trial with the runs' own parameters fitted once more.
 
-        Where runs differ by chance, a long step of the common parameters is cheap, since deviations absorb it. To
-        first order they absorb all but some thousandths, which is far above the noise.
+        Where runs differ by chance, deviations absorb a long step of the common parameters, so it is cheap.
+        To first order they absorb all but some thousandths of it, which is far above the noise.
         """
         for _ in range(_CORRECTIONS):
             pull = self.problem.parameters.pull(trial.point)
@@ -453,7 +452,7 @@ class _State:
         return trial
 
     def result(self, converged: bool) -> Fit:
-        """The fit as it stands."""
+        """The fit at the current point."""
         none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
         matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
         scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
@@ -470,7 +469,7 @@ class _State:
 
 
 def clip(problem: Problem, point: Point) -> Point:
-    """The point, its common parameters brought inside their bounds."""
+    """The point with its common parameters inside their bounds."""
     lower, upper = problem.bounds
     return Point(np.clip(point.common, lower, upper), point.release)
 
@@ -481,7 +480,7 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    with np.errstate(invalid="ignore", over="ignore"):  # a run that grew without bound; its cost is infinite
+    with np.errstate(invalid="ignore", over="ignore"):  # a run that diverged; its cost is infinite
         return [
             run.scaled(run.reading - values)
             for run, values in zip(problem.data.runs, prediction, strict=True)

@@ -1,9 +1,9 @@
 """Where the mains show in residuals: at 50 or 60 Hz and their multiples, as sampled.
 
-A line above half the sample rate appears at another frequency, as the spectrum of samples repeats: 60 Hz sampled
-at 100 Hz are 40 Hz. So every line is sought where the samples show it, at its own frequency less the nearest
-multiple of the sample rate. It is not sought where it would fall on the motion or its harmonics, nor at the ends of
-the spectrum, where a sine and a cosine are not distinct.
+A line above half the sample rate appears at another frequency, because the spectrum of samples repeats: 60 Hz
+sampled at 100 Hz appears at 40 Hz. Every line is therefore sought at its own frequency less the nearest
+multiple of the sample rate. It is not sought on the motion or its harmonics, nor at the ends of the spectrum,
+where sine and cosine are not distinct.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from tunnel_sim.vocabulary.record import Array
 
 #: Nominal frequencies of the mains, Hz.
 MAINS = (50.0, 60.0)
-#: Multiples of them that are sought. Rectifiers and lamps give the even ones, transformers the odd ones.
+#: Their multiples that are sought. Rectifiers and lamps give the even ones, transformers the odd ones.
 HARMONICS = range(1, 6)
-#: Farthest that the mains wander, a share of their frequency: a grid without a synchronous connection to others
-#: keeps 50 Hz within 2 % during 95 % of a week (EN 50160:2010, 4.2.1).
+#: Greatest deviation of the mains, a share of their frequency: a grid that is not synchronously connected to
+#: others keeps 50 Hz within 2 % during 95 % of a week (EN 50160:2010, 4.2.1).
 _WANDER = 0.02
-#: Least range that is worth seeking, a share of the frequency: large grids keep 50 Hz within 1 % during 99.5 % of a
-#: year (EN 50160:2010, 4.2.1) and 60 Hz within 0.5 Hz (NERC PRC-024-3, no-trip zone).
+#: Smallest search range, a share of the frequency: large grids keep 50 Hz within 1 % during 99.5 % of a year
+#: (EN 50160:2010, 4.2.1) and 60 Hz within 0.5 Hz (NERC PRC-024-3, no-trip zone).
 _LEAST_WANDER = 0.01
-#: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side of
-#: its place: where little of the spectrum is seen, a line of another source often lies in a wider range. Judgement.
+#: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side
+#: of its place. In a narrow spectrum a line of another source often lies in a wider range. Judgement.
 _OF_SPECTRUM = 0.05
 _BEYOND_MOTION = 3.3  # times the frequency of the fastest motion: beyond its third harmonic by a tenth
 _WIDTH = 2.0  # half a line's width with a Hann window, in 1/duration
-#: Pieces of the records whose powers are added, s of the rig as measured: within them the mains' phase is steady. A
-#: standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
+#: Length of the pieces whose powers are added, s of the rig as measured: the mains' phase is steady within
+#: them. A standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
 _PIECE = 10.0
 _LEAST_PIECE = 2.0  # s of the similar rig: four cycles
 _PADDING = 8
 _BESIDE = (
     0.6,
     4.0,
-)  # Hz of the similar rig: nearest and farthest that a line is compared with what is beside it
+)  # Hz of the similar rig: least and greatest distance of the spectrum compared with a line
 _MOTION_KNOWN = 1e-3  # of a multiple of the motion's frequency, which changes a little with the amplitude
 _SAME = 1e-6  # cycles per sample
 _CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
@@ -55,18 +55,18 @@ class MainsLine(Line):
     Args:
         parameter: frequency of the mains, Hz.
         drop: of χ² when the line is removed from the runs concerned, dimensionless.
-        contrast: ratio of the drop at the line to the greatest beside it, dimensionless.
+        contrast: ratio of the drop at the line to the greatest drop beside it, dimensionless.
         amplitude: of the line at the sensor, rad, root mean square over the runs concerned.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
         harmonic: the multiple.
         concerned: numbers of the runs in which it is sought.
         freedom: twice the number of pieces of records whose powers are added.
-        trials: number of independent places at which lines of the mains were sought, all of them together.
+        trials: number of independent places at which mains lines were sought, over all lines.
         powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
-        pieces: of every run concerned, shape (concerned,).
+        pieces: number of pieces of every run concerned, shape (concerned,).
         later: power in the later halves of these runs over that in the earlier halves, dimensionless.
-        evidence: drop of χ² beyond chance, at all multiples of the frequency that are seen, dimensionless.
-        folds: how often the line is folded, in the run of the lowest sample rate.
+        evidence: drop of χ² beyond chance, at all visible multiples of the frequency, dimensionless.
+        folds: number of times the line is folded, in the run of the lowest sample rate.
     """
 
     harmonic: int
@@ -81,7 +81,7 @@ class MainsLine(Line):
 
 
 def apparent(frequency: float | Array, interval: float) -> Array:
-    """The frequency at which samples show a line, Hz; negative where the phase runs backwards.
+    """Apparent frequency of a line in samples, Hz; negative where the phase runs backwards.
 
     Args:
         frequency: Hz, any shape.
@@ -92,7 +92,7 @@ def apparent(frequency: float | Array, interval: float) -> Array:
 
 
 def seen(frequency: float | Array, interval: float, duration: float, motion: float) -> np.ndarray:
-    """Whether samples show a line apart from the motion, its harmonics and the ends of the spectrum.
+    """Whether samples separate a line from the motion, its harmonics and the ends of the spectrum.
 
     Args:
         frequency: Hz, any shape.
@@ -106,7 +106,7 @@ def seen(frequency: float | Array, interval: float, duration: float, motion: flo
 
 
 def shown_multiples(frequency: float, interval: float, duration: float, motion: float) -> list[int]:
-    """The multiples of a frequency that samples show as `seen`, and apart from those before them.
+    """The multiples of a frequency that are visible (`seen`) and distinct from the lower ones.
 
     Args:
         frequency: of the mains, Hz.
@@ -126,18 +126,18 @@ def shown_multiples(frequency: float, interval: float, duration: float, motion: 
 
 
 def _limits(interval: float, duration: float, motion: float) -> tuple[float, float]:
-    """Lowest and highest apparent frequency at which a line is sought, Hz."""
+    """Lowest and highest apparent frequency of a line that is sought, Hz."""
     return _BEYOND_MOTION * motion + _WIDTH / duration, 0.5 / interval - _WIDTH / duration
 
 
 def mains_interval(similarity: Similarity) -> float:
-    """Longest interval between blocks at which no block mean folds a line of the mains, s of the similar rig."""
+    """Longest block interval at which block means do not fold a mains line, s of the similar rig."""
     highest = HARMONICS[-1] * max(MAINS) * (1.0 + _WANDER)
     return 1.0 / (2.0 * similarity.similar(highest, "Hz"))
 
 
 def alike(frequency: float, harmonic: int, intervals: list[float]) -> float | None:
-    """The mains' frequency of the other nominal value whose line all records show at the same place; None: no such.
+    """The mains' frequency of the other nominal value whose line coincides in all records; None: there is none.
 
     Args:
         frequency: of the mains, Hz of the rig as measured.
@@ -163,8 +163,8 @@ class _Pieces:
 
     Args:
         power: sum over the pieces of the drop of χ² when a sine is removed, by frequency, shape (n,).
-        halves: its parts of the earlier and of the later half of the run, shape (2, n).
-        spacing: of the frequencies, Hz.
+        halves: the parts of ``power`` from the earlier and the later half of the run, shape (2, n).
+        spacing: between the frequencies, Hz.
         count: of the pieces.
         duration: of one, s.
         run: the run.
@@ -183,7 +183,7 @@ class _Pieces:
 
     @classmethod
     def of(cls, run: RunData, residual: Array, motion: float, own: float, length: float) -> _Pieces:
-        """Cut into an even number of pieces about as long as given, s: two at least."""
+        """Cut into an even number of pieces, at least two, about ``length`` s long."""
         count = 2 * max(1, round(0.5 * residual.size * run.interval / length))
         size = residual.size // count
         window = np.hanning(size)
@@ -194,29 +194,29 @@ class _Pieces:
         return cls(halves.sum(axis=0), halves, spacing, count, size * run.interval, run, motion, own)
 
     def index(self, frequency: float | Array) -> np.ndarray:
-        """The nearest place of the spectrum at which a line of this frequency appears."""
+        """The nearest index of the spectrum to a line of this frequency."""
         place = np.round(np.abs(apparent(frequency, self.run.interval)) / self.spacing).astype(int)
         return np.asarray(np.minimum(place, self.power.size - 1))
 
     def of_motion(self, frequency: float) -> int:
-        """The multiple of the motion's frequency at which a line appears; 0 where it is at none."""
+        """The multiple of the motion's frequency at which a line appears; 0 for none."""
         place = abs(float(apparent(frequency, self.run.interval)))
         multiple = round(place / self.own)
         near = 1.0 / (self.run.reading.size * self.run.interval) + _MOTION_KNOWN * place
         return multiple if abs(place - multiple * self.own) < near else 0
 
     def multiples(self, without: int) -> float:
-        """The largest drop of χ² at the multiples of the motion's frequency beyond the third, but for one."""
+        """The largest drop of χ² at the multiples of the motion's frequency beyond the third, except one."""
         orders = np.arange(np.ceil(_BEYOND_MOTION), 0.5 / self.run.interval / self.own)
         places = self.index(self.own * orders[orders != without])
         return float(np.max(self.power[places], initial=0.0))
 
     def shows(self, frequency: float | Array) -> np.ndarray:
-        """Whether the run shows a line of this frequency apart from the motion, as `seen`."""
+        """Whether the run separates a line of this frequency from the motion, as `seen`."""
         return seen(frequency, self.run.interval, self.duration, self.motion)
 
     def reach(self, frequency: float) -> float:
-        """How far about a frequency a line is sought, a share of it; 0 where it is not sought."""
+        """Search range about a frequency, a share of it; 0 where the line is not sought."""
         lowest, highest = _limits(self.run.interval, self.duration, self.motion)
         share = min(_WANDER, _OF_SPECTRUM * (highest - lowest) / frequency)
         ends = frequency * (1.0 + share * np.array([-1.0, 0.0, 1.0]))
@@ -231,9 +231,9 @@ def fastest(fit: Fit) -> float:
 
 
 def mains_lines(fit: Fit) -> list[MainsLine]:
-    """The strongest line at every multiple of each nominal frequency of the mains that the runs show.
+    """The strongest line at every visible multiple of each nominal frequency of the mains.
 
-    Those of the first nominal frequency and multiple come first.
+    Ordered by nominal frequency, then by multiple.
     """
     data = fit.problem.data
     length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
@@ -249,14 +249,14 @@ def mains_lines(fit: Fit) -> list[MainsLine]:
 
 
 def mains_line(fit: Fit) -> MainsLine | None:
-    """The line of the mains that stands out most; None where the runs show no multiple of their frequency."""
+    """The most prominent mains line; None where no multiple of the mains' frequency is visible."""
     return max(mains_lines(fit), key=lambda line: line.contrast, default=None)
 
 
 def _sought(
     runs: list[_Pieces], similarity: Similarity
 ) -> Iterator[tuple[float, int, float, tuple[int, ...]]]:
-    """Nominal frequency (Hz), multiple, range (a share) and numbers of the runs of every line that is sought."""
+    """Nominal frequency (Hz), multiple, range (a share) and run numbers of every line that is sought."""
     for own in MAINS:
         nominal = similarity.similar(own, "Hz")
         for harmonic in HARMONICS:
@@ -269,7 +269,7 @@ def _sought(
 def _places(
     runs: list[_Pieces], nominal: float, harmonic: int, reach: float, concerned: tuple[int, ...]
 ) -> float:
-    """Independent places in a range: two in each line of the spectrum, as a window halves the record."""
+    """Number of independent places in a range: two in each spectral line, as a window halves the record."""
     longest = max(runs[i].duration for i in concerned)
     return 2.0 * (2.0 * reach * harmonic * nominal * longest + 1.0)
 
@@ -283,7 +283,7 @@ def _line(
     concerned: tuple[int, ...],
     trials: float,
 ) -> MainsLine | None:
-    """The strongest line in a range; None where nothing is seen beside it."""
+    """The strongest line in a range; None where no spectrum beside it is visible."""
     among = [runs[i] for i in concerned]
     spacing = min(run.spacing for run in among)
     middle = harmonic * nominal
@@ -303,7 +303,7 @@ def _line(
     spectra = [whole[i] for i in concerned]
     refined = _refined(among, spectra, place)
     orders = [run.of_motion(refined) for run in among]
-    if all(orders):  # at a multiple of every run's motion, of which none is far above all others
+    if all(orders):  # at a multiple of every run's motion, none of which is far above all others
         floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
     sines = _sines(among, spectra, refined)
     phases = np.zeros(len(runs))
@@ -330,7 +330,7 @@ def _line(
 
 
 def _refined(runs: list[_Pieces], spectra: list[ResidualSpectrum], place: float) -> float:
-    """The frequency within a piece's line at which the whole records hold most power, Hz."""
+    """The frequency of greatest power in the whole records, within a piece's line, Hz."""
     width = 1.0 / max(run.duration for run in runs)
     near = np.arange(place - width, place + width, min(float(one.frequency[1]) for one in spectra))
     pairs = zip(runs, spectra, strict=True)
@@ -351,7 +351,7 @@ def _sines(runs: list[_Pieces], spectra: list[ResidualSpectrum], frequency: floa
 
 
 def _evidence(runs: list[_Pieces], frequency: float) -> float:
-    """Drop of χ² beyond what chance gives, at all multiples of a frequency that the runs show."""
+    """Drop of χ² beyond chance at all visible multiples of a frequency."""
     found = 0.0
     for run in runs:
         for multiple in shown_multiples(frequency, run.run.interval, run.duration, run.motion):

@@ -1,4 +1,4 @@
-"""Motions of many runs at once, from the compiled integrator, and what the sensor reads of them."""
+"""Motions of many runs at once, from the compiled integrator, and the sensor's readings of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 _TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
-#: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
+#: Parameters of the law without effect in still air, and fields of a run that point to samples.
 _AIR = (
     "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
     "shedding_amplitude",
@@ -39,11 +39,11 @@ _POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Runs to be predicted; the same run may be among them with several values of the parameters.
+    """Runs to be predicted; one run may occur several times with different parameters.
 
     Args:
         data: of the campaign.
-        runs: shape (n,), as all below.
+        runs: shape (n,), as for all fields below.
         stated: their physics without any effect.
         physics: with the effects.
         effects: that act in each run.
@@ -68,15 +68,15 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Runs as the compiled integrator takes them.
+    """Runs in the form that the compiled integrator takes.
 
     Args:
         law: shape (n, parameters), in the law's order.
         rows: of `run_dtype`, shape (n,).
-        kept: arrays that the rows point to, beside those in ``winds``, by run.
+        kept: arrays that the rows point to, beside ``winds``, by run.
         winds: wind speeds that the rows point to, m/s, shape (n,).
-        blocks: block means that each motion lasts for, shape (n,).
-        ringing: of a rod, which is to be added, by run.
+        blocks: duration of each motion in block means, shape (n,).
+        ringing: of a rod, to be added, by run.
     """
 
     law: Array
@@ -91,8 +91,8 @@ class Motions:
         """The motions of some runs.
 
         Args:
-            like: every so many runs are the same ones at another point, which has the steps of the first; None: the
-                steps of each run are its own.
+            like: period after which the same runs follow at another point, which uses the steps of the first;
+                None: each run has its own steps.
         """
         physics, runs, rig, count = (
             asked.physics.copy(),
@@ -129,7 +129,7 @@ class Motions:
         length = np.array([run.duration for run in runs])
         blocks = size + np.ceil(np.maximum(0.0, physics["duration"] - length) / interval).astype(np.int64)
         substeps = fit_substeps(physics, interval)
-        # a derivative of the angle would show where steps are joined
+        # joins between steps would show in a derivative of the angle
         derived = np.array([run.derivative > 0 for run in runs])
         flexible = np.array([twist is not None for twist in physics.rod_twist])
         rough = (substeps > 1) | flexible | derived | driven
@@ -152,7 +152,7 @@ class Motions:
         return cls(law, rows, kept, winds, blocks, ringing)
 
     def alike(self) -> list[list[int]]:
-        """Places of the runs of equal motion: of the same law, release and samples."""
+        """Indices of the runs grouped by equal motion: equal law, release and samples."""
         numbers = self.rows.copy()
         for name in _POINTERS:
             numbers[name] = 0
@@ -165,19 +165,19 @@ class Motions:
         return list(found.values())
 
     def steps(self, place: int) -> tuple[float, ...]:
-        """What the motions that are integrated side by side have in common: samples, and steps between them."""
+        """Key of the motions that are integrated side by side: samples, and steps between them."""
         row = self.rows[place]
         return float(self.blocks[place]), float(row["steps"]), float(row["stride"])
 
     def integrated(self, places: Sequence[int]) -> tuple[Array, Array]:
-        """Angle and rate at the blocks' ends of runs of equal length and steps, without a rod's ringing.
+        """Angle and rate at the block ends of runs of equal length and steps, without a rod's ringing.
 
-        In rad and rad/s, shape (places, blocks + 1); infinite where a motion grows without bound.
+        In rad and rad/s, shape (places, blocks + 1); infinite where a motion diverges.
         """
         samples = int(self.blocks[places[0]]) + 1
         angle, rate, status = integrate(self.law[places], self.rows[places], samples)
         first = 0
-        while status:  # one of them grew, and the later ones are not done
+        while status:  # one of them diverged, and the later ones are not done
             angle[first + status - 1], rate[first + status - 1] = np.inf, np.inf
             first += status
             if first == len(places):
@@ -188,7 +188,7 @@ class Motions:
 
 
 def readings(asked: Asked) -> list[Array]:
-    """Block means of the reading, by run, shape (blocks,) each; infinite where the motion grows without bound."""
+    """Block means of the reading, by run, shape (blocks,) each; infinite where the motion diverges."""
     motions = Motions.of(asked)
     equal: dict[tuple[float, ...], list[list[int]]] = {}
     for places in motions.alike():
@@ -212,7 +212,7 @@ def readings(asked: Asked) -> list[Array]:
 
 
 def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], data: Data) -> None:
-    """Do some work on parts of a campaign's runs, in as many threads as its settings allow."""
+    """Run some work on parts of a campaign's runs, in the number of threads that its settings allow."""
     threads = data.settings.work.threads
     list(_pool(threads).map(work, parts) if threads > 1 and len(parts) > 1 else map(work, parts))
 
@@ -228,9 +228,9 @@ def read_together(
     """Block means of the reading of runs whose motions were integrated together.
 
     Args:
-        members: of each run its motion's place and its own.
+        members: for each run, the index of its motion and its own index.
         angle: at the blocks' ends, rad, shape (motions, blocks + 1).
-        rate: there, rad/s, of that shape.
+        rate: at the blocks' ends, rad/s, of the same shape.
     """
     places = [place for _, place in members]
     if len(members) != len(angle):
@@ -246,7 +246,7 @@ def read_together(
     found = []
     for number, (place, run) in enumerate(zip(places, runs, strict=True)):
         chain, zero = asked.chain(place), float(asked.zero[place])
-        if not np.isfinite(angle[number, 0]):  # it grew without bound
+        if not np.isfinite(angle[number, 0]):  # it diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
             ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
@@ -268,14 +268,14 @@ def end_weights(runs: Sequence[RunData], blocks: int) -> Array:
 
 
 def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
-    """Block means of the angle, or its derivative that is read, from the blocks' ends, shape (runs, blocks).
+    """Block means of the angle, or of the derivative that is read, from the block ends, shape (runs, blocks).
 
     Args:
         angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1).
     """
     weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]
-    with np.errstate(invalid="ignore"):  # a motion that grew without bound
+    with np.errstate(invalid="ignore"):  # a motion that diverged
         found: Array = (
             weights[:, 0] * angle[:, :-1]
             + weights[:, 1] * angle[:, 1:]
@@ -288,14 +288,14 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
 def _apart(
     physics: SettingsTable, place: int, asked: Asked, rig: Rig, *, whole: bool
 ) -> tuple[float, float, float, Ringing] | None:
-    """Put in place of a run with a flexible rod its slow motion.
+    """Replace a run with a flexible rod by its slow motion.
 
     Args:
         whole: whether the rod is followed, unless it is too stiff to ring.
 
     Returns:
-        The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing that is to be
-        added, where it was set apart.
+        The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing to be
+        added, where it was separated.
     """
     run = physics.row(place)
     run = released_by_spring_end(condensed(run, asked.data) if whole else run)
@@ -305,7 +305,7 @@ def _apart(
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:
-    """By how many blocks a motion must outlast the record: 0 unless an effect reads it after the end."""
+    """Blocks by which a motion must outlast the record: 0 unless an effect reads it after the end."""
     return int(np.ceil(max(0.0, physics.duration - run.duration) / run.interval))
 
 
@@ -323,8 +323,9 @@ def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) 
 def condensed(physics: RunSettings, data: Data) -> RunSettings:
     """Replace a rod that is too stiff to ring visibly by its first-order effect on the slow motion.
 
-    With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
-    sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
+    With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at
+    the sensor's end grows by the share (1 − s) a, and the air acts on (1 + a) θ. The neglected terms are of
+    order (c Kr)².
     """
     twist = physics.rod_twist
     if twist is None or twist.compliance > _SOFT_ROD:
@@ -340,7 +341,7 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
 
 
 def campaign_rig(data: Data) -> Rig:
-    """A rig of the campaign's own reference sizes."""
+    """A rig of the campaign's reference sizes."""
     return _rig(data.frontal_area, data.reference_length, data.width)
 
 

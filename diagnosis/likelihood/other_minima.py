@@ -1,7 +1,8 @@
-"""Other minima of χ²: where a fit's parameters may lie instead, and what they add to its stated covariance.
+"""Other minima of χ², and their contribution to a fit's covariance.
 
-An effect names other values that change the slow motion alike (`Effect.alike`). χ² may have a narrow minimum at any
-of them, as at every frequency of a rod's ringing, so that Gauss–Newton steps from one lead to no other.
+An effect names other values that change the slow motion alike (`Effect.alike`). χ² may have a narrow minimum
+at each of them, as at every frequency of a rod's ringing, so that Gauss–Newton steps do not lead from one to
+another.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 16  # points predicted at once: a campaign's predictions fill memory
-_REFITTED = 3  # of the best points, since linear theory cannot tell which is the deepest
+_REFITTED = 3  # of the best points, since linear theory does not show the deepest
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class _Elsewhere:
     Args:
         point: with the other parameters moved by linear theory.
         total: χ² there, by linear theory.
-        held: places of the common parameters that were not moved.
+        held: indices of the common parameters that were not moved.
     """
 
     point: Point
@@ -38,12 +39,12 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
     """The fit in the deepest of the minima that its effects name.
 
     Args:
-        fitted: a fit that may lie in another minimum.
-        tolerance: share of χ² by which a step must lower it for a fit to go on, as in `fit`.
+        fitted: a fit that may be in another minimum.
+        tolerance: share of χ² by which a step must lower it for a fit to continue, as in `fit`.
 
     Returns:
-        The fit of least χ². Its stated covariance includes the other minima, each by its likelihood, since the
-        deepest of many shallow minima is so by chance.
+        The fit of least χ². Its stated covariance includes the other minima, each by its likelihood, since
+        the deepest of many shallow minima may be so by chance.
     """
     found = _elsewhere(fitted)
     if not found:
@@ -83,7 +84,7 @@ def _elsewhere(fitted: Fit) -> list[_Elsewhere]:
 
 
 def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: list[int]) -> _Elsewhere:
-    """The point with the parameters that are not held moved, by the sensitivities of the fit."""
+    """The point with all parameters but the fixed ones moved, by the sensitivities of the fit."""
     jacobian = []
     for columns, own in fitted.jacobian:
         free = columns.copy()
@@ -99,9 +100,9 @@ def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: l
 
 
 def _with_spread(fitted: Fit, found: list[_Elsewhere]) -> Fit:
-    """The fit whose stated covariance includes how far likely other minima are away.
+    """The fit whose stated covariance includes the distance of other likely minima.
 
-    What χ² rises there as the curvature of the fit's own minimum says is in the covariance already.
+    The part of it that follows from the curvature of the fit's own minimum is already in the covariance.
     """
     std = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     weights, spread = [1.0], np.zeros_like(fitted.covariance)

@@ -14,18 +14,18 @@ from tunnel_sim.vocabulary.record import Array
 
 _STEPS = 6  # Gauss–Newton steps without a group
 _TRIES = 4  # dampings tried in a step
-_GAIN = 1e-4  # share of χ² that a step must save
-_RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
-_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
+_GAIN = 1e-4  # least drop of χ² in a step, as a share of it
+_RELEASE_STEPS = 4  # two are enough with slopes at nearly the same parameters
+_RELEASE_GAIN = 1e-6  # least drop of a run's χ² in a step, as a share of it
 
 
 def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
     """Fit only each run's own parameters: release and phases.
 
     Args:
-        start: common parameters, which are held, and releases to start from.
-        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
-            about the same parameters.
+        start: common parameters, which are fixed, and releases to start from.
+        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit
+            at nearly the same parameters.
 
     Returns:
         The point found, each run at its own best, and the scaled residuals there by run.
@@ -42,7 +42,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
             steps.append(np.linalg.lstsq(rows, values, rcond=1e-10)[0])
         trial = Point(best.common, best.release + np.stack(steps))
         moved = scaled_residuals(problem, trial)
-        with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
+        with np.errstate(invalid="ignore"):  # a diverging prediction is kept unchanged
             saved = problem.parameters.surprises(best) - problem.parameters.surprises(trial)
             gains = [float(r @ r - m @ m) + own for r, m, own in zip(residuals, moved, saved, strict=True)]
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
@@ -56,15 +56,15 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
 def fit_seen(
     whole: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str] = ()
 ) -> tuple[Point, list[Array]]:
-    """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
+    """Fit some of the blocks, with the sensitivities of the fit of all blocks.
 
     Args:
-        seen: by run the blocks to fit, shape (n,).
-        held: names of common parameters that stay as they are.
+        seen: the blocks to fit, by run, shape (n,).
+        held: names of common parameters to be kept fixed.
 
     Returns:
-        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
-        of a run that is not seen, stay as they were.
+        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own
+        parameters of a run without blocks to fit, are unchanged.
     """
     free = np.array(
         [whole.bound(name) is None and name not in held for name in whole.problem.names], np.float64

@@ -1,8 +1,8 @@
-"""The measured path of every run, the reading that a further moment along it would cause, and bases of moments.
+"""The measured path of every run, the response of the reading to a further moment along it, and bases of moments.
 
-The nominal model is linear, so that a missing moment m changes the reading by the response of the linear rig to
-m(t), however large the gap is, provided that m is evaluated along the true motion. The measured motion is close to
-it: the fitted motion and the smoothed residual together.
+The nominal model is linear, so a missing moment m changes the reading by the response of the linear rig to
+m(t), however large the gap, if m is evaluated along the true motion. The measured motion is close to it: the
+fitted motion plus the smoothed residual.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
 _WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
-_LARGE = 30.0  # noise variances of a block mean: of a residual beyond, the smoothing may take nothing
+_LARGE = 30.0  # noise variances of a block mean: larger residuals must not be smoothed away
 _ROWS = 24  # per cycle, to which white residuals are averaged: the motion has no more than its third harmonic
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One run as a law sees it; the fit's residuals are to be explained."""
+    """One run as the laws use it; the fit's residuals are to be explained."""
 
     fit: Fit
     index: int
@@ -45,7 +45,7 @@ class Path:
 
     @cached_property
     def time(self) -> Array:
-        """Time since the start of what is fitted, s, shape (n,)."""
+        """Time since the start of the fitted part, s, shape (n,)."""
         return np.asarray((np.arange(self.run.reading.size) + 0.5) * self.run.interval)
 
     @cached_property
@@ -61,10 +61,10 @@ class Path:
 
     @property
     def fitted(self) -> Places:
-        """The places of the fitted motion, in which no error of the reading is.
+        """The places of the fitted motion, free of errors of the reading.
 
-        Along the measured path an error in proportion to the angle would be the residual itself, whatever causes
-        it: what is not residual is the release's.
+        Along the measured path an error in proportion to the angle would be the residual itself, whatever its
+        cause: the release absorbs the rest.
         """
         angle, rate = self._fitted
         return Places(angle, rate, self.time, self.stiffness, self.speed)
@@ -103,12 +103,12 @@ class Path:
 
     @property
     def stiffness(self) -> float:
-        """Of the spring, stated or fitted where none is stated, N m/rad; the rig's at rest where no spring acts."""
+        """Stiffness of the spring, stated or fitted, N m/rad; that of the rig at rest without a spring."""
         return self._stated.spring_stiffness or float(linear_coefficients(self.fit, self.index)[2])
 
     @property
     def still_omega(self) -> float:
-        """√(Kr/Izz), rad/s, as the expressions of effects have it."""
+        """√(Kr/Izz), rad/s, as in the expressions of effects."""
         return float(np.sqrt(self.stiffness / self._stated.yaw_inertia))
 
     @cached_property
@@ -117,7 +117,7 @@ class Path:
         return self.fit.problem.stated(point.common, point.release[self.index], self.run)
 
     def _filter(self, interval: float) -> tuple[Array, Array]:
-        """Numerator and denominator of the reading's response to a moment that is linear in between."""
+        """Numerator and denominator of the reading's response to a moment that is linear between samples."""
         from scipy.signal import cont2discrete  # only here: slow to load
 
         numerator = np.array([1.0] + [0.0] * self.run.derivative)
@@ -126,7 +126,7 @@ class Path:
         return np.ravel(found[0]), found[1]
 
     def response(self, moment: Array) -> Array:
-        """What a moment, N m, shape (n, k), adds to the reading of the rig that was at rest, as `rows`."""
+        """Response of the reading, from rest, to a moment, N m, shape (n, k), as `rows`."""
         from scipy.signal import lfilter  # only here: slow to load
 
         run = self.run
@@ -145,19 +145,19 @@ class Path:
         return self.rows(self.run.scaled(reading))
 
     def rows(self, white: Array) -> Array:
-        """White residuals, shape (n, k) or (n,), averaged in whole groups to rows of the same noise."""
+        """White residuals, shape (n, k) or (n,), averaged in whole groups to rows of equal noise."""
         count = white.shape[0] // self.group
         grouped = white[: count * self.group].reshape(count, self.group, *white.shape[1:])
         return np.asarray(grouped.sum(axis=1) / np.sqrt(self.group))
 
     @cached_property
     def residual(self) -> Array:
-        """What is to be explained, shape (rows,)."""
+        """The residual to be explained, shape (rows,)."""
         return self.rows(self.fit.residuals[self.index])
 
     @cached_property
     def release(self) -> Array:
-        """Responses that the release and the run's own numbers absorb, orthonormal, shape (rows, own)."""
+        """Responses absorbed by the release and the run's own parameters, orthonormal, shape (rows, own)."""
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         roots = np.roots([inertia, damping, stiffness]).astype(complex)
         waves = np.exp(np.outer(self.time - self.time[0], roots))
@@ -171,8 +171,8 @@ class Path:
     def nominal(self) -> Array:
         """Responses to a step of the model's common parameters, shape (rows, common).
 
-        The moments of inertia, damping and air, which come first, are those along the measured path, so that they
-        hold however far the parameters move.
+        The moments of inertia, damping and air, which come first, are those along the measured path, so they
+        apply however far the parameters move.
         """
         data, run = self.fit.problem.data, self.run
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
@@ -200,12 +200,12 @@ def paths(fit: Fit) -> list[Path]:
 _FINE, _MEDIUM, _COARSE = 33, 15, 7  # splines over the range of the motion
 _SLOW = 16  # splines over the time of a run
 _PER_CYCLE = 6.0  # splines in time that follow a blow
-_SETTLED = 0.02  # of the greatest rate: within it, dry friction may be any moment
+_SETTLED = 0.02  # of the greatest rate: below it, dry friction may be any moment
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Some places at which a basis is evaluated, instead of along a `Path`.
+    """Points at which a basis is evaluated, in place of a `Path`.
 
     Args:
         angle: rad, shape (n,).
@@ -224,7 +224,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Ranges:
-    """What the runs visit.
+    """Ranges of the runs.
 
     Args:
         angle: greatest, rad.
@@ -263,7 +263,7 @@ def _splines(values: Array, low: float, high: float, count: int) -> Array:
 
 
 def _times(one: Array, other: Array) -> Array:
-    """All products of two sets of columns."""
+    """Products of each column of one set with each of the other."""
     return np.asarray((one[:, :, None] * other[:, None, :]).reshape(one.shape[0], -1))
 
 
@@ -272,7 +272,7 @@ Basis = Callable[[Motion, Ranges], Array]
 
 
 def _spring(at: Motion, r: Ranges) -> float:
-    """How far the run's spring is from the median, a share."""
+    """Deviation of the run's spring from the median, a share."""
     return at.stiffness / r.stiffness - 1.0
 
 
@@ -289,7 +289,7 @@ def _of_both(at: Motion, r: Ranges) -> Array:
 
 
 def _wide(values: Array, reach: float) -> Array:
-    """Wide splines, which a law uses before narrow ones: without them the prior would prefer a rough law."""
+    """Wide splines, which a law uses before narrow ones; without them the prior would favour rough laws."""
     found = [_splines(values, -reach, reach, count) * (_FINE / count) for count in (_MEDIUM, _COARSE)]
     return np.column_stack(found)
 
@@ -300,7 +300,7 @@ def _rate_shapes(at: Motion, r: Ranges) -> Array:
 
 
 def angle(at: Motion, r: Ranges) -> Array:
-    """Moments of the angle alone, the same for all springs or in proportion to the spring."""
+    """Moments of the angle alone, equal for all springs or in proportion to the spring."""
     wide = _wide(at.angle, r.angle)
     return np.column_stack([_of_angle(at, r, _FINE), wide, _spring(at, r) * wide])
 
@@ -318,7 +318,7 @@ def state(at: Motion, r: Ranges) -> Array:
 
 
 def wind(at: Motion, r: Ranges) -> Array:
-    """Moments of angle and rate in proportion to the dynamic pressure, or to the wind speed if of the rate."""
+    """Moments of angle and rate in proportion to the dynamic pressure; of the rate also to the wind speed."""
     share = at.speed / r.speed
     still = [
         share * _of_angle(at, r, _FINE),
@@ -329,7 +329,7 @@ def wind(at: Motion, r: Ranges) -> Array:
 
 
 def time(at: Motion, r: Ranges) -> Array:
-    """Moments that change in time, alike in all runs: alone, as a stiffness, damping or friction."""
+    """Moments that vary in time, alike in all runs: alone, or as a stiffness, damping or friction."""
     slow = _splines(at.time, 0.0, r.time, _SLOW)
     fine = _splines(at.time, 0.0, r.time, max(4, round(_PER_CYCLE * r.time / r.cycle)))
     stiffness = at.angle / r.angle * np.array([[1.0], [_spring(at, r)], [(at.speed / r.speed) ** 2]])
@@ -350,28 +350,28 @@ def reading(at: Motion, r: Ranges) -> Array:
 
 
 def event(at: Motion, r: Ranges) -> Array:
-    """Moments that change in time, different in every run."""
+    """Moments that vary in time, different from run to run."""
     first, last = float(at.time[0]), float(at.time[-1])
     return _splines(at.time, first, last, max(4, round(_PER_CYCLE * (last - first) / r.cycle)))
 
 
 def between(at: Motion, r: Ranges) -> Array:
-    """A steady moment, stiffness and damping of its own in every run."""
+    """A steady moment, stiffness and damping that differ from run to run."""
     return np.column_stack([np.ones(at.angle.size), at.angle / r.angle, at.rate / r.rate])
 
 
 def wander(at: Motion, r: Ranges) -> Array:
-    """A zero of the reading that wanders or jumps, different in every run: steps, whose sum is a random walk."""
+    """A zero of the reading that wanders or jumps, different from run to run: steps, whose sum is a random walk."""
     knots = np.linspace(at.time[0], at.time[-1], max(4, round(_PER_CYCLE * r.time / r.cycle)))[1:-1]
     return np.asarray((at.time[:, None] > knots[None, :]).astype(np.float64))
 
 
-#: Kinds whose law holds in every run, so that it predicts a run left out; the simpler first.
+#: Kinds whose law is common to all runs, so that it predicts a held-out run; simpler kinds first.
 COMMON: Mapping[str, Basis] = {
     "angle": angle, "rate": rate, "wind": wind, "state": state, "time": time, "reading": reading,
 }  # fmt: skip
 
-#: Kinds that are different in every run, so that only short gaps in it can be predicted.
+#: Kinds that differ from run to run, so that only short gaps in a run can be predicted.
 SINGLE: Mapping[str, Basis] = {"between": between, "wander": wander, "event": event}
 
 #: Kinds that are errors of the reading; the others are moments.

@@ -1,4 +1,4 @@
-"""Effects with numbers of their own in every run, found in the residuals: phases, and instants of skips."""
+"""Effects with their own parameters in every run, found in the residuals: phases, and instants of skips."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from tunnel_sim.vocabulary.record import Array
 _RINGING_PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
-_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the one common time found
+_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the common time
 _EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or distinguished from the release
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualsOf:
-    """The residuals of a fit, as effects search them (`tunnel_sim.effects.evidence.Residuals`)."""
+    """The residuals of a fit, searched by effects (`tunnel_sim.effects.evidence.Residuals`)."""
 
     fit: Fit
 
@@ -35,7 +35,7 @@ class ResidualsOf:
 
         Args:
             least: frequency times size over wind speed, dimensionless.
-            greatest: likewise.
+            greatest: upper bound of the same ratio, dimensionless.
         """
         return _of_line(wind_line(self.fit, least, greatest, size))
 
@@ -61,10 +61,10 @@ def ringing(fit: Fit) -> Sought | None:
 
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
-        frequency is left beside the motion's own.
+        frequency is distinct from the motion.
 
-    Where a frequency is that of a run's own motion, or a multiple of it, that run does not count. At least half of
-    them must: springs and winds differ, and a line that is near the motion of one run is beside that of another.
+    A run does not count where the frequency is that of its own motion, or a multiple. At least half of the
+    runs must count: springs and winds differ, so a line near the motion of one run is distinct in another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
@@ -110,11 +110,11 @@ _APART = 0.02  # frequencies tried, relative: within the half-power width of the
 
 
 def excited(fit: Fit) -> Sought | None:
-    """The strongest oscillation beside the motion that the input excites from rest, the same in all runs.
+    """The strongest oscillation, distinct from the motion, that the input excites from rest, common to all runs.
 
     Returns:
-        Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which do nothing in driven
-        runs; None where no run on a spring is driven, or no frequency is left beside the motion's own.
+        Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which are unused in
+        driven runs; None where no run on a spring is driven, or no frequency is distinct from the motion.
     """
     runs, parts, own = fit.problem.data.runs, [], []
     for number, run in enumerate(runs):
@@ -156,22 +156,22 @@ def skip(fit: Fit, *, with_input: bool = False) -> Sought | None:
     """The instants at which the runs jump ahead by one common time.
 
     Args:
-        with_input: whether the input of driven runs jumps too, so that only their state changes at once; else their
-            reading is that of a later time from there on, as in free decays.
+        with_input: whether the input of driven runs jumps too, so that only their state changes at once; else
+            the reading is late from there on, as in free decays.
 
     Returns:
-        The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough, or
-        none has an input that could jump.
+        The time lost (s) with every run's instants, as many as χ² supports; None where no run is long enough,
+        or none has an input that could jump.
     """
     data = fit.problem.data
     runs = [_Skipping(fit, number, with_input=with_input) for number in range(len(data.runs))]
     if any(run.left.size < 4 * _EDGE for run in runs) or (with_input and not data.driven):
         return None
     found = []
-    for count in range(1, _MOST_SKIPS + 1):  # so many skips in every run, all of one time
+    for count in range(1, _MOST_SKIPS + 1):  # number of skips in every run, all of one time
         steps, lost = [run.steps(count) for run in runs], 0.0
         for number in range(_ROUNDS):
-            if number > 0:  # two skips close together were one of twice the time, and another one of nothing
+            if number > 0:  # two skips close together are one of twice the time and an empty one
                 steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
             times, weights = (
                 np.array([[getattr(step, name) for step in of_run] for of_run in steps])
@@ -197,15 +197,15 @@ class _Skip:
 
 
 class _Skipping:
-    """One run, in which skips are sought by linear theory.
+    """Search for skips in one run, by linear theory.
 
-    What a second lost at block k adds to the reading of a later block t is a sum over j of a_j(k) b_j(t) z_j^(t−k):
+    A second lost at block k adds to the reading of a later block t a sum over j of a_j(k) b_j(t) z_j^(t−k):
 
-    - The rate of the motion at t, where the reading alone jumps, and in free decays.
-    - The free motion that begins with the rate and the acceleration at k, where the input jumps too.
+    - where the reading alone jumps, and in free decays: the rate of the motion at t;
+    - where the input jumps too: the free motion that begins with the rate and the acceleration at k.
 
-    The residual changes by what the whitening filter makes of that. What the run's own sensitivities absorb is
-    taken out for all k at once by sums from the end.
+    The residual changes by that sum after the whitening filter. The part absorbed by the run's own
+    sensitivities is removed for all k at once by sums from the end.
     """
 
     def __init__(self, fit: Fit, number: int, *, with_input: bool) -> None:
@@ -230,11 +230,11 @@ class _Skipping:
         self.weight = np.maximum(power, 1e-9 * float(np.sum((self.scale * rate) ** 2)))
 
     def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
-        """The skips that leave least, each sought again beside the others.
+        """The skips of least residual, each sought again beside the others.
 
         Args:
-            found: where the search starts; None starts without any.
-            time: lost at every skip, s; None for a time of its own at each.
+            found: where the search starts; None: without any.
+            time: lost at every skip, s; None: each skip has its own.
         """
         found = list(found or [])
         inside = slice(_EDGE, self.left.size - _EDGE)
@@ -251,7 +251,7 @@ class _Skipping:
         return found
 
     def drop(self, steps: list[_Skip], time: float) -> float:
-        """Of χ² by skips of one time (s)."""
+        """Drop of χ² by skips of one time (s)."""
         left = self.left - self._change([(step, time) for step in steps])
         return float(self.left @ self.left - left @ left)
 
@@ -269,7 +269,7 @@ class _Skipping:
         return self._unabsorbed(self.run.scaled(added))
 
     def _seen(self, whitened: Array) -> Array:
-        """Products of what a second lost at every block adds with values that the filter's transpose changed."""
+        """Products of the change by a second lost at every block with values after the transposed filter."""
         columns = whitened.reshape(len(whitened), -1)
         found = sum(
             (a[:, None] * _after((b * self.scale)[:, None] * columns, z)).real for a, b, z in self.terms
@@ -277,7 +277,7 @@ class _Skipping:
         return np.asarray(found, np.float64).reshape(whitened.shape)
 
     def _powers(self) -> Array:
-        """Powers of what a second lost at every block adds."""
+        """Powers of the change by a second lost at every block."""
         if len(self.terms) == 1:
             # the sum from any value to the last is the power of the whitened slope from there on
             return self.run.noise.powers_onward(np.real(self.terms[0][1] * self.scale))
@@ -297,7 +297,7 @@ class _Skipping:
 
 
 def _after(values: np.ndarray, factor: complex = 1.0) -> np.ndarray:
-    """Sums from each block to the last, every later block times one more power of a factor."""
+    """Sums from each block to the last, each later block multiplied by one more power of a factor."""
     if factor == 1.0:
         return np.cumsum(values[::-1], axis=0)[::-1]
     from scipy.signal import lfilter  # only here: slow to load

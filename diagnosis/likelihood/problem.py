@@ -24,16 +24,16 @@ _BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted: prepared runs, and the effects added to the nominal model.
+    """A fit to be made: prepared runs, and the effects added to the nominal model.
 
     Args:
         effects: effect classes whose parameters are free.
-        fixed: value of effect parameters that are held, as ``effect.parameter``.
-        free_forms: form parameters that are free, as ``effect.parameter``; the others keep the textbook form.
-        instants: how many instants every run has for an effect that skips samples.
-        scatter: chance differences between runs beside the effects; each run has a deviation of its own of each.
-        rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
-            motion, which is much faster and exact as far as the rig is linear.
+        fixed: values of fixed effect parameters, as ``effect.parameter``.
+        free_forms: free form parameters, as ``effect.parameter``; the others keep the textbook form.
+        instants: number of instants in every run for an effect that skips samples.
+        scatter: chance differences between runs beside the effects; each run has its own deviation of each.
+        rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the
+            slow motion, which is much faster and exact for a linear rig.
     """
 
     data: Data
@@ -91,7 +91,7 @@ class Problem:
         return self.data.model.held.get("zero", 0.0)
 
     def _values(self, common: Array, own: Array) -> dict[str, float]:
-        """Values of all parameters in one run by name, those held among them; arguments as in `zero`."""
+        """Values of all parameters in one run by name, fixed ones included; arguments as in `zero`."""
         names, own_names = self.parameters.names, self.parameters.own_names
         fitted = dict(zip(names, common.tolist(), strict=True))
         return {**self.data.model.held, **fitted, **dict(zip(own_names, own.tolist(), strict=False))}
@@ -120,7 +120,7 @@ class Problem:
     def chain(
         self, common: Array, own: Array, run: RunData, effects: tuple[Effect, ...] | None = None
     ) -> EffectChain:
-        """The effects of one run, with the phases and instants that it has.
+        """The effects of one run, with its phases and instants.
 
         Args:
             common: as in `Point`, shape (common,).
@@ -139,8 +139,8 @@ class Problem:
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.
 
-        In rad; infinite where the motion grows without bound, or a parameter is not finite or an initial state
-        beyond any motion.
+        In rad; infinite where the motion diverges, a parameter is not finite, or an initial state is beyond
+        any motion.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
         places = [
@@ -158,8 +158,7 @@ class Problem:
     def asked(self, points: Sequence[Point], places: Sequence[tuple[int, int]]) -> Asked:
         """The runs to be predicted, with their physics.
 
-        They are in the shorter blocks that theirs were made of where a reading is not that of the angle, or the rod
-        rings.
+        They are in their original, shorter blocks where the reading is not the angle, or the rod rings.
 
         Args:
             places: of the points and the runs.
@@ -192,7 +191,7 @@ class Problem:
         return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.rod_followed)
 
     def _columns(self, common: Array, own: Array) -> dict[str, Array]:
-        """Values of all parameters in several runs by name, those held among them, shape (runs,) each.
+        """Values of all parameters in several runs by name, fixed ones included, shape (runs,) each.
 
         Args:
             common: shape (runs, common).
@@ -203,7 +202,7 @@ class Problem:
         return values | dict(zip(self.parameters.own_names, own.T, strict=False))
 
     def linear(self, point: Point) -> Array:
-        """Of every run inertia, damping and stiffness, as in `Fit.linear`, shape (runs, 3)."""
+        """Inertia, damping and stiffness of every run, as in `Fit.linear`, shape (runs, 3)."""
         runs = self.data.runs
         values = self._columns(np.tile(point.common, (len(runs), 1)), point.release[: len(runs)])
         stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
@@ -215,7 +214,7 @@ class Problem:
         return np.stack([stated["yaw_inertia"], damping, stiffness], axis=1)
 
     def _drawn(self, own: Array) -> list[tuple[Drawn, ...]]:
-        """What the effects of several runs drew, by run.
+        """Random draws of the effects in several runs, by run.
 
         Args:
             own: the runs' own parameters, rows of ``Point.release``, shape (runs, own).

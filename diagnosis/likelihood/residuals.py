@@ -1,9 +1,9 @@
-"""What residuals hold: spectral lines, and the misfit by channel.
+"""Spectral lines of residuals, and the misfit by channel.
 
-An error in the damping changes the amplitude of the motion, and one in the stiffness its phase. So in every cycle
-the residual is split into its part along the motion, its part along the rate, its mean, and the rest; what changes
-in proportion to time over a run is a damping or a frequency of the run's own. An error of the frequency makes χ²
-large, because phases add up: apart, it does not hide a cause in the damping, nor the other way round.
+A damping error changes the amplitude of the motion, and a stiffness error its phase. In every cycle the
+residual is therefore split into its part along the motion, its part along the rate, its mean, and the rest; a
+part that grows linearly over a run is a damping or a frequency specific to the run. A frequency error makes
+χ² large, because phases add up: in a separate channel it does not hide a cause in the damping.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Line:
 
 
 def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:
-    """`residual_spectra` with a Hann window, whose leakage from the motion does not reach the mains."""
+    """`residual_spectra` with a Hann window, so that leakage from the motion does not reach the mains."""
     found, step = [], _PADDING
     for spectrum in residual_spectra(fit):
         values = spectrum.transform
@@ -108,7 +108,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None
 
     Args:
         least: frequency times size over wind speed, dimensionless; a Strouhal number where the size is the width.
-        greatest: likewise.
+        greatest: upper bound of the same ratio, dimensionless.
         size: ``width`` or ``length`` of the body.
 
     Returns:
@@ -172,7 +172,7 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
 
 
 CHANNELS = ("damping", "frequency", "damping of runs", "frequency of runs", "zero", "harmonics")
-"""In this order everywhere."""
+"""The order of the channels in all arrays."""
 
 _LEAST = 4  # samples in a cycle
 _SINGULAR = 1e-14  # relative: columns that are the same but for rounding
@@ -180,15 +180,16 @@ _SINGULAR = 1e-14  # relative: columns that are the same but for rounding
 
 @dataclass(frozen=True, eq=False)
 class ChannelMisfit:
-    """What residuals hold by channel.
+    """Misfit of residuals by channel.
 
     Args:
         chi2: by channel, shape (6,), dimensionless.
-        count: of independent values by channel, which is what noise alone gives, shape (6,).
-        motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
-        scatter_cost: −2 ln of the evidence of chance differences between runs that it takes, dimensionless; 0 where
+        count: expected χ² of noise alone: independent values by channel, shape (6,).
+        motion: sum of squares of the readings about their means in every cycle, in noise variances,
+            dimensionless.
+        scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless; 0 where
             they repeat.
-        known: how well the runs show these differences, as `Between.cost` has it, shape (runs, kinds, kinds).
+        known: precision of these differences, as in `Between.cost`, shape (runs, kinds, kinds).
         repeats: whether the runs of the fit repeat exactly.
     """
 
@@ -206,10 +207,10 @@ class ChannelMisfit:
 
 
 def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
-    """What a fit leaves, by channel.
+    """Misfit of a fit, by channel.
 
     Args:
-        residuals: scaled, by run, where they are not those of the fit, each of shape (n,).
+        residuals: scaled, by run, each of shape (n,); None: those of the fit.
     """
     given = fit.residuals if residuals is None else residuals
     chi2 = [run.channels(left) for run, left in zip(_cycles(fit), given, strict=True)]
@@ -223,19 +224,19 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
 
 
 def gap_left(fit: Fit) -> ChannelMisfit:
-    """What sets are weighed against: what a fit leaves, with the cost of chance differences between its runs."""
+    """The reference of the weights: a fit's misfit, with the cost of chance differences between its runs."""
     if not fit.problem.scatter:
         return misfit(fit)
     known = fit.columns.products.own
     return dataclasses.replace(misfit(fit), scatter_cost=fit.scatter_cost(known), known=known)
 
 
-#: Of every fit that is still in use. They depend on it alone, and its residuals are split many times.
+#: Cached per fit: they depend on the fit alone, and its residuals are split many times.
 _KNOWN_CYCLES: WeakKeyDictionary[Fit, list[_Cycles]] = WeakKeyDictionary()
 
 
 def _cycles(fit: Fit) -> list[_Cycles]:
-    """What the channels of every run's residuals are counted in."""
+    """The cycles of every run, in which the channels are computed."""
     if fit not in _KNOWN_CYCLES:
         _KNOWN_CYCLES[fit] = [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
     return _KNOWN_CYCLES[fit]
@@ -249,7 +250,7 @@ class _Cycles:
         starts: of the cycles, in blocks, shape (cycles,).
         sizes: of the cycles, in blocks, shape (cycles,).
         along: the motion about its mean in every cycle, in noise standard deviations, shape (n,).
-        slope: its derivative, without what is along the motion, shape (n,).
+        slope: derivative of the motion, orthogonal to ``along``, shape (n,).
         along_power: sum of the squares of ``along`` in every cycle, shape (cycles,).
         slope_power: sum of the squares of ``slope`` in every cycle, shape (cycles,).
         power: sum of squares of the readings about their means in every cycle.
@@ -265,7 +266,7 @@ class _Cycles:
 
     @classmethod
     def of(cls, fit: Fit, index: int) -> _Cycles:
-        """Those of a run in a fit."""
+        """The cycles of one run of a fit."""
         run = fit.problem.data.runs[index]
         reading = run.scaled(run.reading - fit.zero(index))
         motion = reading - fit.residuals[index]
@@ -282,7 +283,7 @@ class _Cycles:
 
     @cached_property
     def count(self) -> list[int]:
-        """Of independent values by channel."""
+        """Number of independent values by channel."""
         cycles, lines = self.starts.size, min(self.starts.size, 2)
         return [cycles - lines, cycles - lines, lines, lines, cycles, self.along.size - 3 * cycles]
 

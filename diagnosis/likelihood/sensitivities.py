@@ -1,4 +1,4 @@
-"""Sensitivities of the scaled prediction: exact in the motion, by finite differences where it has no derivative."""
+"""Sensitivities of the scaled prediction: exact in the motion, finite differences where it has no derivative."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sensitivities(
             prediction, *predictions = problem.predict([point, *moved])
         else:
             predictions = problem.predict(moved)
-        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+        with np.errstate(invalid="ignore"):  # a run that diverged; the caller checks for it
             for place, values in zip(lost, predictions, strict=True):
                 for change, here, there in zip(found, prediction, values, strict=True):
                     change[place] = there - here
@@ -63,7 +63,7 @@ def moves(problem: Problem, point: Point, known: int = 0, known_own: int = 0) ->
 
     Args:
         known: the first so many common parameters are left out.
-        known_own: of every run's own, likewise.
+        known_own: the first so many of every run's own parameters are left out.
 
     Returns:
         The points, and their steps by run, in the parameters' units, shape (points, runs).

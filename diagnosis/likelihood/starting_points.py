@@ -1,4 +1,4 @@
-"""Where fits start: the nominal model from the records alone, and an effect's severity from its signature."""
+"""Starting points of fits: the nominal model from the records alone, an effect's severity from its signature."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
-_HELD = 1e18  # precision of deviations that stay as they are
-_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of what the fit leaves
-_NEARER = 0.02  # of the size that linear theory gives an effect
+_HELD = 1e18  # precision of fixed deviations
+_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
+_NEARER = 0.02  # share of an effect's size by linear theory
 
 
 def nominal_start(data: Data) -> Point:
@@ -32,7 +32,7 @@ def nominal_start(data: Data) -> Point:
 
 
 def nominal_starts(data: Data) -> Iterator[Point]:
-    """The starting points of the nominal model; the second where the fit from the first misses the motion."""
+    """The starting points of the nominal model; the second for a fit that misses the motion from the first."""
     parameters = Problem(data).parameters
     for start in data.model.starts(data):
         yield parameters.point(start.common, start.own)
@@ -40,14 +40,14 @@ def nominal_starts(data: Data) -> Iterator[Point]:
 
 @dataclass(frozen=True, eq=False)
 class StartingPoint:
-    """Where the fit of an effect starts, and how much linear theory predicts that it closes.
+    """Start of an effect's fit, with the improvement predicted by linear theory.
 
     Args:
         problem: the fit with the effect added.
         point: where to start.
         predicted_drop: of χ² by linear theory, dimensionless.
-        predicted: χ² beyond noise that linear theory leaves by channel, shape (6,), dimensionless.
-        scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
+        predicted: χ² beyond noise by channel that linear theory predicts, shape (6,), dimensionless.
+        scaled: index of the common parameter scaled by linear theory; None: there is none.
         second_order: whether the other parameters absorb the first order of the effect.
         scatter_cost: −2 ln of the evidence of chance differences between the runs by linear theory, dimensionless.
     """
@@ -61,9 +61,9 @@ class StartingPoint:
     scatter_cost: float = 0.0
 
     def nearer(self) -> StartingPoint | None:
-        """The point with much less of the effect; None where linear theory did not say how much.
+        """The point with much less of the effect; None where linear theory did not scale it.
 
-        A fit from there goes down from the fit without the effect.
+        A fit from there cannot end worse than the fit without the effect.
         """
         if self.scaled is None:
             return None
@@ -73,9 +73,9 @@ class StartingPoint:
 
 
 def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
-    """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
+    """Starting points for adding one effect to a fitted problem, by predicted drop of χ², greatest first.
 
-    One per trial; none where the effect cannot be seen in these runs.
+    One per trial; none where the runs cannot show the effect.
     """
     data = base.problem.data
     if not _may_show(data, kind):
@@ -89,12 +89,12 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 
 def _may_show(data: Data, kind: type[Effect]) -> bool:
-    """Whether the runs have the wind, or the input, that an effect needs."""
+    """Whether the runs have the wind or the input that an effect needs."""
     return (kind.condition != "wind_on" or data.wind_on) and (not kind.driven or data.driven)
 
 
 def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint:
-    """An effect with a phase or instants in every run, as it was found in the residuals."""
+    """An effect with a phase or instants in every run, as found in the residuals."""
     of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
     fixed = (*base.problem.fixed, *(of_input if base.problem.data.driven else ()))
     instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
@@ -116,9 +116,9 @@ class _TrialChange:
 
     Args:
         problem: the fit with the effect added.
-        own: its free parameters, of which ``sizes`` has the values, shape (own,).
-        scaled: place among them of the one that is scaled; None: none is.
-        replaced: place of the common parameter that the effect replaces; None: it replaces none.
+        own: its free parameters, with the values ``sizes``, shape (own,).
+        scaled: index of the scaled one among them; None: there is none.
+        replaced: index of the common parameter that the effect replaces; None: there is none.
         change: of the scaled prediction, by run, shape (n,).
     """
 
@@ -131,7 +131,7 @@ class _TrialChange:
 
 
 def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | None:
-    """A trial at a moderate size; None where it changes the prediction without bound, or may not be so large."""
+    """A trial at a moderate size; None where the prediction diverges or the size is not allowed."""
     problem = _tried(base, kind, trial)
     own = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
@@ -145,12 +145,12 @@ def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | Non
 
 
 def _within(infos: Sequence[ParameterInfo], values: Array) -> bool:
-    """Whether parameters may have such values: of an arm that turns over the top an effect may want others."""
+    """Whether parameters are within their bounds: for an arm that turns over the top an effect may exceed them."""
     return all(info.lower <= value <= info.upper for info, value in zip(infos, values, strict=True))
 
 
 def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
-    """What an effect without numbers of its own in every run changes at moderate sizes, one for each trial.
+    """Changes by an effect without parameters per run, at moderate sizes, one for each trial.
 
     Returns:
         Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
@@ -165,7 +165,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
 
 
 def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
-    """An effect of the size that closes most by linear theory; None where it changes nothing that counts."""
+    """An effect at its best size by linear theory; None where its change is negligible."""
     tried = _moderate(base, kind, trial)
     if tried is None:
         return None
@@ -201,13 +201,13 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
 
 @dataclass(frozen=True, eq=False)
 class _Added:
-    """What a change of the prediction closes by linear theory, at its best size.
+    """A change of the prediction added by linear theory at its best size.
 
     Args:
-        slope: that size, in the change.
+        slope: the best size, as a multiple of the change.
         drop: of −2 ln L, dimensionless.
         left: residuals, scaled, by run.
-        scatter: chance differences between the runs, with their likeliest widths beside it.
+        scatter: chance differences between the runs, with their likeliest widths beside the change.
         scatter_cost: −2 ln of their evidence, dimensionless.
     """
 
@@ -232,7 +232,7 @@ def _added(base: Fit, change: list[Array]) -> _Added | None:
 
 
 def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _Added | None:
-    """The same where the runs differ by chance: with a further cause, they may differ by less."""
+    """A change added to a fit whose runs differ by chance: with a further cause, they may differ less."""
     if not all(np.all(np.isfinite(one)) for one in change):
         return None
     columns, size = base.columns.with_column(change)
@@ -247,7 +247,7 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
 
 
 def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
-    """A problem with one more effect, with what a trial holds and frees."""
+    """A problem with one more effect, with the parameters that a trial fixes and frees."""
     spring = kind.chosen_spring()
     held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
@@ -258,7 +258,7 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
 
 
 def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
-    """An effect whose first order is absorbed at the sizes of its trials, whether or not the readings ask for it.
+    """Starts of an effect whose first order is absorbed, at the sizes of its trials, whatever the readings.
 
     Empty for other effects, and where the runs cannot show it.
     """
@@ -279,8 +279,8 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 def misses_motion(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
-    Its residual then holds more than a given share of the power of the readings, both about their means in every
-    cycle. A drift or a step of the zero is slower than the motion and leaves its phase known.
+    It does where the residual exceeds a given share of the power of the readings, both about their means in
+    every cycle. A drift or a step of the zero is slower than the motion and does not affect its phase.
     """
     found = misfit(fit)
     at_motion = float(found.chi2.sum()) - float(found.chi2[CHANNELS.index("zero")])
@@ -288,7 +288,7 @@ def misses_motion(fit: Fit) -> bool:
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
-    """Those parameters of an effect that are free in a problem."""
+    """The parameters of an effect that are free in a problem."""
     return [info for info in kind.parameters() if f"{kind.name}.{info.name}" in problem.names]
 
 
@@ -298,7 +298,7 @@ def _circumstances(base: Fit) -> Circumstances:
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
     moment, rate = 0.0, 0.0
     for run, own in zip(data.runs, base.point.release, strict=True):
-        if run.drive is not None and run.drive.on_body:
+        if run.drive is not None and run.drive.through_actuator:
             drive = base.problem.stated(base.point.common, own, run).drive
             assert drive is not None
             own_moment, own_rate = drive.greatest
@@ -307,7 +307,7 @@ def _circumstances(base: Fit) -> Circumstances:
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
-    """Common parameters with those of an effect; ``replaced`` is the place of the one that it replaces."""
+    """Common parameters with those of an effect; ``replaced`` is the index of the one that it replaces."""
     common = base.point.common.copy()
     if scaled is not None and replaced is not None:
         common[replaced] -= values[scaled]
@@ -315,9 +315,9 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
 
 
 def absorbed(base: Fit, change: Sequence[Array]) -> Point:
-    """Where the parameters of a fit go to absorb a change of the scaled prediction, by one Gauss–Newton step."""
+    """The point at which a fit's parameters absorb a change of the scaled prediction, by one Gauss–Newton step."""
     products = base.products
-    if base.problem.scatter:  # which may be chance beside what is absorbed
+    if base.problem.scatter:  # chance differences may contribute to the absorbed change
         precision = base.problem.parameters.precision
         products = Products.of(base.jacobian, np.where(precision > 0.0, _HELD, 0.0))
     return damped_step(
@@ -342,10 +342,10 @@ def _moderate_change(
 ) -> list[Array] | None:
     """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
-    ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
-    place of the one that is lowered, None where none may be, and ``replaced`` that of the one that it replaces.
-    Where the runs differ by chance, it is small: the square of an error of the phase is one of the amplitude, and
-    would tell an effect from such differences. An effect of ``second_order`` shows by that square alone.
+    ``values`` has the effect's parameters and is changed in place to those used; ``scaled`` is the index of
+    the one to lower, None for none, and ``replaced`` that of the common parameter that it replaces. Where the
+    runs differ by chance the change is small: the square of a phase error is an amplitude error, which would
+    separate an effect from such differences. An effect of ``second_order`` shows by that square alone.
     """
     limit = (_SMALL if base.problem.scatter and not second_order else _MODERATE) * np.sqrt(base.total)
     for _ in range(12):
@@ -362,7 +362,7 @@ def _moderate_change(
 
 
 def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
-    """What an effect of typical size changes that the fitted parameters cannot absorb.
+    """The change by an effect of typical size that the fitted parameters cannot absorb.
 
     Args:
         kind: an effect without numbers of its own in every run.

@@ -89,12 +89,13 @@ def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
     moment = DriveMoment(
         record.time_s - record.time_s[0] + begun,
         run.drive.values,
-        scale=1.0 if run.drive.gain is None else run.drive.gain,
+        scale=run.drive.kind.scale * (1.0 if run.drive.gain is None else run.drive.gain),
         delay=-model.lead,
         held=run.drive.held,
         on_body=run.drive.on_body,
+        by_actuator=run.drive.kind.by_actuator,
     )
-    return dataclasses.replace(data, drive=moment, gain_free=model.fits_gain(run.drive))
+    return dataclasses.replace(data, drive=moment, multiplied_by=model.multiplied_by(run.drive))
 
 
 def without_start(data: Data) -> Data:

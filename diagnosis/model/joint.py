@@ -300,8 +300,8 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     """
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
-    by_actuator = ("drive", "command_rad")
-    controlled = any(run.drive is not None and run.drive.column in by_actuator for run in campaign.runs)
+    by_control = ("drive", "command_rad")
+    controlled = any(run.drive is not None and run.drive.column in by_control for run in campaign.runs)
     if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
@@ -364,6 +364,10 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
     if drive.column == "base_rad":
         what, remedy = "the joint of a model has no root that moves", "name the input moment_nm or drive"
         raise TunnelError(f"{what}, and the input is base_rad", where=where, remedy=remedy)
+    if drive.kind.of_base:
+        what = f"the base of a model's joint stands still, and the input is {drive.column}"
+        remedy = "diagnose without the model, or record the moment of the base's motion as moment_nm"
+        raise TunnelError(what, where=where, remedy=remedy)
     if drive.column == "moment_nm":
         return drive
     if actuator is None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.model.parameters import Parameter, released
+from diagnosis.model.parameters import GAIN, Parameter, released
 from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -91,17 +91,25 @@ class NominalModel:
     def among(self, runs: Sequence[RunData]) -> NominalModel:
         """The model of some runs by themselves, without the parameters that these runs do not have."""
         return dataclasses.replace(
-            self, windy=any(run.wind_on for run in runs), unknown_gain=any(run.gain_free for run in runs)
+            self,
+            windy=any(run.wind_on for run in runs),
+            unknown_gain=any(run.multiplied_by == GAIN for run in runs),
         )
 
     def fits_gain(self, drive: Drive) -> bool:
         """Whether the gain of an input is fitted.
 
         Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's
-        root acts by the spring's stiffness.
+        root acts by the spring's stiffness, and the rotation of the base by the inertia.
         """
-        known = drive.column != "drive" or drive.gain is not None
-        return drive.on_body and (self.per_inertia or not known)
+        return self.multiplied_by(drive) == GAIN
+
+    def multiplied_by(self, drive: Drive) -> str:
+        """The parameter that multiplies the moment of an input as the run states it; empty: none."""
+        kind = drive.kind
+        if kind.by_inertia:
+            return "" if self.per_inertia else "yaw_inertia"
+        return GAIN if drive.on_body and (self.per_inertia or not drive.gain_stated) else ""
 
     def refuse(self, campaign: Campaign) -> None:
         """Refuse runs that it cannot describe.
@@ -174,7 +182,7 @@ class NominalModel:
             return ()
         inputs = [float(np.max(np.abs(run.drive.values))) for run in data.runs if run.drive is not None]
         size = 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0)
-        return (Parameter("drive_gain", "N m", size=size),)
+        return (Parameter(GAIN, "N m", size=size),)
 
     def offset(self, data: Data) -> tuple[Parameter, ...]:
         """The sensor's zero, where the runs have one in common."""
@@ -223,7 +231,7 @@ class NominalModel:
             if self.moment:
                 table.program[place] = _program(self.moment, spring[place])
             if run.drive is not None:
-                gain, offset = row.get("drive_gain", 1.0), row.get("moment_offset", 0.0)
+                gain, offset = row.get(run.multiplied_by, 1.0), row.get("moment_offset", 0.0)
                 table.drive[place] = run.moment(gain, offset)
         return table
 

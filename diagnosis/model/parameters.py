@@ -14,6 +14,8 @@ from tunnel_sim.vocabulary.record import Array
 #: Step of one-sided differences, in a parameter's size. It gives the derivative to 3e-6 and better: the curvature
 #: of a phase over many cycles dominates for longer steps (3e-4 at 1e-5), rounding for shorter ones (1e-4 at 1e-9).
 _RELATIVE_STEP = 1e-7
+#: Name of the parameter that is the gain of an input.
+GAIN = "drive_gain"
 
 #: Whether the runs share a parameter, or each of them has its own.
 Owner = Literal["common", "per_run"]

@@ -133,8 +133,8 @@ class PerInertia(Rig):
         Raises:
             TunnelError: for the campaign.
         """
-        on_body = [run.drive for run in campaign.runs if run.drive is not None and run.drive.on_body]
-        mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
+        fitted = [run.drive for run in campaign.runs if run.drive is not None and self.fits_gain(run.drive)]
+        mixed = {drive.gain_stated for drive in fitted}
         if len(mixed) > 1:
             raise TunnelError(
                 "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",

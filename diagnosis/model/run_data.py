@@ -112,7 +112,7 @@ class RunData:
             follow from it.
         samples: where they are, if they are not evenly spaced.
         drive: the moment of a driven run, its times since the start of the record; None of a free decay.
-        gain_free: whether the common gain multiplies that moment.
+        multiplied_by: name of the parameter that multiplies that moment; empty: none.
         stretch_of: id of the run that this is a stretch of; None of a whole run.
         merges: how many shorter blocks each block was made of.
         shorter: the means of these, rad, shape (merges · n,); None where ``merges`` is 1.
@@ -131,7 +131,7 @@ class RunData:
     derivative: int = 0
     samples: Samples | None = None
     drive: DriveMoment | None = None
-    gain_free: bool = False
+    multiplied_by: str = ""
     stretch_of: str | None = None
     merges: int = 1
     shorter: Array | None = field(default=None, repr=False)
@@ -178,12 +178,13 @@ class RunData:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
-            gain: of an input whose gain is not known, N m per unit of the input; of others it does not matter.
+            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; where none does it
+                does not matter.
             offset: a constant moment beside the input, N m; 0 where that of the input is 0 throughout.
         """
         if self.drive is None:
             return None
-        scale = self.drive.scale * (gain if self.gain_free else 1.0)
+        scale = self.drive.scale * (gain if self.multiplied_by else 1.0)
         end = self.start + (self.reading.size + 1) * self.interval
         first, last = np.searchsorted(self.drive.time_s, (self.start, end))
         seen = slice(max(int(first) - 1, 0), int(last) + 2)
@@ -198,7 +199,7 @@ class RunData:
 
     def undriven(self) -> RunData:
         """The run as a free decay."""
-        return dataclasses.replace(self, drive=None, gain_free=False)
+        return dataclasses.replace(self, drive=None, multiplied_by="")
 
     @property
     def input_means(self) -> Array:
@@ -453,7 +454,7 @@ def _covers(data: Data, left_out: list[RunData]) -> bool:
 
     def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
         return (
-            {run.gain_free for run in runs},
+            {run.multiplied_by for run in runs},
             {run.spring_stiffness for run in runs},
             {run.wind_on for run in runs},
         )

@@ -18,7 +18,7 @@ from diagnosis.model.similarity import Similarity
 from diagnosis.model.starts import responses
 from tunnel_sim.effects import Effect
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -36,7 +36,11 @@ _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 
 def by_command(campaign: Campaign) -> bool:
     """Whether any run is driven by the command of a servo."""
-    return any(run.drive is not None and run.drive.column == "command_rad" for run in campaign.runs)
+    return any(_commanded(run) for run in campaign.runs)
+
+
+def _commanded(run: Run) -> bool:
+    return run.drive is not None and "servo_kv" in run.drive.kind.keys
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class _OfServo(NominalModel):
             TunnelError: for the first such run.
         """
         for run in campaign.runs:
-            if run.drive is None or run.drive.column != "command_rad":
+            if not _commanded(run):
                 raise TunnelError(
                     "the run has no command_rad, and other runs do: the servo may not have held the joint in it",
                     where=f"{campaign.name}, run '{run.id}'",

@@ -62,8 +62,6 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
 
 def _drive(drive: Drive, change: Similarity) -> Drive:
     """An input, whose own times are those of its record."""
-    if not drive.on_body:
-        return drive
-    if drive.column == "drive":
+    if drive.kind.takes_gain:  # the values stay as they are
         return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
-    return dataclasses.replace(drive, values=drive.values * change.similar(1.0, "N m"))
+    return dataclasses.replace(drive, values=drive.values * change.similar(1.0, drive.kind.unit))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.model.parameters import GAIN
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.driven import driven_start
 from identification.signal.frequency import peak_of_swing, starting_decay
@@ -63,7 +64,7 @@ class Shown:
         gains = [
             response[2] / run.drive.scale
             for run, response in zip(data.runs, driven, strict=True)
-            if response is not None and run.gain_free and run.drive is not None
+            if response is not None and run.multiplied_by == GAIN and run.drive is not None
         ]
         return cls(
             np.array(squares),

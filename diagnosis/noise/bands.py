@@ -1,4 +1,4 @@
-"""Residuals against white noise: by band about the motion's harmonics, and by the runs' means."""
+"""Residuals against white noise: by band about the motion's harmonics, and by the means of the runs."""
 
 from __future__ import annotations
 
@@ -41,14 +41,15 @@ def _known(_frequency: Array) -> float:
 def p_values(
     fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
 ) -> dict[str, float]:
-    """Probability that white noise alone gives as much power, summed over the runs, by name of `TESTS`.
+    """P-value of the power, summed over the runs, under white noise, by name of `TESTS`.
 
-    That of the runs' means about the common zero is 1 where the runs have zeros of their own or nothing holds the
-    body.
+    The p-value of the runs' means about the common zero is 1 where the runs have their own zeros or the body has
+    no spring.
 
     Args:
         floor: power assumed for white noise, a factor on the noise variance; one for all, or shape (tests,).
-        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
+        spread: function for the standard deviation of the noise's mean power over some frequencies (Hz), a share
+            of it.
         scatter: standard deviation of the floor, a share of it, of its shape.
     """
     total, count, places = powers(fit, fit.residuals)
@@ -67,7 +68,7 @@ def powers(fit: Fit, residuals: Sequence[Array]) -> tuple[Array, Array, list[Arr
 
     Returns:
         Sums of the periodograms' ordinates, in variances of white noise, and half that of the squared means; the
-        same of white noise, which is the number of ordinates, and half that of the runs, shape (tests,) each; and
+        expectation under white noise: the number of ordinates, and half that of the runs, shape (tests,) each; and
         the frequencies of the ordinates, Hz.
     """
     runs = fit.problem.data.runs

@@ -1,12 +1,12 @@
-"""The colour of the sensor's noise: its spectrum where the motion is not; and a zero that wanders.
+"""The colour of the sensor's noise, from its spectrum between the harmonics of the motion; and a wandering zero.
 
-Coloured noise differs from a gap in three properties. It is as strong with the wind off as on, it is as strong at
-the start of a record as at its end, and it is smooth across the motion's frequency and its harmonics. Its spectrum
-is therefore taken between the harmonics, in parts of all records, where these parts agree. A gap changes with the
+Coloured noise differs from a gap in three properties: it is as strong with the wind off as on, as strong at the
+start of a record as at its end, and smooth across the motion's frequency and its harmonics. Its spectrum is
+therefore taken between the harmonics, in parts of all records, where these parts agree. A gap changes with the
 wind or the amplitude, and lies at the harmonics, across which the spectrum is interpolated.
 
-Both make a spectrum that rises towards low frequencies. That of noise is level below some corner; that of a random
-walk is not, because its zero goes ever further away.
+Coloured noise and a wandering zero both raise the spectrum towards low frequencies. The spectrum of noise is level
+below some corner; that of a random walk is not, because its zero departs ever further.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
-_CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
-_BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
+_CYCLES = 8.0  # least number in a part: the motion's windowed line then stays within the excluded share
+_BESIDE = 0.25  # of the motion's frequency, excluded on either side of its harmonics
 _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
 _OCTAVE_PARTS = 2  # bands in an octave
 _SLOPE_BANDS = 4  # lowest bands that give the slope below them
-#: Neighbouring ordinates under a Hann window: as many carry the information of one independent ordinate.
+#: Neighbouring ordinates under a Hann window that carry the information of one independent ordinate.
 HANN = 1.94
 _LONGEST = 512  # taps of the whitening filter
 
@@ -45,7 +45,7 @@ class Colour:
         slope: of the level against the logarithm of frequency in the lowest bands, between 0 and that of a random
             walk, −2; dimensionless.
         slope_std: its standard deviation, dimensionless.
-        steep: slope assumed below the first band: the same, made steeper by what chance may hide; dimensionless.
+        steep: slope assumed below the first band: ``slope``, made steeper by the uncertainty; dimensionless.
     """
 
     frequency: Array
@@ -87,11 +87,11 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
 
     Args:
         nominal: any fit whose residuals were scaled as white.
-        beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
-        throughout: whether the lowest band and most of all must be steady; otherwise any two do.
+        beyond: multiple of the motion's frequency from which the spectrum is used.
+        throughout: whether the lowest band and most of all must be steady; otherwise any two must.
 
     Returns:
-        The spectrum; None where it is flat within a tolerance and chance, no bands are the same in all parts of the
+        The spectrum; None where it is flat within a tolerance and chance, no bands agree in all parts of the
         records, or these are too few.
     """
     parts, chosen = [], nominal.settings.noise
@@ -133,18 +133,16 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     information = float(weight @ centred**2)
     slope = float((weight * centred) @ level[lowest_bands]) / information
     slope_std = float(np.sqrt(1.0 / information))
-    # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
+    # where a gap hides the lowest bands, a steeper slope would take the gap for noise
     steep = slope - chosen.colour_slope_stds * slope_std if steady[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 
 def _steady(power: Array, count: Array, rate: float) -> np.ndarray:
-    """Which bands have one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
+    """The bands with one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
 
-    A steady band fails at a ``rate``.
-
-    Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268,
-    doi 10.1098/rspa.1937.0109).
+    A steady band fails at a ``rate``. Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc.
+    R. Soc. A 160 (1937) 268, doi 10.1098/rspa.1937.0109).
     """
     total = count.sum(axis=0)
     mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
@@ -193,10 +191,10 @@ def _red(slope: float) -> float:
 
 
 def whitened(data: Data, colour: Colour) -> Data:
-    """The data, prepared for white noise, with a filter that makes noise of a colour white.
+    """The data, prepared for white noise, with a filter that whitens noise of a colour.
 
     The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
-    all records together hold less than one nat of evidence for another; the gain of all further orders is known
+    all records together have less than one nat of evidence for another; the gain of all further orders follows
     from the spectrum (Kolmogorov). The runs have the variance of the innovations.
     """
     longest = max(run.reading.size for run in data.runs)
@@ -226,7 +224,7 @@ def whitened(data: Data, colour: Colour) -> Data:
     return data.with_runs(tuple(runs))
 
 
-_LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: as good as none
+_LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
 _CORNERS = (1.0, 4.0, 16.0)  # of the colour's lowest frequency, to start from
 _WHITE = 30.0  # the level's natural logarithm stays within this of that of white noise
 
@@ -234,10 +232,10 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    This is decided by a likelihood ratio. The spectrum is that of white noise and a
-    first-order process, which is a random walk where its corner is zero; the colour's lowest band is the lowest
-    corner of stationary noise that counts as seen. It is fitted to the ordinates between the harmonics by Whittle's
-    likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
+    The decision is a likelihood ratio. The spectrum is that of white noise and a first-order process, which is a
+    random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
+    It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423,
+    doi 10.1007/BF02590998).
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
@@ -252,15 +250,15 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
 
 
 def alike_in_all_runs(fit: Fit) -> bool:
-    """Whether what is slower than the motion repeats itself from run to run, as an error of the sensor does.
+    """Whether residuals slower than the motion repeat from run to run, as an error of the sensor does.
 
-    Noise is another one in every run. Let the share of the mean of n runs in the mean of their powers be γ² at a
-    frequency, times being counted from the release. Of independent runs it exceeds x with probability
-    (1 − x)ⁿ⁻¹, whatever the noise's colour.
+    Noise differs from run to run. Let the share of the mean of n runs in the mean of their powers be γ² at a
+    frequency, with times from the release. For independent runs it exceeds x with probability (1 − x)ⁿ⁻¹, whatever
+    the noise's colour.
 
     Returns:
-        By that test of all frequencies below half the motion's together. False where fewer
-        than two runs have the same raster.
+        By that test of all frequencies below half the motion's together. False where fewer than two runs have the
+        same raster.
     """
     runs: dict[tuple[float, float], list[int]] = {}
     for index, run in enumerate(fit.problem.data.runs):
@@ -277,7 +275,7 @@ def alike_in_all_runs(fit: Fit) -> bool:
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:
-    """Least negative log-likelihood, nats, with the corner at or above a frequency over the colour's lowest."""
+    """Least negative log-likelihood, nats, with the corner at or above a frequency (relative to the lowest)."""
 
     def loss(place: Array) -> tuple[float, Array]:
         white, slow, corner = np.exp(place)

@@ -1,4 +1,4 @@
-"""Is there a gap? Tests of the residuals and of the noise, and the choice between a gap and coloured noise."""
+"""Tests for a gap in the residuals and in the noise, and the choice between a gap and coloured noise."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from diagnosis.settings import GapSettings
 from tunnel_sim.effects import the_effect
 
 _MOST, _FEWEST = 32, 16  # repetitions of the campaign
-#: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
+#: A step this many times the noise hides its level, since crossed edges look like noise; several levels are tried.
 _COARSE = 3.0
 _FACTORS = (0.0, 0.5, 1.0, 1.5)
 _NAMES = ("noise against amplitude", "noise against rate", "noise in bursts")
@@ -33,9 +33,9 @@ _HANN = 1.57  # correlated bins of the windowed periodogram that carry the infor
 
 
 def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
-    """Probability that white noise behaves like that of the campaign, by name of the test.
+    """P-values of the campaign's noise under white noise, by name of the test.
 
-    It is from Student's t of the campaign among repetitions of it simulated with white noise and the readings'
+    They come from Student's t of the campaign among simulated repetitions with white noise and the readings'
     lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993); where the lattice hides the
     noise, the largest over several possible levels. All are 1 where the sampling is too slow for the test.
     """
@@ -60,7 +60,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
-    """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
+    """P-value of the estimated noise level if the stated noise, with its rounding, is right.
 
     It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
     median found, at the largest noise that the statement allows.
@@ -80,12 +80,12 @@ class GapTest:
 
     Args:
         p_value: the smallest p-value, times the number of tests (at most 1).
-        tests: p-value by name: the bands, the noise's trend with the motion, its scatter and its level, and whether
-            runs differ by more than the fit lets them.
+        tests: p-value by name: the bands, the noise's trend with the motion, its scatter and its level, and
+            differences between runs beyond those in the fit.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
             above the stated level.
-        within_step: whether a gap is no larger than the error of the readings' lattice, and is therefore none; the
-            smallest p-value is then 1, whatever the single tests say.
+        within_step: whether the gap is no larger than the error of the readings' lattice, and therefore not a gap;
+            the smallest p-value is then 1, whatever the single tests give.
     """
 
     detected: bool
@@ -99,8 +99,8 @@ def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
-        coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
-            noise are then not tested.
+        coarse_step: whether the step of the readings is coarser than stated; the level and trend of the noise are
+            then not tested.
 
     Returns:
         The verdict at one rate of false alarms, shared equally among the tests (Bonferroni).
@@ -139,12 +139,12 @@ def gap_or_colour(
     Args:
         nominal: fit of the nominal model to runs prepared for white noise.
         step: of the lattice of the readings, rad; 0 where there is none.
-        coarse_step: as `gap_test` takes it.
+        coarse_step: as in `gap_test`.
 
     Returns:
-        The fit, the noise and the verdict, with the first colour that is believed, else with the noise as it was
-        found. The noise of the fit allows for rounding, whose error is not white where the motion is slow and the
-        noise small.
+        The fit, the noise and the verdict, with the first colour that passes, else with the noise as it was found.
+        The noise of the fit allows for rounding, whose error is not white where the motion is slow and the noise
+        small.
     """
     noise = noise.rounded(nominal, step)
     allowed = noise.rounding.allowed_in(nominal.problem.data)
@@ -163,8 +163,8 @@ def gap_or_colour(
 def _within_step(nominal: Fit, noise: Noise, step: float) -> bool:
     """Whether a gap is no larger than the error of the readings' lattice.
 
-    The levels of a camera or an encoder may be off by half a step, which follows the motion as long as no noise of
-    half a step blurs it (Widrow and Kollár, Quantization Noise, 2008).
+    The levels of a camera or an encoder may be off by half a step, which follows the motion unless noise of half a
+    step blurs it (Widrow and Kollár, Quantization Noise, 2008).
     """
     blurred = max(noise.white(step).values()) >= 0.5 * step
     power = nominal.excess * max(run.noise.variance for run in nominal.problem.data.runs)
@@ -173,7 +173,7 @@ def _within_step(nominal: Fit, noise: Noise, step: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A colour of the noise that may be all of a gap.
+    """A colour of the noise that may explain the whole gap.
 
     Args:
         nominal: the fit in white noise.
@@ -200,10 +200,10 @@ class _Candidate:
     def believed(self, test: GapTest) -> bool:
         """Whether it is noise rather than a gap.
 
-        Where the whitened fit still has a gap, the colour must be that of runs with the wind off, and show above
-        the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. Nor may
-        there be more noise than is stated. Where no gap is left, it must not be the spectrum of a wandering zero,
-        of an error that every run repeats or of an oscillation that the input excites.
+        Where the whitened fit still has a gap, the colour must appear in runs with the wind off, and above the
+        motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. The noise
+        may not exceed its stated level. Where no gap remains, it must not be the spectrum of a wandering zero, of
+        an error that every run repeats or of an oscillation that the input excites.
         """
         chosen = self.nominal.settings
         if test.detected:
@@ -216,10 +216,10 @@ class _Candidate:
 
 
 def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:
-    """The colours that the noise may have, none where the nominal model misses the motion.
+    """The possible colours of the noise; none where the nominal model misses the motion.
 
-    The first is that of all runs. What the input excites is a narrow line, and colour is sought beside it.
-    Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
+    The first is that of all runs. The input excites a narrow line, and colour is sought beside it. Turbulence may
+    hide the colour, which is then sought in the runs with the wind off alone.
     """
     if misses_motion(nominal):
         return
@@ -249,7 +249,7 @@ _TRIED = 2000  # frequencies and dampings of an oscillation, at most
 
 
 def _follows_input(white: Fit) -> bool:
-    """Whether white residuals hold an oscillation that the input excites alike in all runs, as noise does not."""
+    """Whether white residuals contain an oscillation that the input excites alike in all runs, unlike noise."""
     found = excited(white)
     rate = white.settings.noise.oscillation_rate
     return found is not None and bool(_TRIED * chdtrc(1.0, found.drop) < rate)
@@ -263,15 +263,15 @@ def _beside_mode(nominal: Fit) -> Fit | None:
 
 
 def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest, *, named: bool) -> tuple[Noted, ...]:
-    """What the user should know of the noise.
+    """Remarks on the noise for the user.
 
     Args:
         trend: of the noise with the motion.
-        named: whether a cause of a gap is named: noise that misbehaves would be no part of the answer.
+        named: whether a cause of the gap is named; misbehaving noise is then not part of the answer.
 
     Returns:
-        Where the readings' steps may be all of the gap, where the noise is coloured, and where the sampling is too
-        slow to compare it with the motion and no cause is named.
+        Where the readings' steps may explain the whole gap, where the noise is coloured, and where the sampling is
+        too slow to compare the noise with the motion and no cause is named.
     """
     within = (Fact("within step"),) if test.within_step else ()
     slow = () if trend.judged or named else (Fact("not judged"),)

@@ -1,4 +1,4 @@
-"""The noise of a campaign, one type for each way in which it was found."""
+"""The noise of a campaign, with one type for each way of finding it."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """A campaign's noise, white unless a kind says otherwise.
+    """A campaign's noise, white unless the kind says otherwise.
 
     Args:
-        variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
-        stated_variance: of one sample as the campaign states it, rad²; None where it does not.
-        reason: why it is of this kind.
+        variance: of one sample, quantisation included, rad², by run id: the one used by the diagnosis.
+        stated_variance: of one sample, stated by the campaign, rad²; None where it is not stated.
+        reason: for this kind.
         estimated: the records' own variance, mean over the runs, rad².
         relative: standard deviation of that estimate, a share of it.
-        measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
-        rounding: what rounding leaves beside white noise.
+        measured: variance of one sample from the spectrum above the motion, rad², by run id.
+        rounding: the rounding error beside white noise.
     """
 
     variance: dict[str, float]
@@ -40,9 +40,9 @@ class Noise:
     measured: Mapping[str, float]
     rounding: Rounding = field(default_factory=Rounding)
 
-    #: Of the variance used: ``stated``, ``estimated`` or ``floor``.
+    #: Origin of the variance used: ``stated``, ``estimated`` or ``floor``.
     source: ClassVar[str]
-    #: Whether the records show it, so that its level and its trend with the motion are tested.
+    #: Whether the records show it; its level and its trend with the motion are then tested.
     shown: ClassVar[bool] = True
 
     @property
@@ -57,7 +57,7 @@ class Noise:
 
     @property
     def margin(self) -> float:
-        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
+        """Factor by which the noise may exceed the one used: stated noise may be slightly low and still agree."""
         return max(self.estimated / self.used, 1.0)
 
     @property
@@ -71,14 +71,14 @@ class Noise:
         return self.relative
 
     def noted(self) -> tuple[Fact, ...]:
-        """What is remarkable of its spectrum."""
+        """Remarkable features of its spectrum."""
         return ()
 
     def cautions(self, contradicted: float) -> tuple[Fact, ...]:
-        """The caveat of an answer that is based on it.
+        """The caveat of an answer based on it.
 
         Args:
-            contradicted: factor between standard deviations as stated and as seen, from which on they disagree.
+            contradicted: factor between stated and observed standard deviations from which they disagree.
         """
         ratio = self.estimated**0.5 / self.stated_variance**0.5 if self.stated_variance else 1.0
         if ratio >= contradicted:
@@ -93,9 +93,9 @@ class Noise:
 
         Returns:
             Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
-            spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
-            the next edge: qσ/√π for noise of a third of a step or less. The edges that the motion itself crosses
-            add to that, so noise of less than a tenth of a step is overestimated.
+            spectrum above it does not show the rounding error's q²/12 but the frequency with which noise takes a
+            reading across the next edge: qσ/√π for noise of a third of a step or less. The edges crossed by the
+            motion itself add to that, so noise of less than a tenth of a step is overestimated.
         """
         found = {}
         for run, variance in self.variance.items():
@@ -105,7 +105,7 @@ class Noise:
         return found
 
     def rounded(self, fit: Fit, step: float) -> Noise:
-        """The noise with what rounding leaves in the residuals of a fit.
+        """The noise with the rounding error in the residuals of a fit.
 
         Args:
             step: of the lattice of the readings, rad; 0 where there is none.
@@ -113,7 +113,7 @@ class Noise:
         return replace(self, rounding=Rounding.of(fit, self.white(step), step))
 
     def coloured(self, colour: Colour, data: Data) -> Coloured:
-        """The same noise, found to have a colour, and with an estimate of all power that the records resolve."""
+        """The noise with a colour, and with an estimate of all power that the records resolve."""
         extra = [
             self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
             for run in data.runs
@@ -125,39 +125,39 @@ class Noise:
 
 
 class Stated(Noise):
-    """White noise as the campaign states it, with which the records agree; arguments as in `Noise`."""
+    """White noise as stated by the campaign, confirmed by the records; arguments as in `Noise`."""
 
     source = "stated"
 
 
 class Estimated(Noise):
-    """White noise as the records show it; arguments as in `Noise`."""
+    """White noise as estimated from the records; arguments as in `Noise`."""
 
     source = "estimated"
 
 
 class Floor(Noise):
-    """The accuracy of the fits, where the records contain less noise than that; arguments as in `Noise`."""
+    """The accuracy of the fits, where the records contain less noise; arguments as in `Noise`."""
 
     source, shown = "floor", False
 
     def cautions(self, contradicted: float) -> tuple[Fact, ...]:
-        """That it stands in for the records' own noise."""
+        """The caveat that it replaces the records' own noise."""
         del contradicted
         return (Fact("floor", {"records_rad": self.estimated**0.5, "fits_rad": self.used**0.5}),)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Coloured(Estimated):
-    """Noise whose spectrum the records show; its variance used is that of the white noise assumed before.
+    """Noise with the spectrum of the records; its variance used is that of the white noise assumed before.
 
     Args:
-        spectrum: its power relative to that; the other arguments as in `Noise`.
+        spectrum: its power relative to that variance; the other arguments as in `Noise`.
     """
 
     spectrum: Colour
 
-    #: The spectrum is that of the records.
+    #: The spectrum is estimated from the records.
     margin: ClassVar[float] = 1.0
 
     @property
@@ -171,12 +171,12 @@ class Coloured(Estimated):
         return float(np.sqrt(self.estimated))
 
     def noted(self) -> tuple[Fact, ...]:
-        """That the noise is coloured, and how much."""
+        """The fact that the noise is coloured, with its strength."""
         span = self.spectrum.frequency[-1] / self.spectrum.frequency[0]
         ratio = np.exp(np.ptp(self.spectrum.level))
         figures = {"std_rad": self.std, "power_ratio": float(ratio), "frequency_ratio": float(span)}
         return (Fact("coloured", figures),)
 
     def spread(self, frequency: Array) -> float:
-        """That of the spectrum."""
+        """The standard deviation of the spectrum's mean power."""
         return self.spectrum.spread(frequency)

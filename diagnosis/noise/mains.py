@@ -29,20 +29,20 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
-_KNOTS = 12.0  # per cycle of the motion: a curve follows what is slower than six times the motion
-_NEAR = 0.25  # of 1/duration, within which the frequency of a line found in the whole records is refined
+_KNOTS = 12.0  # per cycle of the motion: a curve follows motions slower than six times it
+_NEAR = 0.25  # of 1/duration: range in which the frequency of a line is refined
 
 
 @dataclass(frozen=True)
 class Hum:
-    """A hum found.
+    """A hum that was found.
 
     Args:
         frequency: of the mains, Hz.
         amplitude: of its strongest line, rad, root mean square over the runs that show it.
         std: of the amplitude, rad.
         frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
-        excess: what it adds to the mean squared residual over the noise variance, a ratio.
+        excess: its contribution to the mean squared residual over the noise variance, a ratio.
         harmonic: the multiple of the frequency at which the strongest line is.
     """
 
@@ -57,9 +57,8 @@ class Hum:
 def find_hum(nominal: Fit) -> float | None:
     """The frequency of the mains whose hum is in the residuals of the nominal fit, Hz; None where there is none.
 
-    It is sought near 50 and 60 Hz and their multiples, at one rate of false alarms for all of them together. Where
-    several frequencies explain the same lines as sampled, it is the one of least folding, then that of the lowest
-    multiple.
+    It is sought near 50 and 60 Hz and their multiples, at one joint rate of false alarms. Where several
+    frequencies explain the same sampled lines, the one of least folding, then of the lowest multiple, is taken.
     """
     chosen = nominal.settings.read_off
     found = [line for line in mains_lines(nominal) if _is_hum(line, chosen)]
@@ -71,15 +70,15 @@ def find_hum(nominal: Fit) -> float | None:
 
 
 def _plainness(line: MainsLine) -> tuple[int, int]:
-    """How often a line is folded, and its multiple."""
+    """Number of foldings of a line, and its multiple."""
     return line.folds, line.harmonic
 
 
 def _is_hum(line: MainsLine, chosen: ReadOffSettings) -> bool:
-    """Whether a line is beyond chance, beyond what is beside it, in most runs, and in their later halves as well.
+    """Whether a line exceeds chance and its surroundings, in most runs, and in their later halves as well.
 
     A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
-    therefore rejected. A mode that is excited at the release decays.
+    therefore rejected. A mode excited at the release decays.
     """
     chance = float(chdtri(line.freedom, chosen.hum_rate / line.trials))
     shown = line.powers > chdtri(2.0 * line.pieces, chosen.hum_run_rate)
@@ -125,18 +124,19 @@ def remove_hum(
     chosen: ReadOffSettings,
     motion: float = REFERENCE_FREQUENCY,
 ) -> tuple[Campaign, Hum]:
-    """Remove a hum and its harmonics from every record, as far as the record shows them apart from the motion.
+    """Remove a hum and its harmonics from every record, where the record separates them from the motion.
 
     Args:
-        frequency: of the fundamental, Hz, seen in one record or more.
+        frequency: of the fundamental, Hz, visible in one record or more.
         variance: of the noise of one sample, rad².
         motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is removed.
 
     Returns:
         The campaign without it, and the hum that was removed. The standard deviation of its frequency is that of
-        the peak of all records' windowed spectra under white noise, of the strongest line only. Of one record of
-        window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the bound
-        24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi 10.1109/TIT.1974.1055282).
+        the peak of all records' windowed spectra under white noise, for the strongest line only. For one record
+        with window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the
+        bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi
+        10.1109/TIT.1974.1055282).
     """
     from scipy.signal.windows import tukey  # only here: slow to load
 
@@ -180,7 +180,7 @@ def remove_hum(
 
 
 def hum_noted(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> tuple[Noted, ...]:
-    """What the user should know of a hum: which line is stated, and what the sample rate cannot tell.
+    """Remarks on a hum for the user: the line stated, and the ambiguity of the sample rate.
 
     Args:
         campaign: the similar campaign in which the hum was found.
@@ -204,13 +204,13 @@ def hum_noted(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> tu
 
 
 def _showing(campaign: Campaign, frequency: float, motion: float) -> list[tuple[Record, list[int]]]:
-    """Every record with the multiples of a frequency that it shows apart from the motion and from each other."""
+    """Every record with the multiples of a frequency that it separates from the motion and from each other."""
     records = [run.record for run in campaign.runs]
     return [(r, shown_multiples(frequency, r.sample_interval, r.duration, motion)) for r in records]
 
 
 def _strongest(shown: Sequence[tuple[Record, list[int]]], frequency: float) -> int:
-    """The multiple of a frequency at which the records hold most power."""
+    """The multiple of a frequency with most power in the records."""
     powers = dict.fromkeys(HARMONICS, 0.0)
     for record, multiples in shown:
         if multiples:
@@ -259,10 +259,10 @@ def _swell(record: Record, frequency: float) -> Array:
 
 
 def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Array], Array]:
-    """What takes the slow motion out of columns of samples, and the windowed reading without it.
+    """A function that removes the slow motion from columns of samples, and the windowed reading without it.
 
     The window keeps the motion from leaking into a line far above it. Unevenly spaced samples spread it over all
-    frequencies, so that a curve takes it out first.
+    frequencies, so a curve removes it first.
     """
     if record.uniform:
         level = np.linspace(record.yaw_rad[0], record.yaw_rad[-1], record.yaw_rad.size)

@@ -15,7 +15,7 @@ from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.bands import TESTS, powers
 from tunnel_sim.vocabulary.record import Array
 
-#: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
+#: Noise of this many steps makes the rounding error independent of the motion to within 1e-4: the first
 #: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
 _BLURS = 0.5
 _MOST, _FEWEST = 16, 4  # repetitions of the campaign
@@ -28,7 +28,7 @@ def samples(fit: Fit) -> int:
 
 
 def repetitions(fit: Fit, fewest: int, most: int) -> int:
-    """How often to read the runs of a fit again: less often where they are long."""
+    """Number of repetitions of the runs of a fit: fewer where they are long."""
     return int(np.clip(_SAMPLES / samples(fit), fewest, most))
 
 
@@ -41,8 +41,8 @@ def repeated(
         white: standard deviation of a sample's noise before rounding, rad, by run id.
         step: of the lattice, rad; 0 where there is none.
         count: of the repetitions.
-        levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: the
-            step is the same everywhere.
+        levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: all
+            steps are equal.
 
     Yields:
         Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
@@ -65,40 +65,40 @@ def repeated(
 
 
 class Rounding:
-    """What rounding leaves in block means beside white noise: nothing, where the noise blurs the lattice."""
+    """The rounding error of block means beside white noise: none where the noise blurs the lattice."""
 
     @classmethod
     def of(cls, fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None) -> Rounding:
-        """In the residuals of a fit, arguments as in `repeated`."""
+        """The rounding error in the residuals of a fit, arguments as in `repeated`."""
         if min(white.values()) > _BLURS * step:
             return Rounding()
         again = repeated(fit, white, step, repetitions(fit, _FEWEST, _MOST), levels)
         return Rounded([run.means(reading - motion) for run, motion, reading in again])
 
     def residuals(self, data: Data) -> list[list[Array]]:
-        """What noise and rounding alone leave as white residuals of data, by repetition and by run."""
+        """White residuals of data due to noise and rounding alone, by repetition and by run."""
         del data
         return []
 
     def expected(self, fit: Fit) -> tuple[Array, Array]:
         """Mean power of the residuals of a fit by `TESTS`, and its scatter, shape (tests,) each.
 
-        Both are shares of the power of white noise of the fit's variance; the scatter is that beyond white noise's.
+        Both are shares of the power of white noise of the fit's variance; the scatter is that beyond white noise.
         """
         del fit
         return np.ones(len(TESTS)), np.zeros(len(TESTS))
 
     def allowed_in(self, data: Data) -> Data:
-        """Data prepared for white noise, with noise of block means that is not below what rounding leaves."""
+        """Data prepared for white noise, with noise of block means that is at least the rounding error."""
         return data
 
 
 @dataclass(frozen=True, eq=False)
 class Rounded(Rounding):
-    """An error that is not white.
+    """A rounding error that is not white.
 
     Args:
-        errors: that noise and rounding leave, by run, repetitions of it, shape (repetitions, blocks), rad.
+        errors: due to noise and rounding, by run, repetitions of it, shape (repetitions, blocks), rad.
     """
 
     errors: Sequence[Array]
@@ -111,14 +111,14 @@ class Rounded(Rounding):
     def expected(self, fit: Fit) -> tuple[Array, Array]:
         """From the repetitions; not less than white noise."""
         seen = [powers(fit, residuals)[:2] for residuals in self.residuals(fit.problem.data)]
-        count = np.maximum(seen[0][1], 0.5)  # any number where there are none
+        count = np.maximum(seen[0][1], 0.5)  # avoids a division by zero
         found = [power / count for power, _ in seen]
         level = np.mean(found, axis=0)
         beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
         return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
 
     def allowed_in(self, data: Data) -> Data:
-        """Raised where averaging does not reduce the errors as white noise, at most to that of one sample.
+        """Raised where averaging reduces the errors less than white noise, at most to that of one sample.
 
         The same data where none is raised.
         """

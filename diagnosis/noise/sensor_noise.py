@@ -1,7 +1,7 @@
-"""The noise of a record, compared with what is stated, and whether it follows the motion.
+"""The noise of a record, compared with the stated noise, and its dependence on the motion.
 
-It is measured in the part of the spectrum far above the motion. There is no such part where the samples are not
-evenly spaced, since an irregular clock spreads the motion over all frequencies, nor in driven runs.
+It is measured in the part of the spectrum far above the motion. There is no such part in driven runs, nor where
+the samples are not evenly spaced, since an irregular clock spreads the motion over all frequencies.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
-#: Error, as a share of the swing, that block means and steps leave in a fit of the closed form of the nominal
-#: model, while its bands still pass as white.
+#: Error of block means and steps in a fit of the closed form of the nominal model, as a share of the swing, at
+#: which its bands still pass as white.
 _ACCURACY = 4e-5
 
 
@@ -35,12 +35,12 @@ def estimate_variance(record: Record, fastest: float | None = None) -> tuple[flo
     Where the samples are not evenly spaced, `scattered_variance` measures it.
 
     Args:
-        fastest: frequency of the campaign's fastest motion, Hz, so that coloured noise is measured in the same band
-            in all runs; None: the record's own.
+        fastest: frequency of the campaign's fastest motion, Hz, so that coloured noise is measured in the same
+            band in all runs; None: the record's own.
 
     Returns:
-        Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics
-        do not move a median.
+        Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics do
+        not change a median.
     """
     if not record.uniform:
         block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
@@ -68,18 +68,18 @@ def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
 
 
 _ORDER = 5
-_KNOTS = 24.0  # per cycle at most: the curve follows what is slower than twelve times the motion
+_KNOTS = 24.0  # greatest number per cycle: the curve follows motions slower than twelve times it
 _LONG_GAP = 0.25  # of a cycle: the curve is not drawn across it
 _LEAST_PIECES = 8  # of a curve
 
 
 def scattered_variance(record: Record, frequency: float, block: int) -> tuple[float, float]:
-    """Variance of the noise as it acts on means of neighbouring samples.
+    """Variance of the noise in means of neighbouring samples.
 
     Args:
         frequency: of its motion, Hz.
-        block: samples that a mean is taken of. Where stamps were given to the samples afterwards, neighbours share
-            some noise, so that differences of single samples would miss it.
+        block: number of samples in a mean. Where time stamps were assigned to the samples afterwards, neighbours
+            share some noise, which differences of single samples would miss.
 
     Returns:
         Variance of a mean times ``block``, in the reading's unit squared, and its relative standard deviation.
@@ -114,28 +114,29 @@ class SmoothCurve:
         self.knots = np.concatenate([np.full(_ORDER + 1, time[0]), inner, np.full(_ORDER + 1, time[-1])])
 
     def left(self, values: Array) -> Array:
-        """What the curve leaves of the values, shape (n,) or (n, k)."""
+        """Residuals of the values from the curve, shape (n,) or (n, k)."""
         curve = make_lsq_spline(self.time, values, self.knots, _ORDER)
         return np.asarray(values - curve(self.time), np.float64)
 
 
-#: From here on the median is taken over eight windows or more. Simulated records of known noise then have no bias
-#: beyond chance (3 %); with 200 samples the variance is 17 % too large, and with 130 five times and more.
+#: With this many samples the median is taken over eight windows or more. Simulated records of known noise then
+#: have no bias beyond chance (3 %); with 200 samples the variance is 17 % too large, and with 130 by a factor of
+#: five and more.
 LEAST_SAMPLES = 500
 
 _LINES = 24  # of a window
 _DEGREE = 2  # of the polynomials of the response to the input, and of the ends of the record
 _FROM = 0.1  # of the sampling rate: the lowest frequency used where the record allows no higher one
 _TO = 0.49  # of the sampling rate
-_BAND = 0.999  # share of the power of a driven motion that its band holds
+_BAND = 0.999  # share of the power of a driven motion within its band
 
 
 def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, float]:
     """Variance of the white noise of a driven run, by the local polynomial method.
 
     In each narrow window of the spectrum, the frequency response and the effect of the record's ends are smooth
-    (Pintelon and Schoukens, System Identification, 2nd ed., ch. 7). What is left is noise, and harmonics of the
-    input where the body is not linear, which a median over the windows ignores as far as they are few.
+    (Pintelon and Schoukens, System Identification, 2nd ed., ch. 7). The residual is noise, with harmonics of the
+    input where the body is not linear, which a median over the windows ignores if they are few.
 
     Args:
         reading: shape (n,), n at least `LEAST_SAMPLES`, rad.
@@ -169,12 +170,12 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
 def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
-    It is as stated where the runs agree with one another and their mean agrees with it,
-    both within chance; else the estimate, pooled over runs where they agree with one another. Where a run contains
-    less noise than the accuracy of the fits, that stands in for it.
+    The stated noise is used where the runs agree with one another and their mean agrees with it, both within
+    chance; else the estimate, pooled over runs where they agree. Where a run contains less noise than the accuracy
+    of the fits, that accuracy is used instead.
     """
     measured, relative = _measured(campaign)
-    # however slow the motion, the error of a rounded reading is that large
+    # however slow the motion, a rounded reading has at least this error
     rounded = lattice_step(campaign) ** 2 / 12.0
     estimates = {run: max(value, rounded) for run, value in measured.items()}
     variances = np.array(list(estimates.values()))
@@ -218,7 +219,7 @@ def _measured(campaign: Campaign) -> tuple[dict[str, float], Array]:
 
 
 def _stated_variance(sensor: SensorProperties, seen: float) -> float | None:
-    """The variance that a data sheet states, before rounding or after, rad²: the one closer to that seen, rad²."""
+    """The variance stated by a data sheet, before or after rounding, rad²: the one closer to the observed one."""
     if not sensor.noise_std:  # no record has a noise of zero
         return None
     before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
@@ -236,15 +237,16 @@ def _fastest(run: Run) -> float:
 
 
 def accuracy(record: Record, *, swings: bool = True) -> float:
-    """How small a sample's noise may be before the errors of the fits show.
+    """Least noise of a sample at which the errors of the fits do not show.
 
     Args:
-        swings: whether anything holds the body, so that its motion has a phase to lose.
+        swings: whether the body has a spring, so that its motion has a phase to lose.
 
     Returns:
         Standard deviation of a sample, rad: a share of the swing, plus three times the error of the reading from
         RK4's loss of phase, (ωh)⁴/120 of the phase for steps h of a block (Hairer, Nørsett and Wanner, Solving
-        ODEs I, sect. II.1). Three times, because the error lies in one narrow band and the noise in all.
+        ODEs I, sect. II.1). The factor of three is used because the error is in one narrow band and the noise in
+        all.
     """
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(swing)[1:])))
@@ -258,8 +260,8 @@ def accuracy(record: Record, *, swings: bool = True) -> float:
 def reading_step(campaign: Campaign) -> float:
     """The step of the lattice on which the readings lie: the smallest difference between distinct readings, rad.
 
-    This is the true resolution where the record visits neighbouring steps, as every decay does; it is far below any
-    step where readings are continuous.
+    This is the true resolution where the record visits neighbouring steps, as every decay does; it is far below
+    any step where readings are continuous.
     """
     return min((float(np.quantile(gaps, 0.02)) for gaps in _gaps(campaign)), default=0.0)
 
@@ -273,7 +275,7 @@ def lattice_step(campaign: Campaign) -> float:
 
 
 def reading_levels(campaign: Campaign) -> Array:
-    """The readings that occur, in increasing order, shape (levels,), rad; those a rounding error apart are one."""
+    """The distinct readings in increasing order, shape (levels,), rad; merged within a rounding error."""
     found = np.unique(np.concatenate([run.record.yaw_rad for run in campaign.runs]))
     apart = np.diff(found) > _OFF_LATTICE * reading_step(campaign)
     return np.asarray(found[np.concatenate([[True], apart])], np.float64)
@@ -298,12 +300,12 @@ _OFF_LATTICE = 0.1  # of a step: printed readings are rounded once more
 
 @dataclass(frozen=True)
 class NoiseTrend:
-    """How the noise's level depends on the motion and on time.
+    """Dependence of the noise's level on the motion and on time.
 
     Args:
         amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
             deviation under steady white noise.
-        rate_z: likewise against the squared rate.
+        rate_z: slope of the local noise variance against the squared rate, in its own standard deviation, a ratio.
         spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
             distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
         step: of the lattice of the readings, rad.
@@ -323,11 +325,11 @@ _SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
 
 
 def noise_trend(campaign: Campaign) -> NoiseTrend:
-    """Measure whether the noise is as strong in motion as at rest, and the same at all times.
+    """Measure whether the noise is equally strong in motion and at rest, and at all times.
 
-    These are trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over
-    the runs that are not shorter than five windows. Their null distribution is simulated (`diagnosis.noise.gap`).
-    Not judged where a run is driven: its motion may be as fast as the noise.
+    The statistics are trends of the variance of fourth divided differences of the reading in windows of 20 ms,
+    pooled over the runs of five windows or more. Their null distribution is simulated (`diagnosis.noise.gap`).
+    Driven runs are not judged: their motion may be as fast as the noise.
     """
     if campaign.driven:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
@@ -347,8 +349,8 @@ def trend_statistics(readings: Iterable[tuple[Array, Array]]) -> Array | None:
     """The statistics of `NoiseTrend`, shape (repetitions, 3); None where no run is fast enough.
 
     Args:
-        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their times, shape
-            (n,), s; taken one after another, so that a generator holds those of one run at a time.
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their times,
+            shape (n,), s; consumed one by one, so that a generator keeps one run in memory at a time.
     """
     parts = [_local_levels(reading, time) for reading, time in readings if _in_window(time) >= _FEWEST]
     if not parts:
@@ -380,8 +382,8 @@ def _local_levels(reading: Array, time: Array) -> tuple[Array, Array, Array]:
     """Mean squared fourth difference by window over its mean, less one; squared angle and rate, standardised."""
     width = _in_window(time)
     reading = reading - reading.mean(axis=-1, keepdims=True)
-    # fourth divided differences: white noise has the same variance in all of them, and they leave (ω dt)⁴ of the
-    # motion, far below any noise
+    # fourth divided differences: white noise has the same variance in all of them, and (ω dt)⁴ of the motion
+    # remains, far below any noise
     size = time.size - 4
     total, gain = np.zeros((*reading.shape[:-1], size)), np.zeros(size)
     for k in range(5):

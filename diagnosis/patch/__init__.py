@@ -1,1 +1,1 @@
-"""The causes written into a model of one's own."""
+"""The causes written into the user's own model."""

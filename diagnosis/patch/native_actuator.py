@@ -1,4 +1,4 @@
-"""What an actuator does to its control as MuJoCo has it: a range, a filter and a delay."""
+"""An actuator's effects on its control in MuJoCo: a range, a filter and a delay."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ def controlled(campaign: Campaign, actuator: Actuator | None) -> frozenset[str]:
 def native_actuator(
     problem: Problem, common: Array, release: Array, index: int, actuator: Actuator, change: Similarity
 ) -> ActuatorPatch | None:
-    """What the effects of a fit make of an actuator, in the units of the measured campaign.
+    """An actuator with the effects of a fit, in the units of the measured campaign.
 
     Args:
         common: parameters of all runs, shape (common,).
         release: of a driven run, shape (own,).
         index: of that run.
-        actuator: of the model, that drives it.
+        actuator: of the model, which drives it.
 
     Returns:
-        The limits, None where there are none, or where MuJoCo has no element for one of them: a limit of the rate,
-        which acts between the other two, and an input that acts earlier than stated.
+        The limits; None where there are none, or where MuJoCo has no element for one of them: a rate limit, which
+        acts between the other two, and an input that acts earlier than stated.
     """
     chain = problem.chain(common, release, problem.data.runs[index])
     stated, found = chain.stated.drive, chain.physics().drive

@@ -1,4 +1,4 @@
-"""Friction of any form as MuJoCo has it: its own element as far as it goes, and the plugin for the rest."""
+"""Friction of any form in MuJoCo: its own element as far as it applies, and the plugin for the rest."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _SYMBOLS = {"n": "exponent", "v0": "saturation", "b": "peak", "vs": "peak_rate"}
 
 @dataclass(frozen=True, eq=False)
 class NativeFriction:
-    """Friction as it is written into a model, in the units of the law.
+    """Friction as written into a model, in the units of the law.
 
     Args:
         loss: ``frictionloss`` of the joint, N m.
         damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
         program: of a further moment of the plugin; empty: none.
         contact: numerics of the plugin's own friction, with their values and units; empty: none.
-        differences: where the native element is not the same law, and what is left out.
+        differences: where the native element follows another law, and causes left out.
     """
 
     loss: float = 0.0
@@ -46,16 +46,16 @@ def native_friction(
 ) -> NativeFriction:
     """The friction of a moment law in the elements of MuJoCo.
 
-    Friction that depends on the rate is ``frictionloss`` and the joint's polynomial damping where these miss less
-    of it than is allowed. Else ``frictionloss`` is the friction at rest, which holds the joint, and the plugin adds
-    the rest, which is zero there. The plugin has a presliding contact of its own.
+    Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial damping where their error
+    is within the allowance. Else ``frictionloss`` is the friction at rest, and the plugin
+    adds the rest, which is zero there. The plugin has its own presliding contact.
 
     Args:
         parameters: of the moment law, by name.
-        rates: that the runs visit, above 0, rad/s, shape (n,).
+        rates: positive rates in the runs, rad/s, shape (n,).
         law: of the joint as the model has it.
-        damping: what is written beside that of the joint, N m s/rad.
-        may_miss: share of the greatest friction that a polynomial may miss.
+        damping: to be written in addition to that of the joint, N m s/rad.
+        may_miss: greatest error of a polynomial, as a share of the greatest friction.
     """
     friction = friction_of(parameters)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]

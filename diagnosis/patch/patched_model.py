@@ -1,4 +1,4 @@
-"""A model of one's own with the causes written into it, and how far it closes the gap by itself."""
+"""The user's own model with the causes written into it, and the share of the gap that it closes."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ _NAMES = frozenset(
 
 @dataclass(frozen=True)
 class FoundLaw:
-    """The law found for a joint, in the units of the model given.
+    """The law found for a joint, in the units of the given model.
 
     Args:
-        patch: what is written into the model: native elements, and the rest as a program.
-        differences: where the native element is not the same law, and what is left out.
+        patch: changes of the model: native elements, and the rest as a program.
+        differences: where the native element follows another law, and causes left out.
     """
 
     patch: JointPatch
@@ -77,7 +77,7 @@ def found_law(
         release: of a run, shape (own,).
         noise: of the sensor, rad; 0: not written.
         index: of that run, with the wind off.
-        actuator: what is written into the actuator that drives the joint; None: nothing.
+        actuator: changes of the actuator that drives the joint; None: none.
     """
     data = problem.data
     assert isinstance(data.model, Joint | LooseJoint)
@@ -101,7 +101,7 @@ def found_law(
     added = physics.spring_stiffness - law.stiffness - of_servo
     spring = np.array([-fitted.get("moment_offset", 0.0), added, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
-    # the part of the program that effects added to the model's own
+    # the part of the program that effects add to the model's own
     own_program = problem.stated(common, release, data.runs[index]).program
     program = physics.program[len(own_program) :]
     if own_program and program:
@@ -156,10 +156,10 @@ def found_law(
 
 
 def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | None) -> list[Fact]:
-    """What the patched model does otherwise than the law found, or leaves out.
+    """Differences of the patched model from the law found, and omissions.
 
     Args:
-        written: what is written into the actuator.
+        written: changes of the actuator.
     """
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
     left_out = {
@@ -184,7 +184,7 @@ def _number(operation: str) -> float:
 def _own_program(
     program: tuple[float, ...], rest: float, own: Callable[[float, str], float]
 ) -> tuple[float, ...]:
-    """A program of the similar campaign as one of the model's joint: its position, rate, time and moment."""
+    """A program of the similar campaign in terms of the model's joint: its position, rate, time and moment."""
     value = _number("number")
     replaced = {
         _number("angle"): (value, rest, _number("subtract")),
@@ -216,17 +216,17 @@ def native_closure(
     simulate: Simulate,
     native: frozenset[str] = frozenset(),
 ) -> NativeClosure:
-    """Simulate what was held out with the patched model of the fit that has not seen it; only with the wind off.
+    """Simulate held-out runs with the patched model of the fit that has not used them; only with the wind off.
 
     Args:
-        nominal: fit of the model as given.
+        nominal: fit of the given model.
         chosen: fit with the causes.
         nominal_out: runs held out of the first.
         chosen_out: runs held out of the second.
-        native: as of `engine_residual`.
+        native: as in `engine_residual`.
 
     Raises:
-        TunnelError: when nothing could be held out, or the patched model's motion grows without bound.
+        TunnelError: when nothing could be held out, or the patched model's motion diverges.
     """
     runs = chosen.problem.data.runs
     known = chosen_out.points.keys() & nominal_out.residuals.keys()
@@ -273,7 +273,7 @@ def _restarted(
     native: frozenset[str],
     seen: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, Array]:
-    """A run's own parameters, its start refitted in the engine to what was seen, and the `engine_residual` then."""
+    """A run's own parameters, its start refitted in the engine to the fitted part, and its `engine_residual`."""
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(release: Array) -> Array:
@@ -306,7 +306,7 @@ def engine_residual(
     Args:
         common: parameters of all runs, shape (common,).
         own: parameters of the run, shape (own,).
-        native: ids of the runs in which the model's actuator does by itself what effects make of the input.
+        native: ids of the runs in which the model's actuator itself has the effects on the input.
 
     Returns:
         In noise standard deviations, shape (n,).
@@ -330,16 +330,16 @@ def engine_residual(
 
 
 def _start(problem: Problem, own: Array, index: int) -> Start:
-    """Where a run with these own parameters, shape (own,), starts, in the units of the measured campaign."""
+    """The initial state of a run with these own parameters, shape (own,), in the units of the measured campaign."""
     run, change = problem.data.runs[index], problem.data.similarity
     return Start(run.id, change.own(run.start, "s"), float(own[0]), change.own(float(own[1]), "rad/s"))
 
 
 def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
-    """Refuse a model that no answer about a campaign could be written into, before the work.
+    """Refuse a model that no answer about a campaign could be written into, before the diagnosis.
 
     Raises:
-        TunnelError: when every run has the wind on, or the engine cannot write or simulate the model as given.
+        TunnelError: when every run has the wind on, or the engine cannot write or simulate the given model.
     """
     still = [run for run in campaign.runs if not run.wind_on]
     if not still:
@@ -355,12 +355,12 @@ def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> Non
 
 
 def patched_model(study: Study, model: JointModel) -> PatchedModel:
-    """Write the answer of a study into the model whose joint it is of, and simulate it against what was held out.
+    """Write the answer of a study into the model of its joint, and simulate held-out readings.
 
     Without causes only the free parameters are written.
 
     Raises:
-        TunnelError: when the engine refuses the patched model, or its motion grows without bound.
+        TunnelError: when the engine refuses the patched model, or its motion diverges.
     """
     chosen = study.chosen
     problem, change = chosen.problem, study.similarity

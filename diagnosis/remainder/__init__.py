@@ -1,1 +1,1 @@
-"""What no named effect explains: how much of it could be closed, and the law that would close it."""
+"""The explainable part of an answer's residual, and the law for it."""

@@ -1,8 +1,8 @@
-"""The formula for what an answer leaves of driven runs: laws of a short list, each fitted like any effect.
+"""The formula for the residual of driven runs: laws of a short list, each fitted like any effect.
 
-Where dry friction holds a driven body, the moment missing at rest is whatever the input asks for, and not a
-function of the measured path. What could be closed is therefore not bounded from linear responses, as along free
-decays; the laws are integrated with the motion instead.
+Where dry friction stops a driven body, the moment missing at rest depends on the input, not on the measured path.
+The explainable share is therefore not bounded from linear responses, as for free decays; the laws are integrated
+with the motion instead.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
 """The rise of friction at low rates (Stribeck), and friction that is smooth about rest."""
 _OF_ANGLE = ("b^2", "b^3", "abs(b)*b")
 _OF_BOTH = ("b^2*r", "b*sign(r)", "abs(b)*sign(r)")
-_WIDTHS = (0.05, 0.2)  # of the greatest rate, from which a fit finds those between
+_WIDTHS = (0.05, 0.2)  # of the greatest rate; a fit reaches the values between
 _FIRST = 0.01  # of the greatest restoring moment: where the fit of a coefficient starts
 
 
@@ -32,10 +32,10 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
     """The law of a short list that predicts held-out data best; None where none does, or none is sought.
 
     Args:
-        significant: whether what the answer leaves is beyond chance.
+        significant: whether the residual of the answer exceeds chance.
 
     Returns:
-        In the measured campaign's units, with the share that the law closes for what could be closed.
+        In the measured campaign's units, with the law's share as the explainable share.
 
     Raises:
         LinAlgError: when the equations of a fit cannot be solved.
@@ -52,7 +52,7 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
         return None
     settings = base.settings.remainder
     kind, best = min(found, key=lambda one: one[1].fit.total)
-    # A rate for all laws of the list together.
+    # One rate for all laws of the list together.
     if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(found)):
         return None
     closed, std, held_out = held_out_share(base, best.fit)
@@ -77,14 +77,14 @@ def _own_numbers(proposal: Proposal) -> int:
 
 
 def _formulas(base: Fit) -> Iterator[tuple[str, Formula]]:
-    """The laws that are tried, with the kind of each; their first coefficients are small."""
+    """The laws to be tried, with the kind of each; their first coefficients are small."""
     motions = paths(base)
     r = ranges(motions)
     moment = _FIRST * r.angle * r.stiffness
     delta = np.zeros(base.point.common.size)
     for kind, term in _terms(r):
         at = {"b": r.angle, "r": r.rate}
-        # Where a law is greatest is not at the ends of the motion for all of them.
+        # The laws do not all have their maxima at the ends of the motion.
         inside = [
             float(np.max(np.abs(term.value({k: s * v for k, v in at.items()})))) for s in (0.05, 0.3, 1.0)
         ]

@@ -1,4 +1,4 @@
-"""What could be closed of what an answer leaves: by kind, with its curve, events, line or formula."""
+"""The explainable part of an answer's residual: by kind, with its curve, events, line or formula."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from diagnosis.where.excess import away_from_motion
 from tunnel_sim.vocabulary.record import Array
 
 Events = tuple[Mapping[str, Any], ...]
-"""By run, the largest part first: ``run``, its ``share`` of what is closed, and ``from_s`` and ``to_s`` since the
-start of the record."""
+"""By run, the largest part first: ``run``, its ``share`` of the explained part, and ``from_s`` and ``to_s`` since
+the start of the record."""
 
 
 def closable(study: Study, *, significant: bool, decided: bool = True) -> Closable | None:
-    """Say how much of what the answer leaves could be closed, and by what.
+    """Find the share of an answer's residual that could be explained, and the law for it.
 
     Args:
-        decided: whether the answer is; of an undecided one the whole gap of the nominal model is left, beyond what
-            the runs differ by chance under the likeliest answer.
-        significant: whether what remains is beyond chance.
+        decided: whether the answer is decided; if not, the residual is the whole gap of the nominal model, beyond
+            chance differences between the runs under the likeliest answer.
+        significant: whether the residual exceeds chance.
 
     Returns:
-        In the measured campaign's units; None where nothing remains beyond chance, or it is too little to tell how
-        much could be closed, or a random moment is part of the answer, beside which anything would be closed.
+        In the measured campaign's units; None where the residual is within chance or too small for a share, or a
+        random moment is part of the answer, since it could explain anything.
 
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
@@ -49,7 +49,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         left = with_scatter(study.nominal, study.chosen.problem.scatter)
     if not study.causes or not significant or study.random is not None:
         return None
-    # a run of a few blocks has no row of an eighth of a cycle
+    # a run of few blocks has no row of an eighth of a cycle
     if left.excess <= 0.0 or any(path.residual.size == 0 for path in paths(left)):
         return None
     unexplained = Unexplained(left)
@@ -96,9 +96,9 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
 def chosen_kind(
     common: Mapping[str, Evidence], single: Mapping[str, Evidence], chosen: RemainderSettings
 ) -> str | None:
-    """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first.
+    """The simplest kind of `KINDS` that explains about as much as any; simpler common laws come first.
 
-    None where only kinds whose shares are not determined could close more than a small share.
+    None where only kinds of undetermined shares could explain more than a small share.
     """
     of_all, of_one = (
         {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined(chosen)}
@@ -116,7 +116,7 @@ def chosen_kind(
 
 
 def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
-    """The formula of a kind in the measured campaign's units, where one is supported on what is held out."""
+    """The formula of a kind in the measured campaign's units, where held-out data support one."""
     formula = choose(unexplained, kind, drop)
     proposal = None if formula is None else propose(unexplained.fit, formula, kind)
     if proposal is None:
@@ -128,9 +128,9 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
 def _others(
     kind: str, ceilings: tuple[Ceiling, ...], chosen: RemainderSettings
 ) -> tuple[tuple[str, ...], float | None]:
-    """The kinds that close about as much as the one chosen, and what the others close at most.
+    """The kinds that explain about as much as the chosen one, and the greatest share of the others.
 
-    Of other kinds only those count that the one chosen is not a case of, and that are measured as it is.
+    Only those others count that do not include the chosen one as a case, and that are measured in the same way.
     """
     best = next((one for one in ceilings if one.kind == kind), None)
     if best is None:
@@ -170,8 +170,8 @@ _OVER: Mapping[str, tuple[str, ...]] = {
 def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> Curve | None:
     """The law of a kind without a formula, in the measured campaign's units; None where it has no common law.
 
-    It is for the median spring, and the greatest wind speed where it is of the wind; a moment in time is that at
-    the greatest angle, without rate. What the model's own coefficients and its zero absorb is taken out.
+    It is for the median spring, and for the greatest wind speed if it is of the wind; a moment in time is that at
+    the greatest angle, without rate. The part absorbed by the model's own coefficients and its zero is removed.
     """
     kind = found.ceiling.kind
     if found.solution is None or kind not in _OVER:
@@ -211,15 +211,15 @@ def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> 
 
 
 def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
-    """The runs that show what differs from run to run, and when, in the units of the fit.
+    """The runs and times of a residual that differs from run to run, in the units of the fit.
 
     Args:
-        unexplained: what is left.
+        unexplained: the residual.
         kind: of `diagnosis.likelihood.paths.SINGLE`.
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:
-        The times are those between which most of a run's part lies.
+        The times between which most of a run's part occurs.
     """
     drops, spans, share = [], [], unexplained.fit.settings.remainder.event_share
     for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
@@ -257,14 +257,14 @@ _NYQUIST = 0.45  # of the sample rate: lines above may be images
 
 @dataclass(frozen=True)
 class SteadyLine:
-    """A line that stands out of the residuals of all runs together, in the units of the fit.
+    """A prominent line in the residuals of all runs together, in the units of the fit.
 
     Args:
         frequency: Hz.
         frequency_std: its standard deviation, Hz.
         amplitude: in the unit of the reading, root mean square over the runs.
         amplitude_std: its standard deviation, in the same unit.
-        events: the runs that show it, over their whole time.
+        events: the runs that show it, over their whole duration.
     """
 
     frequency: float
@@ -276,10 +276,10 @@ class SteadyLine:
 
 
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
-    """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
+    """The strongest line at one frequency in a fit's residual, away from the motion and its harmonics.
 
-    None where chance may explain it, at one rate for all frequencies together, and where
-    it is the skirt of something broader or does not keep its phase in a run.
+    None where chance may explain it, at one joint rate for all frequencies, where it is the skirt of a broader
+    feature, or where it does not keep its phase in a run.
     """
     start, floor = _strongest(unexplained)
     if start is None:
@@ -290,8 +290,8 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
     frequency = float(found.x)
-    # Share of the line in a half of a run that the other half predicts: 1 where phase and amplitude are kept.
-    # Chance lowers what is predicted by 2 in every half, and raises what is fitted.
+    # Share of the line in one half of a run that the other half predicts: 1 at constant phase and amplitude.
+    # Chance lowers the prediction by 2 in every half, and raises the fit.
     predicted, fitted = 0.0, 0.0
     for path in unexplained.paths:
         waves, residual = _waves(path, frequency)

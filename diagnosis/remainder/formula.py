@@ -1,4 +1,4 @@
-"""The sparsest formula that explains what is left, chosen on held-out runs and fitted like any effect."""
+"""The sparsest formula for the residual, chosen on held-out runs and fitted like any effect."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from tunnel_sim.vocabulary.units import Dimension, dimension, dimension_text, pr
 
 _NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
 _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}
-"""Own numbers of terms: widths, places, numbers per radian, rates, times and frequencies."""
+"""Inner parameters of terms: widths, places, numbers per radian, rates, times and frequencies."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term with the values of its own numbers.
+    """A term with the values of its inner parameters.
 
     Args:
-        text: of ``b``, ``r``, ``t``, ``V``, ``Kr``, ``omega`` or ``y``, and its own numbers.
-        inner: value of each of its own numbers, in the unit of `_INNER`.
+        text: of ``b``, ``r``, ``t``, ``V``, ``Kr``, ``omega`` or ``y``, and its inner parameters.
+        inner: value of each inner parameter, in the unit of `_INNER`.
     """
 
     text: str
@@ -55,7 +55,7 @@ class Term:
         return self.formula.dimension({name: dimension(unit) for name, unit in (_NAMES | _INNER).items()})
 
     def value(self, places: Mapping[str, float | Array]) -> Array:
-        """The term in its own unit, where numbers or arrays of shape (n,) are given by name; shape (n,) or ()."""
+        """The term in its own unit, for numbers or arrays of shape (n,) given by name; shape (n,) or ()."""
         return self.formula.value({**places, **self.inner})
 
 
@@ -81,8 +81,8 @@ _READING_PLACE = ("max(abs(y)-c,0)*sign(y)", "max(y-c,0)", "max(-y-c,0)")
 def terms(kind: str, r: Ranges) -> list[Term]:
     """The terms that may explain a kind of `KINDS`, without a factor for spring or wind.
 
-    Their own numbers are near enough to each other for a fit to find the one between. There are no terms for kinds
-    that no formula explains.
+    Their inner parameters are spaced closely enough for a fit to reach the values between. There are no terms for
+    kinds that no formula explains.
     """
     found: list[Term] = []
     if kind in ("angle", "state", "wind"):
@@ -134,7 +134,7 @@ def _places(r: Ranges) -> Array:
 
 _TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
 _FAR = 1e3  # bounds of a coefficient, in its first value
-_NEAR = 4.0  # bounds of a width or place, likewise
+_NEAR = 4.0  # bounds of a width or place, in its first value
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class Formula:
 
     Args:
         coefficients: of each, in N m, or rad for a reading, over the term's own unit.
-        delta: steps of the fit's common parameters that go with it, in their units, shape (common,).
+        delta: accompanying steps of the fit's common parameters, in their units, shape (common,).
         gained: drop of χ² on held-out runs, dimensionless.
     """
 
@@ -170,7 +170,7 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
     """Find the terms of a kind, one after another.
 
     Args:
-        closable: drop of χ² on held-out runs that the kind's own basis reaches.
+        closable: drop of χ² on held-out runs with the kind's own basis.
 
     Returns:
         The formula; None where no term is supported beyond chance, or it does not predict held-out runs.
@@ -216,7 +216,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
 
 
 def _candidates(unexplained: Unexplained, kind: str) -> list[Term]:
-    """The terms that a formula of a kind may have; none where its runs can have none."""
+    """The terms available for a formula of a kind; none where the runs allow none."""
     of_reading = kind == "reading"
     if of_reading and unexplained.paths[0].run.derivative:
         return []  # an effect's reading is an angle
@@ -230,11 +230,11 @@ def _candidates(unexplained: Unexplained, kind: str) -> list[Term]:
 
 
 def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) -> tuple[list[int], float]:
-    """The terms that are added as long as each pays on held-out runs, and the fall of χ² there.
+    """The terms, added as long as each pays on held-out runs, and the drop of χ² there.
 
     Args:
         parts: normal equations of all terms, by unit.
-        closable: χ² that could be closed.
+        closable: greatest possible drop of χ².
     """
     whole = total(parts)
     c = whole.free
@@ -253,7 +253,7 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
         solved = np.linalg.pinv(inner / np.outer(width, width), rcond=1e-11, hermitian=True) @ cross
         left = own - np.sum(cross * solved, axis=0)
         along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / width)
-        # what the others explain to within rounding gains nothing
+        # a term that the others explain to within rounding gains nothing
         drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
         order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
         tried = []
@@ -275,7 +275,7 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
 
 
 def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
-    """Fit a formula beside those of a fit like any other effect, named after the kind; None where the fit fails."""
+    """Fit a formula beside a fit's effects like any other, named after the kind; None where the fit fails."""
     taken = {known.name for known in known_effects()}
     numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
     table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))
@@ -298,7 +298,7 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
 
 
 def effect_table(formula: Formula, name: str) -> dict[str, Any]:
-    """A formula of the fit's units as the table of an effects file, its values those of the formula."""
+    """A formula in the fit's units as the table of an effects file, with its values."""
 
     def coefficient(value: float, of: Dimension, over: Dimension, default: float) -> dict[str, object]:
         unit, bound = dimension_text(product(of, over, -1.0)), _FAR * abs(value)
@@ -338,7 +338,7 @@ def effect_table(formula: Formula, name: str) -> dict[str, Any]:
 
 
 def effect_of(table: dict[str, Any]) -> type[Effect]:
-    """The class of an effect that a table from `effect_table` states, not registered.
+    """The class of the effect in a table from `effect_table`, not registered.
 
     Raises:
         TunnelError: when the effect cannot be stated.

@@ -1,4 +1,4 @@
-"""A formula that was fitted, as a law in the measured campaign's units, and how much of held-out data it closes."""
+"""A fitted formula as a law in the measured campaign's units, and its share of held-out data."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from diagnosis.remainder.formula import Proposal
 
 
 def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
-    """The share of what a fit leaves that a wider one closes on data held out, its deviation, and what was."""
+    """The share of a fit's residual that a wider fit explains on held-out data, its deviation, and the data."""
     before, after = (predict_held_out(one).residuals for one in (base, wider))
     held_out = "runs" if before else "stretches of time"
     if not before:
@@ -29,10 +29,10 @@ def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
 def stated_law(
     base: Fit, proposal: Proposal, similarity: Similarity, closed: float, std: float
 ) -> Law | None:
-    """The law of a proposal in the measured campaign's units; None where it closes too little of held-out data.
+    """The law of a proposal in the measured campaign's units; None where its share of held-out data is small.
 
     Args:
-        closed: the share that it closes there.
+        closed: its share of held-out data.
         std: its standard deviation, a share.
     """
     if closed < base.settings.remainder.formula_closes:

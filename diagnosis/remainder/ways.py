@@ -1,4 +1,4 @@
-"""How laws of what an answer leaves are sought: the way follows from how the runs are excited and held."""
+"""Ways to find laws of an answer's residual; the way depends on how the runs are excited and supported."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from diagnosis.search.study import Study
 
 
 class Way:
-    """A way in which laws of what an answer leaves are sought."""
+    """A way to find laws of an answer's residual."""
 
-    #: What is said where nothing is sought, by its key among the cautions; empty: nothing.
+    #: Key of the caution where nothing is sought; empty: none.
     caution: ClassVar[str] = ""
 
     def takes(self, study: Study) -> bool:
-        """Whether the runs of a study are such as it is for."""
+        """Whether the way applies to the runs of a study."""
         raise NotImplementedError
 
     def closable(self, study: Study, *, significant: bool, decided: bool) -> Closable | None:
-        """What could be closed of what the answer leaves; None where nothing is sought or found.
+        """The explainable part of the answer's residual; None where nothing is sought or found.
 
         Args:
-            significant: whether what remains is beyond chance; of an undecided answer the whole gap remains.
-            decided: whether the answer is.
+            significant: whether the residual exceeds chance; for an undecided answer it is the whole gap.
+            decided: whether the answer is decided.
 
         Raises:
             LinAlgError: when its equations cannot be solved.
@@ -35,12 +35,12 @@ class Way:
 
 
 class NotSought(Way):
-    """Of a driven body that nothing holds: every small error of a moment adds up in its angle."""
+    """For a driven body without a spring: every small error of a moment adds up in its angle."""
 
     caution = "remainder not sought"
 
     def takes(self, study: Study) -> bool:
-        """Driven runs of a body that nothing restores."""
+        """Whether the runs are driven and the body has no restoring moment."""
         return study.campaign.driven and not study.model.restored
 
     def closable(self, study: Study, *, significant: bool, decided: bool) -> Closable | None:
@@ -50,7 +50,7 @@ class NotSought(Way):
 
 
 class ListedLaws(Way):
-    """Of driven runs: laws of a short list, integrated with the motion."""
+    """For driven runs: laws of a short list, integrated with the motion."""
 
     def takes(self, study: Study) -> bool:
         """Driven runs."""
@@ -62,7 +62,7 @@ class ListedLaws(Way):
 
 
 class AnyLaw(Way):
-    """Of free decays: any smooth moment or error of the reading, from linear responses."""
+    """For free decays: any smooth moment or error of the reading, from linear responses."""
 
     def takes(self, study: Study) -> bool:
         """All runs."""
@@ -70,12 +70,12 @@ class AnyLaw(Way):
         return True
 
     def closable(self, study: Study, *, significant: bool, decided: bool) -> Closable | None:
-        """The share of each kind of law, and the simplest that closes about as much as any."""
+        """The share of each kind of law, and the simplest that explains about as much as any."""
         return closable(study, significant=significant, decided=decided)
 
 
 WAYS: Sequence[Way] = (NotSought(), ListedLaws(), AnyLaw())
-"""All ways, in the order in which they are asked whether they take the runs."""
+"""All ways, in order of preference."""
 
 
 def way_for(study: Study) -> Way:

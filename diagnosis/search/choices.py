@@ -1,7 +1,7 @@
 """Discrete choices that the runs cannot make: which of the springs is not as stiff as stated.
 
-The inertia is fitted, so that a spring which is too stiff and the other one too soft change the frequencies alike.
-The coefficients differ by far more than their standard deviations, and an answer with one choice is one of several.
+The inertia is fitted, so one spring too stiff and another too soft change the frequencies alike. The coefficients
+differ by far more than their standard deviations, so an answer with one choice is one of several.
 """
 
 from __future__ import annotations
@@ -37,11 +37,10 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
 
     Args:
         chosen: a fitted set, with the choice that fits best.
-        gap: what the nominal model leaves.
+        gap: misfit of the nominal model.
 
     Returns:
-        Those probable enough to be stated, weighed like sets of effects; empty where there is nothing to choose, or
-        one choice only is stated.
+        The choices probable enough to be stated, weighed like sets of effects; empty where there is at most one.
     """
     others = [
         other
@@ -67,7 +66,7 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
 
 
 def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequence[Hypothesis]:
-    """The set with another spring in place of the one chosen, fitted; a set whose fit fails is left out."""
+    """The set with another spring in place of the chosen one, fitted; sets whose fit fails are omitted."""
     whole, found = chosen.fit, []
     problem, severity = whole.problem, f"{kind.name}.{kind.parameters()[0].name}"
     stated = dict(problem.fixed)[name]
@@ -83,11 +82,11 @@ def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequenc
 
 
 def _exchanged(whole: Fit, severity: str) -> Point:
-    """Where another spring is off instead: with two springs the same motion, so that no fit loses its phase.
+    """The point with another spring off: with two springs the motion is the same, so no fit loses its phase.
 
-    A spring (1 + x) times as stiff as stated, with all moments divided by 1 + x, is as stiff as stated, and the
-    other spring is then 1/(1 + x) times as stiff as stated. Inertia, damping and moments of effects are fitted, and
-    so are the coefficients of the air, whose pressure is stated.
+    A spring (1 + x) times as stiff as stated, with all moments divided by 1 + x, has its stated stiffness, and the
+    other spring is then 1/(1 + x) times as stiff as stated. Inertia, damping and moments of effects are fitted, as
+    are the coefficients of the air, whose pressure is stated.
     """
     problem, factor = whole.problem, 1.0 / (1.0 + whole.value(severity))
     scaled, air = Similarity(moment=factor), problem.data.model.coefficient_units

@@ -1,4 +1,4 @@
-"""Wall time of the steps of a diagnosis, and the call that says which step it is at."""
+"""Wall time of the steps of a diagnosis, and the progress call at each step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Clock:
     """Wall time by step, and the progress call.
 
     Args:
-        progress: called with the name of each step as it begins; None: nothing is called.
+        progress: called with the name of each step as it begins; None: no calls.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
@@ -24,7 +24,7 @@ class Clock:
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
-        """Time a step, which is announced unless it goes on."""
+        """Time a step, and announce it unless it continues the last one."""
         if self.progress is not None and name != self._last:
             self.progress(name)
         self._last, begun = name, time.perf_counter()

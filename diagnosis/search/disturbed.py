@@ -1,8 +1,7 @@
-"""Runs that were disturbed: which they are, and the campaign without what follows the disturbance.
+"""Disturbed runs, and the campaign without the readings after the disturbance.
 
-What acts in all runs is a cause. A run counts as disturbed where its greatest jump is beyond chance in the run
-itself and beyond the greatest jumps of the other runs, so that dropped samples, turbulence or a ringing rod accuse
-none.
+A cause acts in all runs. A run counts as disturbed where its greatest jump exceeds chance in the run itself and
+the greatest jumps of the other runs, so dropped samples, turbulence or a ringing rod do not count.
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ def prepared_undisturbed(
 
 
 def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
-    """The runs that were disturbed, at one rate of false alarms.
+    """The disturbed runs, at one rate of false alarms.
 
     Args:
         measured: the campaign in its own units.
@@ -69,7 +68,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     for name, p_value in beyond_the_others(list(seen.values()), chosen):
         one = seen[name]
         most = int(np.argmax(one.drop))
-        # fits that include a large jump show it before it happens; it may begin a cycle earlier than it seems
+        # fits that include a large jump show it early; it may begin a cycle before it appears
         first, frequency = most, resonance(nominal, index[name])
         while first > 0 and _clear(float(one.chance[first - 1]), chosen):
             first -= 1
@@ -82,18 +81,19 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
 
 
 def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[tuple[str, float]]:
-    """The runs whose greatest jump is beyond chance and beyond those of the others, with the larger p-value.
+    """The runs whose greatest jump exceeds chance and the jumps of the others, with the larger p-value.
 
     The logarithms of the greatest jumps are tested for up to a given share of outliers from the outside inwards
     (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
-    run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not show it.
+    Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a run among the runs that
+    jump less. Their scatter is estimated with a prior, since few runs do not determine it.
     """
     if len(runs) < chosen.disturbed_fewest:
         return []
     from scipy.special import stdtr  # only here: slow to load
 
     instants = sum(one.drop.size for one in runs)
-    # what is below the greatest of as many values of χ² by chance is no jump, and not a small one
+    # a value below the expected maximum of as many χ² by chance is not a jump
     sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
     order = np.argsort(-sizes)
     most = min(max(1, int(chosen.disturbed_share * len(runs))), len(runs) - 2)

@@ -1,4 +1,4 @@
-"""Which effects: sets of causes, grown one effect at a time."""
+"""Sets of causes, grown one effect at a time."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from tunnel_sim.effects import Effect
 if TYPE_CHECKING:
     from diagnosis.search.views.view import View
 
-_ITERATIONS = 12  # of a fit on the way; the answer's own is polished
+_ITERATIONS = 12  # of an intermediate fit; the answer's is polished
 
 
 def grow(
     view: View, progress: Progress | None = None, enough: Callable[[Sequence[Hypothesis]], bool] | None = None
 ) -> list[Hypothesis]:
-    """Add effects one after another, to the best few sets of each size, as a view of the runs shows them.
+    """Add effects one at a time to the best few sets of each size, in a view of the runs.
 
     Args:
         progress: called with the names of each set that is tried.
-        enough: whether no larger sets than those of a level are sought; None: they are.
+        enough: whether larger sets than those of a level are not needed; None: they are.
 
     Returns:
-        Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
-        could not rise, and at the most causes named.
+        Fitted hypotheses of all sizes, best first. Growth ends where the evidence for a larger set falls or cannot
+        rise, and at the greatest number of causes.
     """
     level, gap = [view.smallest], view.gap
-    # that the runs differ by chance alone is an answer, too
+    # that the runs differ by chance alone is an answer too
     found = {first.names: first for first in level if first.effects or first.fit.problem.scatter}
     while level and not (enough is not None and enough(level)):
         children = _likeliest(view.with_forms(view.larger(level, progress), level), gap, view)
@@ -47,7 +47,7 @@ def grow(
 
 
 def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
-    """The second mode, where the nominal model misses the motion because it has one mode only.
+    """The second mode, where the nominal model misses the motion because it has only one mode.
 
     Returns:
         The fit with the mode added; None where it misses the motion too, or may not be tried.
@@ -58,7 +58,7 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 
 
 def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
-    """Whether two fits differ by little of the power by which they change the nominal one."""
+    """Whether two fits differ by a small share of the power of their change to the nominal fit."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
     return apart < nominal.settings.search.same_change * (nominal.total - max(one.total, other.total))
 
@@ -66,10 +66,10 @@ def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
 def going_on(
     children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
-    """The sets to grow further from their parents, best first; none where the best of all could gain nothing.
+    """The sets to grow further from their parents, best first; empty where the best could gain nothing.
 
     Args:
-        gap: what the nominal model leaves.
+        gap: misfit of the nominal model.
     """
     settings = parents[0].fit.settings
     scale = Scale.of((*children, *parents), gap, settings.weighing)
@@ -79,10 +79,10 @@ def going_on(
     best = max((*ranked, *parents), key=scale.weight)
     if (
         best.explains_runs
-    ):  # what differs between runs is left: another effect may explain it, beside this set
+    ):  # differences between runs remain: another effect may explain them, beside this set
         return [best] if best in ranked else []
     going = []
-    for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
+    for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
         if first or scale.weight(child) > max(map(scale.weight, smaller)) - settings.search.growth_loss:
@@ -91,7 +91,7 @@ def going_on(
 
 
 def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
-    """Whether the weight could rise if one more effect left nothing."""
+    """Whether the weight could rise if one more effect left no residual."""
     if not hypothesis.effects:
         return True
     rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
@@ -101,13 +101,13 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
 def sets_with_one_more(
     level: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None = None
 ) -> list[Hypothesis]:
-    """The sets with one effect more, each fitted from its best starting points.
+    """The sets with one more effect, each fitted from its best starting points.
 
     Returns:
-        One for every set of effects: that of more weight where two sets lead to it, so that a freed form of one
-        does not take the place of the other.
+        One for every set of effects: the one of more weight where two sets lead to it, so that a freed form of one
+        does not exclude the other.
     """
-    # alone, a freed form also follows what other causes do
+    # alone, a freed form also follows the effects of other causes
     single = [h for h in level if len(h.effects) == 1]
     textbook = [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
     found: dict[tuple[str, ...], Hypothesis] = {}
@@ -119,7 +119,7 @@ def sets_with_one_more(
                 progress(" + ".join((*parent.effects, kind.name)))
             starts = starts[: kind.tries]
             tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
-            if all(fitted.total > base.total for fitted in tried):  # linear theory led too far
+            if all(fitted.total > base.total for fitted in tried):  # linear theory overshot
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
@@ -134,10 +134,10 @@ def sets_with_one_more(
 def _worth_fitting(
     parent: Hypothesis, kinds: Sequence[type[Effect]]
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
-    """The effects that linear theory predicts to close most; after the nominal model generously many.
+    """The effects that linear theory predicts to explain most; generously many after the nominal model.
 
-    Beside other effects, those that are predicted to do no more than a needless one are left out. Where chance
-    differences between the runs explain the runs, the effects of greatest predicted likelihood are fitted.
+    Beside other effects, those predicted to gain no more than chance are left out. Where chance differences
+    between the runs explain them, the effects of greatest predicted likelihood are fitted.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     weighing, chosen = parent.fit.settings.weighing, parent.fit.settings.search
@@ -153,7 +153,7 @@ def _worth_fitting(
         for (
             kind,
             starts,
-        ) in scored:  # what the effect's own numbers in every run gain by chance does not count
+        ) in scored:  # the chance gain of the effect's parameters per run does not count
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
         if not parent.effects:
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
@@ -166,7 +166,7 @@ def _worth_fitting(
 
 
 def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
-    """The set with an effect more fitted to runs that repeat exactly, the best from its starting points."""
+    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points."""
     base = parent.repeating
     if base is None:
         return None
@@ -177,7 +177,7 @@ def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
 
 
 def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: View) -> list[Hypothesis]:
-    """The sets, the best of which are sought from runs that repeat exactly, too."""
+    """The sets, the best of which are also fitted to runs that repeat exactly."""
     if not view.base.problem.scatter:
         return list(children)
     scale = Scale.of((*children, view.smallest), gap, view.base.settings.weighing)

@@ -1,4 +1,4 @@
-"""The nominal model with effects added and fitted; their forms freed where that pays."""
+"""The nominal model with effects added and fitted; their forms are freed where that pays."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Hypothesis:
     Args:
         effects: names, in the order they were added.
         fit: the fit.
-        textbook: the fit with the textbook form, where the forms were freed; None otherwise.
+        textbook: the fit with the textbook form, where forms were freed; else None.
         short: the same set fitted to shorter stretches of the runs, where effects are added there.
-        repeating: the same set fitted to runs that repeat exactly, from which effects are added as well.
+        repeating: the same set fitted to runs that repeat exactly, from which effects are added too.
     """
 
     effects: tuple[str, ...]
@@ -52,15 +52,15 @@ class Hypothesis:
 
     @property
     def forms(self) -> int:
-        """How many form parameters were freed."""
+        """Number of freed form parameters."""
         return len(self.fit.problem.free_forms)
 
     @property
     def further_numbers(self) -> int:
-        """Freed form parameters and instants in a run, less two where gravity leaves no need of a spring.
+        """Freed form parameters and instants in a run, less two where gravity replaces a spring.
 
-        An instant follows any slow error of the phase as a form does. A spring would have to soften by chance, and
-        as much as gravity does.
+        An instant absorbs any slow phase error, as a form does. A spring would have to soften by chance, and as
+        much as gravity does.
         """
         problem = self.fit.problem
         numbers = self.forms + sum(
@@ -74,10 +74,9 @@ class Hypothesis:
 
     @cached_property
     def excess(self) -> Array:
-        """χ² beyond noise that the set leaves by channel, shape (6,), dimensionless.
+        """χ² beyond noise of the set, by channel, shape (6,), dimensionless.
 
-        What instants of the runs gain by chance counts as left in the frequency, and what phases gain in the
-        harmonics.
+        The chance gain of instants is added in the frequency, and that of phases in the harmonics.
         """
         problem = self.fit.problem
         found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
@@ -90,11 +89,11 @@ class Hypothesis:
 
     @cached_property
     def explains_runs(self) -> bool:
-        """Whether runs that differ by chance are explained, each by itself, down to what chance leaves."""
+        """Whether each of the runs, which differ by chance, is explained down to chance."""
         return bool(self.fit.problem.scatter) and self.leaves_within(np.zeros(len(CHANNELS)))
 
     def leaves_within(self, error: Array) -> bool:
-        """Whether the set leaves no more in any channel than chance and an error do.
+        """Whether the misfit in every channel is at most chance plus an error.
 
         Args:
             error: χ² by channel, shape (6,), dimensionless.
@@ -104,14 +103,12 @@ class Hypothesis:
         return bool(np.all(found.excess < by_chance + error))
 
     def fitted_set(self, nominal: Fit, gap: ChannelMisfit, *, outside: bool = False) -> FittedSet:
-        """What the weighing needs to know of it.
-
-        What instants and phases of the runs gain by chance counts as left.
+        """The set as input of the weighing, with the chance gain of instants and phases added to its misfit.
 
         Args:
-            nominal: of whose gap the share is.
-            gap: what the set is weighed against.
-            outside: as `FittedSet` has it.
+            nominal: the nominal fit, whose gap shares refer to.
+            gap: the misfit that the set is weighed against.
+            outside: as in `FittedSet`.
         """
         by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
@@ -122,7 +119,7 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What sets are compared by: the misfit by channel that needs no cause, and the least that any of them leaves.
+    """The reference by which sets are compared: the misfit that needs no cause, and the least of any set.
 
     Args:
         misfit: χ² by channel, shape (6,).
@@ -140,7 +137,7 @@ class Scale:
 
     @classmethod
     def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit, chosen: WeighingSettings) -> Scale:
-        """The scale of some sets, from what the nominal model leaves."""
+        """The scale of some sets, from the misfit of the nominal model."""
         least = least_excess([h.excess for h in sets])
         return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost, gap.known)
 
@@ -150,16 +147,16 @@ class Scale:
         return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
-        """The same of the set with one more effect that leaves nothing.
+        """Logarithm of the weight of the set with one more effect and no residual.
 
         Args:
-            repeating: whether the runs then repeat, too; else they differ by chance as much as before.
+            repeating: whether the runs then repeat; else they differ by chance as before.
         """
         cost = 0.0 if repeating else hypothesis.fit.scatter_cost(self.known)
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def form_may_gain(self, hypothesis: Hypothesis) -> bool:
-        """Whether the weight of a set would rise with one more form that leaves nothing."""
+        """Whether the weight of a set would rise with one more form and no residual."""
         cost = hypothesis.fit.scatter_cost(self.known)
         best = self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
         return best > self.weight(hypothesis)
@@ -167,31 +164,30 @@ class Scale:
     def _log_weight(
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
     ) -> float:
-        """Logarithm of the weight of a set with so many more effects and numbers that leaves ``left``."""
+        """Logarithm of the weight of a set with a misfit ``left`` and further effects and parameters."""
         count, further = len(of.effects) + effects, of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
         return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.compared)
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
-    """That of more weight beside what the nominal model leaves; the first if they are equal."""
+    """The set of more weight, given the misfit of the nominal model; the first if they are equal."""
     if one is None:
         return other
     return max(one, other, key=Scale.of((one, other), gap, other.fit.settings.weighing).weight)
 
 
 def own_gain(problem: Problem) -> float:
-    """χ² by which the instants and phases of the runs' own may lower it by chance."""
+    """Chance drop of χ² by the instants and phases of single runs."""
     gain = problem.data.settings.weighing.own_number_gain
     return float(gain * problem.parameters.of_effects * len(problem.data.runs))
 
 
 def is_plausible(fitted: Fit) -> bool:
-    """Whether every effect of a fit is still what its name means, in enough of the runs.
+    """Whether every effect of a fit still is what its name means, in enough of the runs.
 
-    Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
-    Neither is a power law whose free exponent ends at a bound, nor friction whose rate does: the readings ask for
-    another law.
+    Gravity that cancels most of an unstated spring is not: it imitates a nonlinear spring. Neither is a power law
+    whose free exponent ends at a bound, nor friction whose rate does: the readings ask for another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     chosen = fitted.settings.search
@@ -210,13 +206,13 @@ def is_plausible(fitted: Fit) -> bool:
 
 
 def turned_back(fitted: Fit) -> Fit:
-    """The fit with the sensor's zero where the body swings.
+    """The fit with the sensor's zero within the readings.
 
-    Half a turn away, gravity of the other sign swings the body alike, and fits of large swings may end there.
+    Gravity of the opposite sign, half a turn away, moves the body alike, and fits of large swings may end there.
 
     Returns:
-        Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else the
-        fit that was given.
+        Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else
+        the given fit.
     """
     problem, readings = fitted.problem, [run.reading for run in fitted.problem.data.runs]
     least, greatest = min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
@@ -234,7 +230,7 @@ def turned_back(fitted: Fit) -> Fit:
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:
-    """A fit with some effects only, by name, and everything else as it was; its residuals are those of the whole.
+    """A fit with some effects only, by name; the rest, and its residuals, are those of the whole.
 
     Returns:
         A start, with its sensitivities, for the fit of the smaller problem.
@@ -263,14 +259,14 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 def with_forms(
     found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int | None = None
 ) -> list[Hypothesis]:
-    """Free the forms of the best hypotheses where the textbook form leaves a good part open and they gain weight.
+    """Free the forms of the best hypotheses where the textbook form leaves a large residual and they gain weight.
 
-    Before, the deepest minimum of the textbook form is sought: a rod that misses its ringing lacks no form.
+    The deepest minimum of the textbook form is sought first: a rod that misses its ringing does not lack a form.
 
     Args:
-        gap: what the nominal model leaves.
+        gap: misfit of the nominal model.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: how many of the best are tried with free forms; None: as the settings say.
+        count: number of the best that are tried with free forms; None: the setting.
 
     Returns:
         All hypotheses, best first.
@@ -297,7 +293,7 @@ def with_forms(
 
 
 def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
-    """One form of every effect that has any, in all ways; of an effect whose form is free already that one."""
+    """All combinations of one form of every effect that has any; a form that is free already is kept."""
     free = fitted.problem.free_forms
     by_effect = [
         [tuple(f"{kind.name}.{name}" for name in form) for form in kind.forms()]
@@ -308,11 +304,11 @@ def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
 
 
 def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:
-    """The forms without which χ² would rise by more than a given number."""
+    """The forms without which χ² would rise by more than a given amount."""
     infos = {f"{k.name}.{i.name}": i for k in freed.problem.effects for i in k.parameters()}
 
     def pull(name: str) -> float:
-        std = freed.std(name)  # a form that the runs cannot tell has none
+        std = freed.std(name)  # an undetermined form has none
         return (freed.value(name) - infos[name].default) / std if std > 0.0 else 0.0
 
     return tuple(form for form in forms if max(pull(name) ** 2 for name in form) > rise)
@@ -322,14 +318,14 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
 
     Returns:
-        The same effects with a χ² no larger, but for what following the rod changes; as given where the fit cannot
-        go on.
+        The same effects with a χ² no larger, except for the change by following the rod; unchanged where the fit
+        fails.
     """
     first = chosen.fit
     problem = dataclasses.replace(first.problem, rod_followed=True)
     followed = zip(scaled_residuals(problem, first.point), first.residuals, strict=True)
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
-        # adding the ringing to the slow motion is not exact enough; the confirmation says how far off it is
+        # adding the ringing to the slow motion is not exact enough; the confirmation states the error
         first = try_fit(problem, first.point) or first
     forms = next(_choices(first), ())
     better = _free_forms(first, forms, tolerance=_POLISH) or try_fit(
@@ -350,7 +346,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:
-    """The same effects with some forms free and no others; None where none is, or nothing is gained."""
+    """The same effects with only some forms free; None where none is, or there is no gain."""
     problem = fitted.problem
     if not forms:
         return None
@@ -366,5 +362,5 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
-        return None  # nor where the runs tell no form at all
+        return None  # also where the runs determine no form
     return found if found.total < fitted.total and is_plausible(found) else None

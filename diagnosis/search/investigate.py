@@ -44,11 +44,11 @@ def investigate(
         model: the nominal model of the campaign, in the same units; None: that of its kind.
         settings: of the diagnosis.
         rivals: from outside the vocabulary, weighed beside the effects.
-        views: in which sets of effects are found, in the order in which they are asked whether they apply.
+        views: in which sets of effects are found, in order of preference.
 
     Returns:
-        The study, in which disturbed runs end at their disturbance; with the lead of the motion over its input
-        where it explains more with no more causes.
+        The study. Disturbed runs end at their disturbance. It includes a lead of the motion over its input where
+        that explains more with no more causes.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -82,10 +82,10 @@ def investigate(
 def nominal_study(
     campaign: Campaign, kinds: Sequence[type[Effect]], settings: Settings = Settings()
 ) -> Study:
-    """Test a campaign for a gap, and fit no effect: the study up to the fit of the nominal model.
+    """Test a campaign for a gap without fitting effects: the study up to the fit of the nominal model.
 
     Args:
-        kinds: the effects that may be read off the records.
+        kinds: the effects that may be detected in the records.
         settings: of the diagnosis.
 
     Raises:
@@ -97,14 +97,14 @@ def nominal_study(
 
 
 def explains_more(again: Study, found: Study) -> bool:
-    """Whether a study with a lead is better than one without: it explains more with no more causes."""
+    """Whether a study with a lead explains more than one without, with no more causes."""
     unexplained = again.causes == UNKNOWN and found.causes != ()
     fewer = found.causes == UNKNOWN or len(again.causes) <= len(found.causes)
     return fewer and not unexplained
 
 
 def likeliest_lead(study: Study) -> float:
-    """The lead with which the answer's effects, without a delay, leave least, s of the measured campaign.
+    """The lead of least residual with the answer's effects, without a delay, s of the measured campaign.
 
     Returns:
         0 where it is not clear, there is no gap, or the runs have no input.

@@ -43,28 +43,29 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-#: The effects that are read off the records before any is fitted.
+#: The effects detected in the records before any is fitted.
 HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What is known of a campaign before any effect is fitted, in the units of the similar campaign.
+    """A campaign before any effect is fitted, in the units of the similar campaign.
 
     Args:
         campaign: the similar campaign (`diagnosis.model.similarity`).
-        similarity: how it was made from the measured one.
+        similarity: the conversion from the measured one.
         kinds: the effects that may be named.
         noise: of the records without the hum.
         trend: of the noise with the motion.
         step: of the lattice on which the readings lie, rad; 0 where they are continuous.
         coarse: whether that step is coarser than the stated resolution.
         hum: the hum that was removed, or None.
-        nominal: the fit of the nominal model to the runs to which answers are fitted.
-        cut: whether the start of every run and what follows its motion were left out, because the nominal model
+        nominal: the nominal fit, to the runs to which answers are fitted.
+        cut: whether the start of every run and the time after its motion were left out, because the nominal model
             misses the motion grossly.
         rested: runs that end with a long rest, which the fits leave out.
-        tested: the same fit in the blocks in which noise and gap were tested, where those of ``nominal`` are wider.
+        tested: the nominal fit in the blocks in which noise and gap were tested, where those of ``nominal`` are
+            wider.
     """
 
     campaign: Campaign
@@ -82,7 +83,7 @@ class Prepared:
 
     @property
     def read_off(self) -> tuple[str, ...]:
-        """Causes read off the records before fitting."""
+        """Causes detected in the records before fitting."""
         found = {HUM.name: self.hum is not None, COARSE_STEP.name: self.coarse}
         return tuple(name for name, present in found.items() if present)
 
@@ -98,14 +99,14 @@ class Prepared:
 
     @cached_property
     def ringing(self) -> Hypothesis | None:
-        """The second mode, where it alone makes up for a motion that the nominal model misses."""
+        """The second mode, where it alone corrects a motion that the nominal model misses."""
         return second_mode_alone(self.nominal, self.able) if misses_motion(self.nominal) else None
 
     def left_by_read_off(self, base: Fit) -> Array:
         """χ² by channel that no set of effects has to explain, shape (6,), dimensionless.
 
         The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a
-        small share of itself.
+        small residual.
 
         Args:
             base: fit of the nominal model to the runs on which sets are compared.
@@ -115,7 +116,7 @@ class Prepared:
             return left
         levels, stated = reading_levels(self.campaign), self.campaign.sensor.noise_std
         white = self.noise.white(typical_step(levels))
-        # a coarse step hides the noise, so that what is stated of it is the better guess
+        # a coarse step hides the noise, so the stated noise is the better estimate
         white = dict.fromkeys(white, stated) if stated else white
         rounding = Rounding.of(base, white, self.step, levels)
         tries = [misfit(base, residuals).excess for residuals in rounding.residuals(base.problem.data)]
@@ -131,13 +132,13 @@ class Prepared:
         return np.array([size * (name == "harmonics") for name in CHANNELS])
 
     def in_wider_blocks(self) -> Prepared:
-        """The same with the runs in blocks for fits, where a hum is not left in them."""
+        """The campaign with its runs in blocks for fits, unless a hum would remain in them."""
         if self.hum is not None:
             return self
         return replace(self, nominal=compressed(self.nominal), tested=self.nominal)
 
     def place(self) -> Place:
-        """Where the gap is, from the residuals of the nominal model alone."""
+        """The place of the gap, from the residuals of the nominal model alone."""
         stated = self.noise.stated_variance if self.coarse else None
         nominal = self.tested or self.nominal
         level = float(np.mean([run.noise.variance * run.block for run in nominal.problem.data.runs]))
@@ -157,7 +158,7 @@ def prepared_and_tested(
     Args:
         measured: the campaign in its own units.
         model: its nominal model, in the same units.
-        kinds: the effects that may be named, and read off the records.
+        kinds: the effects that may be named, and detected in the records.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -190,9 +191,9 @@ def prepared_and_tested(
 def _without_hum(
     campaign: Campaign, similarity: Similarity, nominal: Fit, noise: Noise
 ) -> tuple[Fit, Noise, Hum | None]:
-    """The nominal model fitted to records without their hum, their noise, and the hum; as given without a hum."""
+    """The nominal fit to records without their hum, their noise, and the hum; unchanged without a hum."""
     model, settings = nominal.problem.data.model, nominal.settings
-    # block means short enough to show every line of the mains that the samples show
+    # block means short enough to show every mains line that the samples show
     interval = mains_interval(similarity)
     problem = Problem(prepare(campaign, noise.variance, similarity, interval, model, settings))
     residuals = scaled_residuals(problem, nominal.point)
@@ -210,7 +211,7 @@ def _without_hum(
 
 
 def fit_nominal(data: Data) -> Fit:
-    """Fit the nominal model; where it misses the motion, from the runs' own decays as well.
+    """Fit the nominal model; where it misses the motion, start from the runs' own decays as well.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.

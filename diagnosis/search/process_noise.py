@@ -1,8 +1,8 @@
 """A random moment on the rig: its likelihood from a steady Kalman filter.
 
-There are three kinds: turbulence, and vibration of the surroundings, broad or about one frequency; and vortex
-shedding with a wandering phase, about a frequency that follows the wind. Two at once are one spectrum with two
-parts. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981), filter error.
+Turbulence, and vibration of the surroundings, are broad or about one frequency; vortex shedding with a wandering
+phase is about a frequency that follows the wind. Two moments at once are one spectrum with two parts. Åström,
+Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981), filter error.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class ProcessNoise:
         spectrum: as fitted, of one part or two.
         runs: ids of the runs in which it acts.
         drops: of −2 ln L against white measurement noise alone, by such run, shape (runs,), dimensionless.
-        by_run: the drop of each such run over the power that the spectrum predicts of its response, in units of
-            the noise's, shape (runs,), dimensionless; at least 0.
+        by_run: the drop of each such run over the predicted power of its response, in noise variances, shape
+            (runs,), dimensionless; at least 0.
         cost: −2 ln L without constants, of all runs, dimensionless.
         excess: mean squared scaled innovation minus one, dimensionless.
         innovations: scaled, by run in which it acts.
@@ -73,11 +73,11 @@ class ProcessNoise:
 
     @property
     def sources(self) -> frozenset[Source]:
-        """Where its parts come from."""
+        """The sources of its parts."""
         return frozenset(part.source for part in self.spectrum)
 
     def price(self, of_part: float) -> float:
-        """What −2 ln L has to fall by beyond one part without a centre, ``of_part`` for each; dimensionless."""
+        """Price of −2 ln L beyond one part without a centre, ``of_part`` for each further one; dimensionless."""
         centres = sum(part.centre > 0.0 for part in self.spectrum)
         return of_part * (centres + len(self.spectrum) - 1)
 
@@ -102,7 +102,7 @@ class _Channel:
         return float(kept.size * np.log(self.variance) + kept @ kept)
 
     def acceleration(self, part: SpectrumPart) -> float:
-        """What a part's unit of intensity gives, rad/s²; 0 where it does not act."""
+        """Acceleration per unit intensity of a part, rad/s²; 0 where it does not act."""
         return (
             self.per_moment * part.source.moment(self.run, self.data) if part.source.acts(self.run) else 0.0
         )
@@ -112,9 +112,8 @@ def random_moments(fit: Fit, source: Source) -> list[ProcessNoise]:
     """The random moments of a source that may explain the residuals of a fit.
 
     Returns:
-        The best fit of each form, and of the likeliest with a second part beside it where that pays; empty where
-        it acts in no run, or the model is not stable. A spectrum of another shape than first order has two parts
-        of one kind sooner than a part of another kind.
+        The best fit of each form, and of the likeliest with a second part where that pays; empty where it acts in
+        no run, or the model is not stable. Two parts of one kind may fit a spectrum that is not of first order.
     """
     channels, narrow, chosen = _channels(fit), wandering(fit.problem.data), fit.settings.moment
     if not channels:
@@ -133,10 +132,10 @@ def random_moments(fit: Fit, source: Source) -> list[ProcessNoise]:
 
 
 def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether a second part lowers −2 ln L by more than a needless one may, whichever the runs had been.
+    """Whether a second part lowers −2 ln L by more than chance, for any selection of runs.
 
-    It acts in all runs, while an error of the model is in those of one spring or speed. The scatter between the
-    runs says how much of the fall may be chance.
+    It acts in all runs, while a model error acts in those of one spring or speed. The scatter between the runs
+    shows how much of the drop may be chance.
     """
     alone = dict(zip(first.runs, first.drops.tolist(), strict=True))
     gains = both.drops - np.array([alone.get(run, 0.0) for run in both.runs])
@@ -147,7 +146,7 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMom
 
 
 def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:
-    """Whether a fall of −2 ln L shows a random moment.
+    """Whether a drop of −2 ln L shows a random moment.
 
     Args:
         drop: of −2 ln L, dimensionless.
@@ -171,10 +170,10 @@ def _fit(
 
     Args:
         known: the fit without the last part; the fit starts there.
-        price: what −2 ln L has to fall by for the last part to pay beside it, dimensionless.
+        price: least drop of −2 ln L by the last part, dimensionless.
 
     Returns:
-        None where they act in no run, or where beside the known parts no point of the last one's grid pays.
+        None where they act in no run, or where no point of the last part's grid pays.
     """
     every_run, channels = channels, [c for c in channels if any(form.source.acts(c.run) for form in forms)]
     if not channels:
@@ -236,7 +235,7 @@ def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> Pr
 
 
 def _powers(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
-    """Power of the response to a moment at the end of each run that began at rest, in that of the noise."""
+    """Power of the response at the end of each run, from rest, in noise variances."""
     power = []
     for channel, a, q in zip(channels, *_discrete(channels, [spectrum] * len(channels)), strict=True):
         for _ in range(int(np.log2(channel.residual.size))):
@@ -246,7 +245,7 @@ def _powers(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
 
 
 def _unit(channels: Sequence[_Channel]) -> float:
-    """The moment of the surroundings whose response is as large as the noise in the median run, N m."""
+    """The surroundings' moment whose response equals the noise in the median run, N m."""
     one = (SpectrumPart(1.0, LONGEST_BANDWIDTH, source=SURROUNDINGS),)
     return 1.0 / float(np.sqrt(np.median(_powers(channels, one))))
 
@@ -254,7 +253,7 @@ def _unit(channels: Sequence[_Channel]) -> float:
 def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
     """Whether noise of the reading explains the runs better than a random moment does.
 
-    A zero that wanders, and coloured noise of the sensor, are of first order in the reading itself. A random moment
+    A wandering zero, and coloured noise of the sensor, are of first order in the reading itself. A random moment
     shows through the motion that it drives, whose spectrum has a peak at the natural frequency.
     """
     from scipy.signal import lfilter  # only here: slow to load
@@ -280,7 +279,7 @@ def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
 
 
 def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
-    """The runs of a fit, with the response to a random moment in the noise of those in which it acts.
+    """The runs of a fit, with the response to a random moment added to their noise.
 
     Args:
         spectrum: of the moment.

@@ -1,9 +1,8 @@
 """Random moments: a layer of noise under every set of causes, and itself a cause.
 
-A strong random motion misleads least squares: the residuals of the runs in which it acts are far from white, so
-that instants and weak effects are missed in them. Here sets are grown and fitted to rows in whose noise the rig's
-response to the random moment is part. The random moment is estimated from what the best of them leaves, until both
-agree.
+Least squares takes residuals for white, so a strong random motion hides instants and weak effects. Here sets are
+grown and fitted to rows whose noise includes the rig's response to the random moment. The random moment is
+estimated from the residual of the best set, until both agree.
 """
 
 from __future__ import annotations
@@ -50,10 +49,10 @@ class RandomAnswer:
     """A random moment, alone or beside other effects.
 
     Args:
-        kinds: the effects that the parts of its spectrum are.
-        beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
-        left: what remains. The share is that of the innovations' and the other runs' excess in the nominal one's,
-            and the same in every channel.
+        kinds: the effects that its spectrum's parts are.
+        beside: the fitted effects beside it, with residuals in the sensor's noise alone, or None.
+        left: the residual. Its share is the excess of the innovations and of the other runs over the nominal
+            excess, the same in every channel.
     """
 
     kinds: tuple[type[Effect], ...]
@@ -63,12 +62,12 @@ class RandomAnswer:
 
     @property
     def share(self) -> float:
-        """Of the gap left open, a fraction."""
+        """Unexplained share of the gap, a fraction."""
         return self.left.share
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects, sorted; once where an effect acts steadily and at random."""
+        """Names of the effects, sorted, without duplicates where an effect acts both steadily and at random."""
         names = {kind.name for kind in self.kinds}
         return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
 
@@ -81,11 +80,11 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
         hypotheses: those found without a random moment.
 
     Returns:
-        The likeliest random moment with the best set of effects beside it, and that of another source which
-        explains the runs about as well: runs in one wind cannot tell the stream from the surroundings. It must
-        lower −2 ln L beside the same set by more than a needless effect may, and be steady noise, alike in all runs
-        in which it acts. Empty where none passes, where the likeliest is of a kind that may not be named, where no
-        random moment could leave little enough of the gap, and where one law closes nearly all that the sets leave.
+        The likeliest random moment with the best set of effects, and one of another source that explains the runs
+        nearly as well: runs in one wind do not separate the stream from the surroundings. It must lower −2 ln L
+        beside the same set by more than chance, and be steady noise, alike in all runs in which it acts. Empty
+        where none qualifies, where the likeliest may not be named, where no random moment could explain enough of
+        the gap, and where one law explains nearly all of the residual.
     """
     scale = Scale.of(hypotheses, view.gap, view.base.settings.weighing)
     best = max([Hypothesis((), view.base), *hypotheses], key=scale.weight)
@@ -119,7 +118,7 @@ class _Beside:
 
     @classmethod
     def found(cls, source: Source, best: Hypothesis, view: View) -> _Beside | None:
-        """The steady noise of a source beside the effects that it leaves to be found; None where it is none."""
+        """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
         top = _settled(best, view, source)
         for number in range(chosen.further_effects + 1):
@@ -151,7 +150,7 @@ class _Beside:
         return _cost(self.process, self.top)
 
     def answer(self) -> RandomAnswer | None:
-        """What is weighed beside the sets; None where a part of the moment is of a kind that may not be named."""
+        """The answer to be weighed; None where a part of the moment is of a kind that may not be named."""
         view, seen, process = self.view, self.seen, self.process
         allowed = [kind for kind in view.prepared.kinds if kind.random]
         of_parts = [[kind for kind in allowed if part.is_of(kind)] for part in process.spectrum]
@@ -161,7 +160,7 @@ class _Beside:
         excess = abs(process.excess) + max(excess_elsewhere(seen.fit, process.runs), 0.0)
         names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
         share, by_channel = excess / view.repeating.gap, excess / view.base.gap * view.gap.excess
-        # of a random motion, taken for the sensor's noise, the runs would seem to differ
+        # with a random motion taken for sensor noise, the runs would appear to differ
         cost = self.top.fit.scatter_cost(view.gap.known)
         numbers, compared = seen.further_numbers, self.top.fit.compared
         left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
@@ -169,7 +168,7 @@ class _Beside:
 
 
 def _explained(source: Source, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
-    """The likeliest random moment of a source in what a set leaves, and its cost; infinite where none acts."""
+    """The likeliest random moment of a source in a set's residual, and its cost; infinite where none acts."""
     process = likeliest(random_moments(beside.fit, source), beside.fit.settings.moment)
     return (np.inf, None) if process is None else (_cost(process, beside), process)
 
@@ -183,10 +182,10 @@ def _cost(process: ProcessNoise, beside: Hypothesis) -> float:
 def without_the_random_moment(
     answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
-    """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
+    """The sets beside random moments, fitted with the sensor's noise alone, in case the moment is not real.
 
     Returns:
-        All sets; of two with the same effects that of more weight.
+        All sets; of two with the same effects the one of more weight.
     """
     found = {hypothesis.names: hypothesis for hypothesis in known}
     for answer in answers:
@@ -201,9 +200,9 @@ def without_the_random_moment(
 def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
     """The set with one more effect that is evident beside the random moment, the most evident first.
 
-    The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
-    the runs says how much of a fall of χ² is chance. An effect with an instant of its own in every run must lower
-    χ² for each of them, too.
+    The noise is estimated from the residuals, and no real spectrum has its form, so the scatter between the runs
+    shows how much of a drop of χ² is chance. An effect with an instant in every run must lower χ² for each instant
+    as well.
     """
     if len(top.effects) >= top.fit.settings.search.most_causes:
         return []
@@ -219,11 +218,11 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
 
 
 def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
-    """Whether a random moment of a source may be what the best set leaves.
+    """Whether a random moment of a source may be the residual of the best set.
 
-    With one in the wind that left nothing there the set would weigh more, or what is left is steady noise: a strong
-    random motion misleads the fit of the other runs too. One that acts in every run could leave nothing of any gap,
-    so that it must be steady noise.
+    It may if perfect agreement of the wind-on runs would raise the set's weight, or if the residual is steady
+    noise: a strong random motion misleads the fit of the other runs too. A moment that acts in every run could
+    explain any gap, so it must be steady noise.
     """
     runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
     still = [run for run, _ in runs if not source.acts(run)]
@@ -246,7 +245,7 @@ def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
 
 
 def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
-    """Whether what a fit leaves is not noise of the reading, and follows no phase and no law."""
+    """Whether a residual is not noise of the reading, and follows neither a phase nor a law."""
     if source.in_every_run and is_of_reading(fitted, process):
         return False
     return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
@@ -275,10 +274,10 @@ def excess_elsewhere(fit: Fit, acts: Collection[str]) -> float:
 
 
 def follows_the_motion(fitted: Fit, acts: Collection[str]) -> bool:
-    """Whether residuals change the amplitude of the motion otherwise than its phase.
+    """Whether residuals change the amplitude of the motion more, or less, than its phase.
 
-    A random moment does not know the phase of the motion: what it adds along the motion and along the rate has the
-    same power. A missing damping adds to the first, and a missing stiffness to the second.
+    A random moment is independent of the phase of the motion: it adds the same power along the motion and along
+    the rate. A missing damping adds to the first, and a missing stiffness to the second.
 
     Args:
         acts: ids of the runs in which the random moment acts.
@@ -300,38 +299,37 @@ def follows_the_motion(fitted: Fit, acts: Collection[str]) -> bool:
 
 
 def obeys_a_law(fitted: Fit, source: Source) -> bool:
-    """Whether most of what a fit leaves would be closed by one law, the same in all runs.
+    """Whether one law, common to all runs, would explain most of a residual.
 
-    A random moment differs from run to run, so that no law fitted to some runs predicts the others. A missing
-    law of angle, rate and wind speed does, and a slow random moment would take its place.
+    A random moment differs from run to run, so no law fitted to some runs predicts the others. A missing law of
+    angle, rate and wind speed does, and must not be taken for a slow random moment.
 
     Args:
-        source: of the random moment, which says what laws act in the same runs.
+        source: of the random moment; determines the laws that act in the same runs.
 
     Returns:
-        Whether one of these laws (`diagnosis.likelihood.paths`) closes enough on runs held out of its fit, beyond
-        chance.
+        Whether one of these laws (`diagnosis.likelihood.paths`) explains enough of held-out runs, beyond chance.
     """
     return _closed_by_a_law(fitted, source.laws, fitted.settings.moment.law_share)
 
 
 def is_no_noise(fitted: Fit) -> bool:
-    """Whether nearly all that a fit leaves would be closed by one law of any kind, the same in all runs.
+    """Whether one law of any kind, common to all runs, would explain nearly all of a residual.
 
-    What remains for a random moment is then too small to be what the sets lack, and none is sought.
+    The rest is then too small for a random moment to be the missing cause, and none is sought.
     """
     return _closed_by_a_law(fitted, list(COMMON), fitted.settings.moment.no_noise_share)
 
 
 def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
-    """Whether a law of some kind closes more than a share of what a fit leaves, on held-out runs."""
+    """Whether a law of some kind explains more than a share of a residual on held-out runs."""
     unexplained = Unexplained(fitted)
     found, stds = (unexplained.common(kind).ceiling for kind in kinds), fitted.settings.moment.law_stds
     return any(one.closed - stds * one.std > share for one in found)
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
-    """Variance of an effect's parameters over what independent noise would give, 1 or more.
+    """Variance of an effect's parameters over that of independent noise, 1 or more.
 
     Returns:
         From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
@@ -349,13 +347,12 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
 
 
 def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
-    """The best set of effects on rows in whose noise the response to the random moment is part.
+    """The best set of effects on rows whose noise includes the response to the random moment.
 
-    The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
-    what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as noise
-    lets the motion wander as the response does, and its own residuals overstate it. The rounds end where the best
-    set is the one that the random moment was estimated beside. Where none is, the likeliest of those reached is
-    taken.
+    The given set where no random moment acts or its filter does not settle. The random moment is estimated from
+    the residual of the best set with the sensor's noise alone: the fit with the response as noise lets the motion
+    wander, and its residuals overstate the moment. The rounds end where the best set is the one that the moment
+    was estimated beside. If they do not end, the likeliest of those reached is taken.
     """
     nominal, kinds, known, top = view.base, view.able, best.fit, best
     data, chosen = nominal.problem.data, nominal.settings.moment
@@ -371,9 +368,8 @@ def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
             base = settled(fit(replace(nominal.problem, data=noisy), nominal.point))
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
-            # a random moment leaves little of a gap where it acts for effects to be compared there: more are added
-            # while one that is seen there alone is evident, the most evident of all, so that none mops up what
-            # another leaves
+            # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
+            # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
             top = _sought_again(found)
             further = _evident(top, kinds)
             while any(h.effects[-1] in hidden for h in further):
@@ -384,15 +380,15 @@ def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
             reached[top.names] = top
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
-        if len(reached) > 1:  # to and fro between sets
+        if len(reached) > 1:  # alternates between sets
             top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
     return top
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
-    """The set with instants and phases sought once more; each run keeps those that leave less.
+    """The set with instants and phases sought once more; each run keeps those of least residual.
 
-    They were found before the other effects were known.
+    They were first found before the other effects were known.
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
@@ -404,7 +400,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
             continue
         sought = fit(start.problem, start.point)
         tried = [known, sought]
-        if sought.point.release.shape == known.point.release.shape:  # else another number of instants
+        if sought.point.release.shape == known.point.release.shape:  # else the number of instants differs
             release = sought.point.release.copy()
             kept = known.chi2 < sought.chi2
             old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))
@@ -415,6 +411,6 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
 
 
 def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:
-    """The hypothesis as it stands, with residuals in the noise of other data."""
+    """The hypothesis, unchanged, with residuals in the noise of other data."""
     problem = replace(hypothesis.fit.problem, data=data)
     return replace(hypothesis, fit=fit_at(problem, hypothesis.fit.point), textbook=None)

@@ -1,8 +1,8 @@
-"""How much of a gap the known effects could close at most: where they could not, no set of them is the cause.
+"""Greatest share of a gap that the known effects could explain: where it is small, no set of them is the cause.
 
-By linear theory a set of effects closes no more than all effects together, each in every trial of it, and with a
-deviation of every run's own of whatever may differ between runs. That takes as long as it takes to start one fit of
-every effect, and fitting the sets takes ten times as long.
+By linear theory a set of effects explains no more than all effects together, each in every one of its trials, with
+deviations of every run in everything that may differ between runs. Computing this takes as long as starting one
+fit of every effect; fitting the sets takes ten times as long.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
 _NULL = 1e-9  # singular value, relative to the largest, that counts as zero
-_RANK = 1e-6  # likewise of the columns of all effects, which are changes by finite differences
+_RANK = 1e-6  # the same for the columns of all effects, which are finite differences
 
 
 def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]) -> float:
@@ -27,11 +27,11 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
 
     Args:
         base: the fit of the nominal model.
-        kinds: the effects; what they have of every run's own is taken to close all that it could alone.
-        between_runs: the effects of which those that differ between runs by chance may act as well.
+        kinds: the effects; their parameters per run count as if each effect acted alone.
+        between_runs: the effects that may also differ between runs by chance.
 
     Returns:
-        A fraction, 0 where linear theory says nothing: the fit misses the motion itself.
+        A fraction; 0 where linear theory is not valid because the fit misses the motion.
     """
     if misses_motion(base):
         return 0.0
@@ -41,7 +41,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
     bases = [_orthonormal(own) for _, own in jacobian]
 
     def beside(change: Sequence[Array]) -> Array:
-        """A change, what the runs' own parameters do taken out; all runs in one."""
+        """A change of all runs, concatenated, with the runs' own parameters projected out."""
         parts = zip(change, bases, strict=True)
         return np.concatenate([one - basis @ (basis.T @ one) for one, basis in parts])
 
@@ -58,7 +58,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
 
 
 def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:
-    """χ² that an effect closes by a phase or instants in every run; 0 for one without."""
+    """χ² explained by an effect's phase or instants in every run; 0 for an effect without them."""
     if not kind.own_numbers(1):
         return 0.0
     return max((start.predicted_drop for start in starting_points(base, kind)), default=0.0)

@@ -1,7 +1,7 @@
-"""Whether the halves of the records show every effect of a set, each by itself.
+"""Whether each effect of a set is confirmed by half of the records alone.
 
-Readings left out of a fit in stretches share the amplitudes of the others, and test interpolation only. An effect
-that is there shows at large amplitudes alone, or at small ones alone; one that only joins the two halves does not.
+Readings held out of a fit in stretches share the amplitudes of the others, and test interpolation only. A real
+effect shows at large amplitudes alone, or at small ones alone; an effect that only joins the two halves does not.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from tunnel_sim.vocabulary.record import Array
 
 _ROUNDS = 4  # of the fit of a half
 _SETTLED = 0.5  # standard deviations by which a round may still move a parameter
-_RIDGE = 1e-12  # of the scaled normal matrix: what a half does not determine has a huge variance
+_RIDGE = 1e-12  # of the scaled normal matrix: undetermined parameters get a huge variance
 
 
 def unresolved(whole: Fit) -> tuple[str, ...]:
-    """The effects that neither the early nor the late half of the records resolves with the sign of the whole.
+    """The effects that neither the early nor the late half of the records confirms with the sign of the whole.
 
-    Free decays swing far in their early halves and little in their late ones. Each half is fitted by itself, with
-    the forms of the effects as the whole gives them. An effect is resolved where its severity lies enough standard
-    deviations from zero, which allow for the misfit of the half.
+    Amplitudes are large in the early half of a free decay and small in the late half. Each half is fitted
+    separately, with the forms of the whole. An effect is confirmed where its severity is enough standard
+    deviations from zero, including the misfit of the half.
 
     Args:
         whole: fit of a set of effects to whole runs.
@@ -54,7 +54,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
     for early in (True, False):
         seen = [(np.arange(r.size) < r.size // 2) == early for r in whole.residuals]
         fitted = whole
-        for _ in range(_ROUNDS):  # the sensitivities of the whole may be far from those of the half
+        for _ in range(_ROUNDS):  # the sensitivities of the whole may differ much from those of the half
             before = fitted.point.common
             fitted = fit_at(problem, fit_seen(fitted, seen, held=forms)[0])
             stds = _stds(fitted, seen, forms)
@@ -64,7 +64,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
 
 
 def _stds(fitted: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str]) -> Array:
-    """Standard deviations by some blocks, with their misfit as noise, shape (common,); infinite where not shown."""
+    """Standard deviations from some blocks, their misfit as noise, shape (common,); infinite if undetermined."""
     names = fitted.problem.names
     free = np.array([name not in held and fitted.bound(name) is None for name in names])
     rows = [(c[s] * free, r[s]) for (c, r), s in zip(fitted.jacobian, seen, strict=True)]

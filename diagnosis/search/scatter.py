@@ -1,8 +1,8 @@
 """Chance differences between runs: a layer under every set of causes.
 
-A wind speed, a spring or a damping that is a little different in every run is no cause beside others. Every run has
-its own deviations under every set, with a normal prior whose width is the likeliest for the set. They are
-integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Under every
+set, every run has its own deviations, with a normal prior of the likeliest width for the set. They are integrated
+out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit h
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
-    """The differences that the runs could show: three of them at least have what differs, and a spring."""
+    """The differences that the runs could show: at least three runs have the quantity, and a spring."""
     runs = {"always": len(data.runs), "wind_on": sum(run.wind_on for run in data.runs)}
     held = data.model.restored
     return tuple(kind for kind in kinds if kind.scatters and held and runs[kind.condition] >= _FEWEST)
@@ -61,7 +61,7 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
 
 
 def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
-    """A chance difference beside the nominal model as it is fitted.
+    """A chance difference beside the nominal model as fitted.
 
     Args:
         width: of the runs' deviations, relative, dimensionless.
@@ -76,10 +76,10 @@ def usual(found: Fit, kind: type[Effect]) -> Chance:
 
 
 def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
-    """A fit whose runs differ as much as the campaign states; as given where it states nothing.
+    """A fit whose runs differ as much as the campaign states; unchanged where it states nothing.
 
     Args:
-        found: whose runs repeat exactly.
+        found: a fit whose runs repeat exactly.
         kinds: the effects that may be named.
     """
     known = found.problem.data.repeatability
@@ -91,10 +91,10 @@ def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
 
 
 def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
-    """A fit whose runs differ by chance, and more than is stated; None where they do not, or the fit fails.
+    """A fit whose runs differ by chance, and more than stated; None where they do not, or the fit fails.
 
     Args:
-        found: whose runs differ as much as is stated.
+        found: a fit whose runs differ as much as stated.
         kinds: the effects that may be named.
     """
     able = may_scatter(kinds, found.problem.data)
@@ -114,7 +114,7 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
 
 
 def evident(fitted: Fit) -> Fit:
-    """A fit with chance differences between its runs where they show any beyond what is stated; else as stated."""
+    """A fit with chance differences where its runs show them beyond those stated; else as stated."""
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter:
         return fitted
@@ -132,7 +132,7 @@ def evident(fitted: Fit) -> Fit:
 
 
 def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
-    """In which of the numbers that may scatter the runs differ: the one missed least is left out, one by one."""
+    """The numbers in which the runs differ, found by removing the least needed one repeatedly."""
     kept = np.ones(prior.usual.size, bool)
     while kept.sum() > 1:
         places = np.flatnonzero(kept)
@@ -145,9 +145,9 @@ def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> K
 
 
 def drifting(fitted: Fit) -> Between | None:
-    """What drifts make of the runs of a fit, where all differences between them follow their order; else None.
+    """The drifts that explain all differences between the runs of a fit by their order; None where they do not.
 
-    Such differences are no scatter.
+    Such differences are not scatter.
     """
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter or len(fitted.residuals) < _IN_ORDER:
@@ -164,7 +164,7 @@ def drifting(fitted: Fit) -> Between | None:
 
 
 def drifts(fitted: Fit, place: int) -> bool:
-    """Whether the runs differ in one number in proportion to their place, and by nothing shown beside that.
+    """Whether the runs differ in one number in proportion to their place, and in no other.
 
     Args:
         place: of the number among those that differ in the fit.
@@ -178,7 +178,7 @@ def drifts(fitted: Fit, place: int) -> bool:
 
 
 def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
-    """A fit with other chance differences between its runs; as given where that fails."""
+    """A fit with other chance differences between its runs; unchanged where that fails."""
     if scatter == fitted.problem.scatter:
         return fitted
     names = fitted.problem.parameters.own_names
@@ -190,7 +190,7 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
 
 
 def named(fitted: Fit) -> tuple[str, ...]:
-    """The chance differences of a fit that its runs show beyond what the campaign states."""
+    """The chance differences of a fit that its runs show beyond those stated."""
     return tuple(one.name for one in fitted.problem.scatter if one.shown)
 
 
@@ -201,20 +201,20 @@ def _evident(columns: RunColumns, prior: WidthPrior, which: Kept, chosen: Scatte
 
 
 def _gain(columns: RunColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
-    """Fall of −2 ln L by some of the differences beside the others that are kept."""
+    """Drop of −2 ln L by some of the differences beside the others that are kept."""
     whole = columns.likeliest(_held(prior, ~kept))
     without = columns.likeliest(_held(prior, ~kept | lost))
     return without.found.restricted - whole.found.restricted
 
 
 def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
-    """The prior with some widths held at their least."""
+    """The prior with some widths fixed at their least."""
     usual, decades = np.where(at_least, prior.least, prior.usual), np.where(at_least, 0.0, prior.decades)
     return replace(prior, usual=usual, decades=decades)
 
 
 def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
-    """A fit whose widths are the likeliest for what it leaves; as given where it has no such differences."""
+    """A fit whose widths are the likeliest for its residuals; unchanged where it has no such differences."""
     for _ in range(rounds):
         between = fitted.between
         if between is None:
@@ -231,13 +231,13 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
 
 
 def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
-    """A fit, or one from runs that repeat exactly, where that is likelier.
+    """A fit, or the likelier one that starts from runs that repeat exactly.
 
-    Wide deviations hide much of what an effect does between runs: a fit from them may end in another minimum.
+    Wide deviations hide much of an effect's change between runs, so a fit from them may end in another minimum.
 
     Args:
         fitted: a fit whose runs differ by chance.
-        repeating: of the same effects to runs that repeat; None: from the values of the other.
+        repeating: a fit of the same effects to runs that repeat; None: from the values of the other.
     """
     if not fitted.problem.scatter:
         return fitted

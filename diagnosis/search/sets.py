@@ -30,18 +30,18 @@ Names = tuple[str, ...]
 
 @dataclass(frozen=True, eq=False)
 class Sets:
-    """What is weighed in a view of the runs.
+    """The sets and rivals weighed in a view of the runs.
 
     Args:
         view: the view.
         hypotheses: sets of effects fitted in it.
         random: answers with a random moment that passed its tests.
-        rivals: what is outside the vocabulary and weighed beside the sets.
-        refused: by names of refused answers, their effects that no half of the records shows.
-        left_by_all: the least share of the gap that all effects together leave, where that ended the search; None
-            elsewhere.
-        settled: the answer fitted to whole runs, each of whose effects a half of them shows; None where the answer
-            is no fitted set, or is not settled yet.
+        rivals: causes from outside the vocabulary, weighed beside the sets.
+        refused: by names of refused answers, the effects that no half of the records confirms.
+        left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
+            None.
+        settled: the answer fitted to whole runs, with every effect confirmed by one half; None where the answer is
+            not a fitted set, or is not settled yet.
     """
 
     view: View
@@ -69,9 +69,10 @@ class Sets:
         return weigh(sets, nominal, base.settings.weighing, whole)
 
     def _fitted_set(self, one: Hypothesis) -> FittedSet:
-        """What the weighing needs to know of a set.
+        """The set as input of the weighing.
 
-        What follows the order of the runs is no scatter and no effect of the vocabulary; it costs as much as one.
+        A drift in the order of the runs is neither scatter nor an effect of the vocabulary; it costs as much as
+        one.
         """
         drift = None if one.effects else drifting(one.fit)
         found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
@@ -86,11 +87,11 @@ class Sets:
         return next((h for h in self.hypotheses if h.names == key), None)
 
     def moment(self, names: Names, steady: Hypothesis | None) -> RandomAnswer | None:
-        """The random moment among these effects; None where none passed, or the effects close more without it.
+        """The random moment among these effects; None where none qualifies, or the effects explain more without it.
 
         Args:
             names: sorted.
-            steady: the effects fitted without a random moment, if they were.
+            steady: the effects fitted without a random moment, if available.
         """
         found = next((answer for answer in self.random if answer.effects == names), None)
         if found is None or steady is None:
@@ -106,17 +107,17 @@ class Sets:
 
     @property
     def answer(self) -> Hypothesis | None:
-        """The set that is the answer; None where that is no fitted set, or a random moment is among it."""
+        """The set that is the answer; None where that is not a fitted set, or includes a random moment."""
         names = self.weighed[0].effects
         found = self.fitted(names)
         return found if self.moment(names, found) is None else None
 
     def without(self, names: Names, lost: Names) -> Sets:
-        """The sets without one, some of whose effects no half of the records shows.
+        """The sets without one that has effects unconfirmed by both halves of the records.
 
         Args:
             names: of the set, sorted.
-            lost: of these effects; none where the set cannot be fitted to whole runs.
+            lost: the unconfirmed effects; empty where the set cannot be fitted to whole runs.
         """
         kept = tuple(h for h in self.hypotheses if h.names != names)
         return replace(self, hypotheses=kept, refused={**self.refused, **({names: lost} if lost else {})})
@@ -128,7 +129,7 @@ class Sets:
         if self.settled is not None:
             at_random = any(moment.effects == names for moment in self.random)
             found[names] = whole = self.settled if at_random else self.view.finished(self.settled)
-            # its parts are compared with it: their runs differ by chance as much as the answer's
+            # its parts are compared with it, with the chance differences between runs of the answer
             parts = {key: part for key, part in found.items() if part is not None and key != names}
             for key, part in parts.items():
                 found[key] = replace(part, fit=with_scatter(part.fit, whole.fit.problem.scatter))
@@ -136,7 +137,7 @@ class Sets:
 
 
 def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
-    """The sets with those that the answer is compared with, and without those that no half of the runs shows.
+    """The sets with those that the answer is compared with, without those that no half of the runs confirms.
 
     Args:
         rivals: from outside the vocabulary.
@@ -155,14 +156,14 @@ def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
 
 
 def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
-    """With every set that has one effect less than the answer, or another one that does the same."""
+    """Add every set with one effect less than the answer, or with an equivalent effect."""
     best, view = sets.best, sets.view
     if best is None or len(best.effects) == 1:
         return sets
     with clock.step("pruning"):
         known = (*sets.hypotheses, *prune(best, sets.hypotheses))
         sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
-    with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
+    with clock.step("forms"):  # of rival sets, freed where that pays: growth frees those of few sets
         least = view.base.settings.search.rival_forms
         near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > least]
         if len(near) < 2:
@@ -173,7 +174,7 @@ def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
 
 
 def resolved(sets: Sets) -> Sets:
-    """Without the answers that cannot be fitted to whole runs, or of which no half of them shows some effect."""
+    """Drop answers that cannot be fitted to whole runs, or have an effect that no half of them confirms."""
     while (answer := sets.answer) is not None:
         whole = sets.view.settled(answer)
         lost = () if whole is None else unresolved(whole.fit)
@@ -184,10 +185,10 @@ def resolved(sets: Sets) -> Sets:
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses with one effect less than a given one that were not fitted yet.
+    """The hypotheses with one effect less than a given one that are not fitted yet.
 
     Returns:
-        The missing ones, each started from the values of the whole.
+        The new ones, each started from the values of the whole.
     """
     known = {hypothesis.names for hypothesis in found}
     smaller = []
@@ -208,7 +209,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
         found: fitted hypotheses, those with one effect less than ``whole`` among them.
 
     Returns:
-        Those that were not fitted yet. Two effects are alike where each was fitted alone and the fits are.
+        Those that are not fitted yet. Two effects are alike where the fits of each alone are.
     """
     by_name = {hypothesis.names: hypothesis for hypothesis in found}
     alone = {h.effects[0]: h for h in found if len(h.effects) == 1}

@@ -1,4 +1,4 @@
-"""Whether what a random moment's filter leaves is steady noise, alike in all runs, and the moment no line."""
+"""Tests of a random moment: innovations that are steady noise, alike in all runs, and no steady line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
+    """Whether innovations are white and steady, without bursts, and not those of one run."""
     return (
         departure_from_white(result) <= chosen.white_innovations
         and bursts(result, chosen.burst_rate) <= chosen.burst_power
@@ -23,7 +23,7 @@ def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
 
 
 def departure_from_white(result: ProcessNoise) -> float:
-    """How far innovations are from white and steady.
+    """Departure of innovations from white and steady.
 
     Returns:
         Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
@@ -40,13 +40,13 @@ def departure_from_white(result: ProcessNoise) -> float:
 
 
 def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
-    """The greatest power of innovations within a short time, divided by the greatest that chance explains.
+    """Greatest power of innovations within a short time, relative to the greatest by chance.
 
-    A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run, up
-    to a quarter of it.
+    A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run,
+    up to a quarter of it.
 
     Args:
-        false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
+        false_alarm_rate: greatest probability that a steady normal moment exceeds 1 in any window, a fraction.
     """
     lengths = [1 << k for k in range(20)]
     windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
@@ -60,7 +60,7 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
 
 
 def of_all_runs(result: ProcessNoise) -> float:
-    """Probability that a random moment that acts in all runs shows in one of them as much as this one does.
+    """P-value that one run has as much of a random moment as this one does, if it acts in all runs.
 
     A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
     quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
@@ -75,14 +75,14 @@ def of_all_runs(result: ProcessNoise) -> float:
 
 
 def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
-    """Whether a line at one frequency, with a phase of its own in every run, is nearly all that a fit leaves.
+    """Whether a line at one frequency, with a phase of its own in every run, explains nearly all of a residual.
 
-    The phase of a random moment about a frequency wanders. Without a centre it is no line: the rig's own response
-    is narrow, and the release of every run absorbs what is steady at its frequency.
+    The phase of a random moment about a frequency wanders. A moment without a centre is not a line: the rig's own
+    response is narrow, and the release of every run absorbs a steady part at its frequency.
 
     Args:
-        fit: by least squares in the sensor's noise, in which the release has absorbed its part.
-        process: the likeliest in what it leaves.
+        fit: by least squares in the sensor's noise; the release has absorbed its part.
+        process: the likeliest random moment in its residual.
     """
     runs = fit.problem.data.runs
     spectra = [one for run, one in zip(runs, residual_spectra(fit), strict=True) if run.id in process.runs]

@@ -1,4 +1,4 @@
-"""What an investigation returns: what was prepared, the gap, and the answers, each with its own fits."""
+"""The result of an investigation: the prepared campaign, the gap, and the answers, each with its own fits."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Answer(Weighed):
     """An answer, its probability and its fits.
 
     Args:
-        share: share of the gap it leaves open, at least 0.
+        share: share of the gap that is unexplained, at least 0.
         probability: among all answers weighed, a fraction.
         hypothesis: its effects without a random moment; fitted to whole runs if it is the answer of the study or a
-            part of it, else in the view in which it was weighed. None where it is no set of effects, or its fit to
-            whole runs fails.
-        stated: the same as its parameters are stated, with the random moment beside it where sets are weighed so.
-        random: the random moment among its effects; None where there is none, or they close more without it.
-        choices: the choices of it that the runs cannot exclude.
+            part of it, else in the view in which it was weighed. None where it is not a set of effects, or its fit
+            to whole runs fails.
+        stated: the hypothesis with its parameters as stated, beside the random moment where sets are weighed so.
+        random: the random moment among its effects; None where there is none, or they explain more without it.
+        choices: its choices that the runs cannot exclude.
     """
 
     hypothesis: Hypothesis | None = None
@@ -69,7 +69,7 @@ class Answer(Weighed):
         return None if self.hypothesis is None else self.hypothesis.fit
 
     def textbook_of(self, fit: Fit) -> Fit | None:
-        """The fit of its textbook form, where a fit is that of its freed forms; else None."""
+        """The fit of its textbook form, where the given fit has its forms free; else None."""
         own = self.hypothesis
         return own.textbook if own is not None and own.fit is fit else None
 
@@ -79,16 +79,16 @@ class Study:
     """Everything found in a campaign, in the units of the similar campaign.
 
     Args:
-        prepared: what is known before any effect is fitted.
+        prepared: the campaign before any effect is fitted.
         gap: whether there is a gap, and where.
-        answers: the answer first, then the most probable ones; empty where there is no gap.
-        refused: by names of refused answers, their effects that no half of the records shows.
-        rivals: what was weighed from outside the vocabulary.
-        disturbed: runs that were disturbed, which are left out from then on.
-        between_runs: of an unknown cause, the fit of the nominal model to runs that differ; None where they do not.
-        caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
-        left_by_all: the least share of the gap that all effects together leave, where that ended the search; None
-            elsewhere.
+        answers: the answer first, then the most probable ones; empty without a gap.
+        refused: by names of refused answers, the effects that no half of the records confirms.
+        rivals: causes weighed from outside the vocabulary.
+        disturbed: disturbed runs, which are left out from the disturbance on.
+        between_runs: for an unknown cause, the nominal fit to runs that differ; None where they do not.
+        caution: key of the caution about answers found in the view of the runs; empty: none.
+        left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
+            None.
         seconds: wall time by step, s.
     """
 
@@ -110,7 +110,7 @@ class Study:
 
     @property
     def similarity(self) -> Similarity:
-        """How it was made from the measured one."""
+        """The conversion from the measured campaign."""
         return self.prepared.similarity
 
     @property
@@ -130,12 +130,12 @@ class Study:
 
     @property
     def read_off(self) -> Names:
-        """Causes read off the records before fitting."""
+        """Causes detected in the records before fitting."""
         return self.prepared.read_off
 
     @property
     def answer(self) -> Answer | None:
-        """The answer; None where no cause had to be weighed."""
+        """The answer; None where no cause was weighed."""
         return self.answers[0] if self.answers else None
 
     @property
@@ -145,29 +145,29 @@ class Study:
 
     @property
     def scattering(self) -> Names:
-        """The chance differences between the runs, as far as they are more than is stated."""
+        """The chance differences between the runs beyond those stated."""
         return () if self.fitted == UNKNOWN else named(self.chosen)
 
     @property
     def beside(self) -> Names:
-        """Causes beside those that sets of effects differ by: read off the records, or differences between runs."""
+        """Causes other than fitted effects: detected in the records, or differences between runs."""
         return (*self.read_off, *self.scattering)
 
     @property
     def causes(self) -> Names:
-        """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
+        """All causes, sorted; ``unknown`` alone where the vocabulary does not explain the gap."""
         if self.fitted == UNKNOWN:
             return UNKNOWN
         return tuple(sorted({*self.beside, *self.fitted}))
 
     @property
     def named(self) -> bool:
-        """Whether there is a gap and a cause of it is named."""
+        """Whether there is a gap with a named cause."""
         return self.causes not in ((), UNKNOWN)
 
     @property
     def chosen(self) -> Fit:
-        """The fit of the answer; the nominal one where no fitted effect is part of it."""
+        """The fit of the answer; the nominal one where the answer has no fitted effect."""
         found = None if self.answer is None else self.answer.fit(self.nominal)
         return self.nominal if found is None else found
 
@@ -191,10 +191,10 @@ class Study:
 
     @classmethod
     def of_sets(cls, sets: Sets, gap: Gap, clock: Clock) -> Study:
-        """The study whose answers are sets, the first of them and its parts fitted to whole runs.
+        """The study whose answers are sets; the first of them and its parts are fitted to whole runs.
 
         Args:
-            sets: what the last view found.
+            sets: those of the last view.
         """
         prepared = sets.view.prepared
         with clock.step("polishing"):
@@ -231,7 +231,7 @@ def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | Non
 
 
 def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:
-    """The answers; where noise explains the gap, what is read off the records, or else that nothing explains it."""
+    """The answers; where noise explains the gap, the causes detected in the records, or else none."""
     weighed, prepared = sets.weighed, sets.view.prepared
     if not sets.view.may_be_noise or not noise_explains(prepared.nominal, test, weighed):
         return weighed
@@ -241,9 +241,9 @@ def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:
 
 
 def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> bool:
-    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
+    """Whether misbehaving noise may be the whole of a small gap, or the shares of the gap are chance.
 
-    Effects of a few numbers close little of any noise, however it misbehaves.
+    Effects with few parameters explain little of any noise, however it misbehaves.
     """
     block, weighing = nominal.problem.data.mean_block, nominal.settings.weighing
     small = test.noisy and nominal.excess < weighing.noise_explains * block
@@ -252,7 +252,7 @@ def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> b
 
 
 def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
-    """The choices of a probable answer that the runs cannot exclude, as its coefficients are fitted."""
+    """The choices of a probable answer that the runs cannot exclude, with its coefficients."""
     nominal = sets.view.prepared.nominal
     chosen = answer.stated if answer.random is None else answer.random.beside
     if chosen is None or answer.probability < nominal.settings.search.choices_from:
@@ -264,7 +264,7 @@ def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
 
 
 def _gap_beside(fit: Fit, *known: Fit) -> ChannelMisfit | None:
-    """What the nominal model leaves of the readings of a fit, in their noise; None where its fit fails.
+    """Misfit of the nominal model to the readings of a fit, in their noise; None where its fit fails.
 
     Args:
         known: fits of the nominal model, the first of them to whole runs.

@@ -1,8 +1,8 @@
 """From fitted sets of effects to answers with probabilities (docs/decisions/0007-how-causes-are-weighed.md).
 
-Real effects never have exactly a textbook form, and at the rig's signal-to-noise ratio every misfit of form is
-significant. So sets are weighed by what they leave in every channel of the residuals relative to a scale, and the
-odds against an unknown cause are those of a logistic regression.
+Real effects never have exactly a textbook form, and at the rig's signal-to-noise ratio every form error is
+significant. Sets are therefore weighed by the misfit in every channel of the residuals relative to a scale, and
+the odds against an unknown cause come from a logistic regression.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
-#: The channels between which a misfit leaks where sets are compared, 1 or 0, shape (6,): an error of the phase,
-#: squared, is one of the amplitude. A misfit of the zero or of the harmonics is no error of the phase.
+#: The channels with leakage where sets are compared, 1 or 0, shape (6,): a phase error, squared, is an amplitude
+#: error. A misfit of the zero or of the harmonics is not a phase error.
 OF_MOTION = np.array([0.0 if name in ("zero", "harmonics") else 1.0 for name in CHANNELS])
-#: The same for the odds against ``unknown``, which were fitted with a leak between all channels.
+#: The channels with leakage for the odds against ``unknown``: all, as in the regression.
 ALL_CHANNELS = np.ones(len(CHANNELS))
 
 
@@ -29,8 +29,8 @@ class Weighed:
     """An answer and its probability.
 
     Args:
-        effects: names, sorted; ``("unknown",)`` for a gap that no effect closes.
-        share: share of the gap it leaves open, at least 0.
+        effects: names, sorted; ``("unknown",)`` for a gap that no effect explains.
+        share: unexplained share of the gap, at least 0.
         probability: among all answers weighed, a fraction.
     """
 
@@ -41,16 +41,16 @@ class Weighed:
 
 @dataclass(frozen=True, eq=False)
 class FittedSet:
-    """What a fitted set of effects leaves.
+    """Misfit of a fitted set of effects.
 
     Args:
         effects: names, in any order.
-        share: of the gap that it leaves open, a fraction; below 0 by chance.
+        share: unexplained share of the gap, a fraction; below 0 by chance.
         excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
-        numbers: how many it has beside its own: freed forms and instants, less two where gravity replaces a spring.
-        outside: whether it is from outside the vocabulary: what is probable of it is probable of ``unknown``.
-        scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, dimensionless.
-        compared: how many of the effects are known by the comparison of runs.
+        numbers: number of further parameters: freed forms and instants, less two where gravity replaces a spring.
+        outside: whether it is from outside the vocabulary: its probability is added to that of ``unknown``.
+        scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
+        compared: number of its effects that only the comparison of runs shows.
     """
 
     effects: tuple[str, ...]
@@ -72,12 +72,12 @@ def weigh(
 
     Args:
         sets: fitted sets of effects; of two with the same effects the better one counts.
-        nominal: what the nominal model leaves, with the chance differences between runs that the sets have.
-        whole: what it leaves without them; None: there are none.
+        nominal: misfit of the nominal model, with the same chance differences between runs as the sets.
+        whole: misfit of the nominal model without them; None: there are none.
 
     Returns:
-        All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` speaks of
-        all sets, and is the answer only where it is more probable than all of them together.
+        All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` competes
+        with all sets together, and is the answer only where it is more probable than their sum.
     """
     best: dict[tuple[str, ...], FittedSet] = {}
     for given in sets:
@@ -131,9 +131,10 @@ def weigh(
 
 
 def least_excess(excesses: Sequence[Array]) -> Array:
-    """By channel the least that any set leaves, or 0, shape (6,).
+    """The least misfit of any set by channel, at most 0, shape (6,).
 
-    What chance adds is common to all sets, because they are fitted to the same noise; only differences count.
+    The contribution of chance is common to all sets, because they are fitted to the same noise; only differences
+    count.
 
     Args:
         excesses: χ² beyond noise, each of shape (6,).
@@ -142,7 +143,7 @@ def least_excess(excesses: Sequence[Array]) -> Array:
 
 
 def common_misfit(excesses: Sequence[Array]) -> float:
-    """The largest χ² of a channel that all sets leave beyond noise: an error of the model that none of them is.
+    """The largest χ² beyond noise of a channel that remains under every set: a model error that no set explains.
 
     Args:
         excesses: χ² beyond noise, each of shape (6,).
@@ -158,15 +159,15 @@ def misfit_scale(
 ) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
-    Beside chance it is that of an error of the model: a share of the amplitude of the gap, since no real effect has
-    its textbook form, or what all sets leave if that is more, and a share of the motion at most. Where the runs
-    differ by chance, it is also an answer that nothing else acts, and the likelihood decides between them: the
-    weight of a small χ² is half of it.
+    Beside chance it allows a model error: a share of the amplitude of the gap, since no real effect has its
+    textbook form, or the common misfit of all sets if that is larger, up to a share of the motion. Where the runs
+    differ by chance, chance alone is also an answer, and the likelihood decides between them: the weight of a
+    small χ² is half of it.
 
     Args:
-        nominal: what the nominal model leaves, and the motion.
-        common: χ² of a channel that all sets leave (`common_misfit`), dimensionless.
-        chance: χ² that chance explains, by channel or common to all; None: that of a needless effect.
+        nominal: misfit of the nominal model, and the motion.
+        common: χ² of a channel that remains under every set (`common_misfit`), dimensionless.
+        chance: χ² due to chance, by channel or common to all; None: that of a superfluous effect.
     """
     needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
     by_chance = needless if chance is None else chance
@@ -189,11 +190,11 @@ def log_weight(
     Args:
         left: χ² by channel beyond that of the best set, shape (6,).
         scale: from `misfit_scale`, shape (6,).
-        effects: how many it has.
-        numbers: how many it has beside their own.
-        scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, and that the
-            nominal model takes. What needless effects may lower it by does not count.
-        compared: how many effects could lower it: those known by the comparison of runs.
+        effects: number of effects.
+        numbers: number of further parameters.
+        scatter_cost: −2 ln of the evidence of its chance differences between runs, and that of the nominal model.
+            The reduction that superfluous effects may bring does not count.
+        compared: number of effects that could reduce it: those that only the comparison of runs shows.
     """
     own, nominal = scatter_cost
     cost = min(own + chosen.needless_scatter * compared, max(own, nominal))
@@ -207,8 +208,7 @@ def log_misfit(left: Array, scale: Array, leaking: Array, leak: float) -> float:
     Args:
         left: χ² by channel, shape (6,), dimensionless.
         scale: from `misfit_scale`, shape (6,).
-        leaking: 1 for the channels between which a misfit leaks, else 0, shape (6,): `OF_MOTION` or
-            `ALL_CHANNELS`.
+        leaking: 1 for the channels with leakage, else 0, shape (6,): `OF_MOTION` or `ALL_CHANNELS`.
         leak: share of the misfit in other channels that counts in a channel.
     """
     above = np.maximum(left, 0.0)

@@ -1,7 +1,7 @@
 """Every number by which the diagnosis decides: one field for each decision, with its origin.
 
-The code that decides is given the settings: `diagnosis.diagnose` takes them, and every fit has those of its data.
-Numerical constants (grids, iterations, paddings, tolerances of solvers) stand where they are used.
+Settings are arguments: `diagnosis.diagnose` takes them, and every fit has those of its data. Numerical constants
+(grids, iterations, paddings, tolerances of solvers) are in the code that uses them.
 """
 
 from __future__ import annotations

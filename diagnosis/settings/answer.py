@@ -1,4 +1,4 @@
-"""Settings of the answer: where the gap is, what is decided, and with which uncertainty."""
+"""Settings of the answer: the place of the gap, the decision, and the uncertainties."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from identification.policy import TRADE_OFF_CORRELATION
 
 @dataclass(frozen=True)
 class WhereSettings:
-    """Where the gap is."""
+    """The place of the gap."""
 
     run_rate: float = setting(
         0.01, "Rate at which a run is falsely said to show the gap, all runs together.", "convention"
@@ -32,52 +32,55 @@ class WhereSettings:
     )
     run_noise_std: float = setting(
         0.015,
-        "Standard deviation of a single run's noise about that of the campaign.",
+        "Standard deviation of the noise between runs.",
         "judgement",
         "Quantisation colours the noise.",
     )
     named_run: float = setting(
-        0.1, "Share of the largest excess from which another run is named.", "judgement"
+        0.1, "Share of the largest excess from which a further run is named.", "judgement"
     )
     one_run: float = setting(
         0.8,
-        "Share of the excess in one run from which it cannot tell whether the gap needs wind.",
+        "Share of the excess in one run from which the runs do not tell whether the gap needs wind.",
         "judgement",
     )
     one_run_of: int = setting(
-        3, "Fewest runs among which one may have most of the excess.", "judgement", unit="runs"
+        3, "Fewest runs for which one may have most of the excess.", "judgement", unit="runs"
     )
     interval_share: float = setting(0.8, "Share of the excess in a stated interval.", "judgement")
     blow_share: float = setting(
-        0.5, "Share of the missing moment's energy in the time of a blow.", "convention", "Most of it."
+        0.5, "Share of the missing moment's energy within the time of a blow.", "convention", "Most of it."
     )
     blow_stds: float = setting(
-        5.0, "Distance beyond which the missing moment stands out of the noise.", "convention", unit="std"
+        5.0,
+        "Distance from the noise beyond which the missing moment is significant.",
+        "convention",
+        unit="std",
     )
-    blow_length: float = setting(0.1, "Greatest share of a record that a blow takes.", "judgement")
+    blow_length: float = setting(0.1, "Greatest duration of a blow, as a share of a record.", "judgement")
     blow_after: float = setting(
-        0.05, "Share of a record at its start in which a moment is the release.", "judgement"
+        0.05, "Share of a record at its start that belongs to the release.", "judgement"
     )
     fastest_moment: float = setting(
         30.0,
-        "Highest frequency of a moment; a faster line is the sensor's.",
+        "Highest frequency of a moment; a faster line is an error of the sensor.",
         "physics",
-        "The rig's inertia keeps the response to faster ones below any noise.",
+        "The rig's inertia keeps the response to faster moments below any noise.",
         unit="Hz of the similar rig",
     )
     line_share: float = setting(
-        0.25, "Share of a run's excess from which a line, with others, is its place.", "judgement"
+        0.25, "Share of a run's excess from which its lines are the place of the gap.", "judgement"
     )
-    line_one_in: int = setting(3, "One run in so many must have such a line.", "judgement", unit="runs")
+    line_one_in: int = setting(3, "One run in this many must have such a line.", "judgement", unit="runs")
     fast_share: float = setting(
         0.5,
-        "Share of the excess above the motion from which it is the sensor's.",
+        "Share of the excess above the motion from which the gap is in the sensor.",
         "convention",
         "Most of it.",
     )
     slow_share: float = setting(
         0.5,
-        "Share of the excess below the motion from which it is a shift of the centre.",
+        "Share of the excess below the motion from which the gap is a shift of the centre.",
         "convention",
         "Most of it.",
     )
@@ -88,19 +91,21 @@ class WhereSettings:
         0.5, "Share of the excess in harmonics from which they are its place.", "convention", "Most of it."
     )
     alone_leaves: float = setting(
-        0.2, "Share of the excess that fits to single runs may leave for every run to be linear.", "judgement"
+        0.2,
+        "Residual share of the excess in fits to single runs up to which every run is linear.",
+        "judgement",
     )
     drift_ratio: float = setting(
-        1.5, "Ratio of the drifts of frequency and damping from which one of them is the place.", "judgement"
+        1.5, "Ratio of the drifts of frequency and damping from which the larger is the place.", "judgement"
     )
     run_departs: float = setting(
-        1.5, "Mean squared residual of a run over the noise from which its model departs.", "judgement"
+        1.5, "Mean squared residual of a run over the noise from which the model misfits it.", "judgement"
     )
 
 
 @dataclass(frozen=True)
 class AnswerSettings:
-    """What is decided, and with which uncertainty."""
+    """The decision, and the uncertainties."""
 
     decided_from: float = setting(
         0.5,
@@ -110,9 +115,9 @@ class AnswerSettings:
     )
     predicted_from: float = setting(
         0.1,
-        "Share of the gap on held-out readings that an answer must close to be decided.",
+        "Share of the gap on held-out readings that a decided answer must explain.",
         "judgement",
-        "An answer that predicts less has followed the readings that it was fitted to.",
+        "An answer that predicts less is fitted to chance.",
     )
     credible_from: float = setting(
         0.9, "Probability of the smallest set of answers that is stated.", "convention"
@@ -132,9 +137,10 @@ class AnswerSettings:
     )
     interval_from: float = setting(
         2.0,
-        "Length of that interval from which it is stated; below it value ± 1.96 std is the interval.",
+        "Length from which that interval is stated; below it, value ± 1.96 std is the interval.",
         "convention",
-        "Value ± one standard deviation is as long. A shorter one leaves out rare rivals, most of the variance.",
+        "As long as value ± one standard deviation. A shorter one excludes rare rivals, which cause most "
+        "of the variance.",
         unit="std",
     )
     small_causes: int = setting(
@@ -147,7 +153,7 @@ class AnswerSettings:
     )
     small_causes_tried: int = setting(
         8,
-        "Effects that sets of small causes are made of: those that alone lower χ² most.",
+        "Effects in the sets of small causes: those that lower χ² most by themselves.",
         "judgement",
         "Time against coverage.",
         unit="effects",
@@ -157,7 +163,7 @@ class AnswerSettings:
         0.05, "Probability of an answer from which small causes are considered beside it.", "judgement"
     )
     small_cause_price: float = setting(
-        20.0, "χ² that every small cause costs.", "judgement", BY_CHANCE, unit="χ²", decision="0028"
+        20.0, "Price of every small cause in χ².", "judgement", BY_CHANCE, unit="χ²", decision="0028"
     )
     misfit_degrees: float = setting(
         6.0,
@@ -169,13 +175,13 @@ class AnswerSettings:
     )
     dispersion_stds: float = setting(
         2.0,
-        "χ² of the campaign beyond its count that is chance where the misfit is taken as noise.",
+        "Excess of the χ² of the campaign over its count that is chance, where the misfit is taken as noise.",
         "convention",
         unit="std",
     )
     scatter_stds: float = setting(
         2.0,
-        "χ² of the campaign beyond its count that is chance where the scatter of the runs is asked.",
+        "Excess of the χ² of the campaign over its count that is chance, for the scatter of the runs.",
         "convention",
         unit="std",
     )
@@ -183,54 +189,57 @@ class AnswerSettings:
         2.0, "Difference between two halves of the data that is chance.", "convention", unit="std"
     )
     least_half: float = setting(
-        0.1, "Least share of the information on a coefficient in a part of the data.", "judgement"
+        0.1, "Least share of the information on a coefficient in one half of the data.", "judgement"
     )
     small_form_std: float = setting(
         0.5,
-        "Standard deviation of a small cause's move of a coefficient, as a share of it, since its "
+        "Standard deviation of a small cause's move of a coefficient, as a share of the move, since its "
         "form is unknown.",
         "judgement",
-        "Made when a blind test showed intervals too narrow, and tested on campaigns drawn afterwards.",
+        "Chosen after a blind test showed intervals too narrow; tested on campaigns drawn afterwards.",
         decision="0028",
     )
     freed_form_std: float = setting(
         0.5,
-        "Standard deviation for freed forms, as a share of the change that freeing them makes.",
+        "Standard deviation for freed forms, as a share of the change by freeing them.",
         "judgement",
         "Another family of forms may change a coefficient as much.",
         decision="0028",
     )
     unknown_std: float = setting(
         0.5,
-        "Standard deviation for an unknown cause, as a share of the change that the answer makes.",
+        "Standard deviation for an unknown cause, as a share of the change by the answer.",
         "judgement",
         decision="0028",
     )
     separated_by: float = setting(
         3.0,
-        "Separation of two answers by a run from which it distinguishes them.",
+        "Separation from which a run distinguishes two answers.",
         "convention",
         "Odds of about 100:1.",
         unit="std",
     )
     hidden_stds: float = setting(
-        2.0, "Largest size of an effect that could hide, from its likeliest size.", "convention", unit="std"
+        2.0,
+        "Distance of the largest size of an effect that could hide from its likeliest size.",
+        "convention",
+        unit="std",
     )
     hidden_absorbed: float = setting(
         0.0001,
-        "Share of a change beyond what the fit absorbs that counts as none.",
+        "Unabsorbed share of a change below which the runs do not show it.",
         "judgement",
         "The accuracy of linear theory.",
     )
     remains_rate: float = setting(
         0.001,
-        "Rate at which the noise is said to be something that remains, and chance to be a further effect.",
+        "Rate at which noise is called a remainder, and chance a further effect.",
         "convention",
         ONE_IN_1000,
     )
     material_share: float = setting(
         0.01,
-        "Change of a coefficient from which what remains is material.",
+        "Change of a coefficient from which the remainder is material.",
         "convention",
         "Derivatives are quoted to a per cent.",
     )
@@ -244,11 +253,11 @@ class AnswerSettings:
         TRADE_OFF_CORRELATION,
         "Absolute correlation of two parameters from which they are said to trade off.",
         "convention",
-        "The variance of each is ten times what it would be with the other known: collinear, as regression has it.",
+        "The variance of each is ten times that with the other known: collinear, in terms of regression.",
     )
     patched_misses: float = setting(
         0.02,
-        "Share of a moment's greatest value that a polynomial in the patched model may miss.",
+        "Greatest error of a polynomial in the patched model, as a share of a moment's greatest value.",
         "judgement",
     )
     integrator_tolerance: float = setting(

@@ -1,4 +1,4 @@
-"""Settings of what is found before any effect is fitted: runs, noise, gap, and what is read off the records."""
+"""Settings of the steps before any fit of effects: runs, noise, gap, and causes detected in the records."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from diagnosis.settings.origin import ONE_IN_1000, setting
 
 @dataclass(frozen=True)
 class SelectionSettings:
-    """Which runs and which parts of them are compared."""
+    """The runs, and the parts of them, that are compared."""
 
     other_mode: float = setting(
         1.5,
-        "Frequency with the wind on over that without, from which a run swings in another mode.",
+        "Ratio of the frequencies with and without wind from which a run swings in another mode.",
         "judgement",
     )
     same_spring: float = setting(
         1.1,
         "Ratio of frequencies at one wind speed above which runs have different springs.",
         "judgement",
-        "Stiffnesses a fifth apart. What depends on amplitude changes a frequency gradually, and "
-        "seldom as much.",
+        "Stiffnesses a fifth apart. Effects of the amplitude change a frequency gradually, and seldom as "
+        "much.",
     )
     long_rest: float = setting(
         0.1,
-        "Share of a run at its end from which a rest is cut off.",
+        "Length of a rest at the end of a run, as a share of it, from which it is cut off.",
         "judgement",
-        "The place where friction stops a body says little about its motion.",
+        "The angle at which friction stops a body says little about its motion.",
     )
     rest_stds: float = setting(
         5.0,
@@ -46,7 +46,7 @@ class SelectionSettings:
         0.01,
         "Share of the gap that wider blocks may hide.",
         "judgement",
-        "Causes are told apart by much larger shares.",
+        "Causes differ by much larger shares.",
     )
     fast_rate: float = setting(
         0.001,
@@ -56,7 +56,7 @@ class SelectionSettings:
     )
     disturbed_rate: float = setting(
         0.001,
-        "Rate at which a campaign without a disturbance has a run that is said to be disturbed.",
+        "Rate of campaigns without a disturbance in which a run is called disturbed.",
         "convention",
         ONE_IN_1000,
     )
@@ -64,14 +64,14 @@ class SelectionSettings:
         3,
         "Fewest free decays among which a disturbed one is sought.",
         "judgement",
-        "What is in one of two runs may as well be in all.",
+        "A feature of one of two runs may as well be one of all.",
         unit="runs",
     )
     disturbed_share: float = setting(
         0.25,
         "Share of the runs that may be disturbed, at least one.",
         "judgement",
-        "The others show what all do.",
+        "The others show the common behaviour.",
     )
     disturbed_scatter: float = setting(
         0.5,
@@ -81,21 +81,21 @@ class SelectionSettings:
     )
     disturbed_prior: float = setting(
         4.0,
-        "Runs by whose scatter this expectation counts.",
+        "Weight of this expectation, as a number of runs.",
         "judgement",
-        "Few runs do not show how much they scatter.",
+        "Few runs do not determine their scatter.",
         unit="runs",
     )
     disturbed_kept: float = setting(
         6.0,
-        "Cycles before a disturbance from which that part of a run is kept; with fewer the run is left out.",
+        "Cycles before a disturbance from which that part of a run is used; with fewer the run is left out.",
         "judgement",
         "A record needs three cycles, and its damping twice as many.",
         unit="cycles",
     )
     gross_misfit: float = setting(
         0.01,
-        "Share of the readings' power in the residual beyond which a fit misses the motion itself.",
+        "Residual, as a share of the readings' power, from which a fit misses the motion itself.",
         "judgement",
     )
 
@@ -106,13 +106,13 @@ class NoiseSettings:
 
     stated_rate: float = setting(
         0.001,
-        "Rate at which noise that is as stated is said to contradict the statement.",
+        "Rate at which correctly stated noise is said to contradict the statement.",
         "convention",
         ONE_IN_1000,
     )
     own_rate: float = setting(
         0.001,
-        "Rate at which runs of the same noise are said to have a noise of their own.",
+        "Rate at which runs of equal noise are said to differ in noise.",
         "convention",
         ONE_IN_1000,
     )
@@ -134,14 +134,14 @@ class NoiseSettings:
     )
     colour_amplitudes: float = setting(
         2.0,
-        "Ratio of the greatest to the smallest motion among the parts, from which noise is seen not"
-        " to follow it.",
+        "Ratio of the greatest to the smallest motion among the parts, from which the noise is known not "
+        "to follow it.",
         "judgement",
         "The power of noise that follows the motion then differs by a factor of four.",
     )
     colour_band_rate: float = setting(
         0.01,
-        "Rate at which a steady band of the noise is left out of its spectrum as unsteady.",
+        "Rate at which a steady band of the noise is excluded from its spectrum as unsteady.",
         "convention",
         "One in a hundred.",
     )
@@ -153,22 +153,21 @@ class NoiseSettings:
     )
     colour_slope_stds: float = setting(
         2.0,
-        "How much steeper than found the spectrum may be below its lowest band.",
+        "Excess of the slope assumed below the lowest band over the one found.",
         "convention",
         unit="std",
     )
     colour_beyond: float = setting(
         3.5,
-        "Where a gap remains, noise is coloured only if its spectrum beyond this multiple of the "
-        "motion's frequency is.",
+        "Multiple of the motion's frequency beyond which the spectrum must be coloured where a gap remains.",
         "judgement",
-        "The bands up to there count as the motion's.",
+        "The bands below belong to the motion.",
     )
     wandering_rate: float = setting(
         0.001, "Rate at which stationary noise is said to be a wandering zero.", "convention", ONE_IN_1000
     )
     repeated_rate: float = setting(
-        0.001, "Rate at which noise is said to repeat itself from run to run.", "convention", ONE_IN_1000
+        0.001, "Rate at which noise is said to repeat from run to run.", "convention", ONE_IN_1000
     )
     oscillation_rate: float = setting(
         0.001,
@@ -202,7 +201,7 @@ class GapSettings:
     )
     noise_above_stated: float = setting(
         1.5,
-        "Ratio of variances up to which noise above the stated one is none of the gap.",
+        "Ratio of variances up to which noise above the stated level is not part of the gap.",
         "judgement",
         "Stated noise is often rounded to one digit.",
     )
@@ -216,11 +215,11 @@ class GapSettings:
 
 @dataclass(frozen=True)
 class ReadOffSettings:
-    """What is read off the records before any effect is fitted."""
+    """Causes detected in the records before any effect is fitted."""
 
     coarse_step: float = setting(
         1.5,
-        "Step of the readings over the stated resolution from which it is coarser than stated.",
+        "Ratio of the step of the readings to the stated resolution from which it counts as coarser.",
         "judgement",
     )
     hum_rate: float = setting(
@@ -234,18 +233,19 @@ class ReadOffSettings:
         4.0,
         "Drop of χ² at the hum's line over the largest beside it, all runs together.",
         "judgement",
-        "Rods and corners ring too.",
+        "Rods and corners also raise the spectrum.",
     )
     hum_steady: float = setting(
         0.25,
-        "Least power of a hum's line in one half of the runs over that in the other half.",
+        "Least ratio of a hum's power in one half of the runs to that in the other half.",
         "judgement",
-        "What an amplifier or a lamp lets in may change by a factor of two; a mode excited at the "
-        "release loses more.",
+        "Hum from an amplifier or a lamp may change by a factor of two; a mode excited at the release "
+        "loses more.",
     )
     hum_alike: float = setting(
         0.02,
-        "Share of the evidence by which two frequencies of the mains may differ and explain the lines alike.",
+        "Difference of evidence, as a share, up to which two frequencies of the mains explain the lines "
+        "alike.",
         "judgement",
     )
     hum_swell_rate: float = setting(

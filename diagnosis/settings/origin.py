@@ -1,4 +1,4 @@
-"""A field of the settings: its value with its unit, what it decides, and where the value comes from."""
+"""A field of the settings: its value with its unit, its decision, and the origin of the value."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def setting(
         default: the value, in ``unit``.
         meaning: what the value decides, in a sentence.
         why: the reason for the value, or what it was fitted to, in a sentence or two.
-        unit: ``1`` of a share, a ratio or a logarithm.
-        decision: number of the document in docs/decisions that has more.
+        unit: ``1`` for a share, a ratio or a logarithm.
+        decision: number of the document in docs/decisions with the details.
     """
     about = {"unit": unit, "meaning": meaning, "origin": origin, "why": why, "decision": decision}
     return field(default=default, metadata=about)

@@ -15,11 +15,11 @@ class SearchSettings:
         7,
         "Effects fitted whatever linear theory predicts.",
         "judgement",
-        "It ranks well but cannot judge.",
+        "Linear theory ranks well but cannot decide.",
         unit="effects",
     )
     predicted_share: float = setting(
-        0.01, "Predicted drop, as a share of χ², from which others are fitted too.", "judgement"
+        0.01, "Predicted drop, as a share of χ², from which further effects are fitted.", "judgement"
     )
     least_drop: float = setting(
         20.0,
@@ -30,35 +30,37 @@ class SearchSettings:
     )
     reach_from: float = setting(
         0.5,
-        "Share of the gap left by all sets of a size, from which it is asked whether larger ones could close it.",
+        "Unexplained share of the gap, under all sets of a size, from which the limit of larger sets is "
+        "computed.",
         "judgement",
-        "The largest of a few causes closes about half of a gap.",
+        "The largest of a few causes explains about half of a gap.",
     )
     out_of_reach: float = setting(
         0.2,
-        "Share of the gap left by all effects together, from which no larger sets are grown.",
+        "Unexplained share of the gap, under all effects together, from which no larger sets are grown.",
         "estimated",
-        "In 77 simulated campaigns with one to four known causes it is 0.15 at most, and above 0.05 in two. In six "
-        "of 14 with a cause outside the vocabulary it is above 0.4. They were in sight.",
+        "In 77 simulated campaigns with one to four known causes it is 0.15 at most, and above 0.05 in "
+        "two. In six of 14 with a cause outside the vocabulary it is above 0.4. These campaigns do not "
+        "test it.",
     )
-    forms_beside_scatter: float = setting(
+    nearly_explained: float = setting(
         0.2,
-        "Share of the gap within runs left by textbook forms beside scatter, up to which forms are freed there.",
+        "Share of the gap within runs that a set beside scatter may leave for its forms to be freed.",
         "judgement",
         "Another form of a cause differs from the textbook's by less than 45 % of what the cause does. In two "
         "simulated campaigns of three and four causes, sets that left 0.26 to 0.81 left as much with free forms.",
     )
     likely_beside_scatter: int = setting(
         6,
-        "Effects fitted where chance differences between the runs explain them, however little linear theory "
-        "predicts that they close.",
+        "Effects fitted whatever linear theory predicts, where chance differences between the runs "
+        "explain them.",
         "judgement",
-        "Linear theory falls short where deviations of the runs hide an effect. Time against coverage.",
+        "Linear theory underestimates effects hidden by deviations of the runs. Time against coverage.",
         unit="effects",
     )
     beside_scatter: int = setting(
         4,
-        "Sets in runs that repeat that are compared beside chance differences between the runs.",
+        "Sets, found in runs that repeat, that are compared beside chance differences between the runs.",
         "judgement",
         "Time against coverage.",
         unit="sets",
@@ -83,38 +85,38 @@ class SearchSettings:
     )
     growth_loss: float = setting(
         2.8,
-        "Logarithm of the weight that a set may lose for an effect added, and still grow.",
+        "Logarithm of the weight that a set may lose for an added effect and still grow.",
         "judgement",
-        "Less than an effect costs that closes nothing; of two equal causes one closes only half.",
+        "A superfluous effect costs more; one of two equal causes explains only half.",
     )
     grown_on: int = setting(
         45_000,
-        "Readings of stretches on which sets are grown; of longer campaigns some stretches are left out.",
+        "Readings of stretches on which sets are grown; in longer campaigns some stretches are left out.",
         "judgement",
         "Time. Twelve runs of 10 s are below it.",
         unit="block means",
     )
     most_causes: int = setting(
         5,
-        "Causes named at most.",
+        "Greatest number of named causes.",
         "convention",
         "The vocabulary's one to four, and a small one beside them.",
         unit="effects",
     )
     same_change: float = setting(
         0.02,
-        "Share of the power by which the changes made by two sets may differ and still be the same.",
+        "Difference between the changes of two sets, as a share of the power, up to which they are the same.",
         "judgement",
     )
     form_open: float = setting(
         0.02,
-        "Share of the excess that a textbook form must leave open for forms to be freed.",
+        "Share of the excess left by a textbook form from which forms are freed.",
         "judgement",
         decision="0008",
     )
     form_needed: float = setting(
         0.2,
-        "Share of the excess by which χ² must rise without a freed form for the form to be kept.",
+        "Rise of χ² without a freed form, as a share of the excess, from which the form is kept.",
         "tuned",
         decision="0008",
     )
@@ -131,7 +133,7 @@ class SearchSettings:
     )
     outside_from: float = setting(
         0.05,
-        "Probability of a set from which rivals from outside the vocabulary are tried in place of it.",
+        "Probability of a set from which rivals from outside the vocabulary are tried in its place.",
         "judgement",
     )
     two_springs_of: int = setting(
@@ -146,41 +148,41 @@ class SearchSettings:
     )
     moment_noise_from: float = setting(
         0.05,
-        "Probability of a set from which the random moment that it leaves is tried as noise.",
+        "Probability of a set from which its residual random moment is tried as noise.",
         "judgement",
     )
     moment_left: float = setting(
         0.25,
-        "Share of the power of the missing moment that a set may leave as a random one, on a body "
-        "that nothing holds.",
+        "Greatest power of the residual random moment of a set, as a share of the missing moment, for a "
+        "body without a spring.",
         "judgement",
-        "Half its size: a cause is the greater part of the gap. The EMPS axis, at 0.115, was in "
-        "sight and does not test it.",
+        "Half its size: a cause is the greater part of the gap. The EMPS axis (0.115) does not test it.",
     )
     moment_chance: float = setting(
         1.0,
-        "Standard deviation of a share of what the best set leaves, below which sets are weighed by the moment.",
+        "Standard deviation of the best set's residual, as a share of it, below which sets are weighed "
+        "by the moment.",
         "convention",
-        "As large as the share itself.",
+        "As large as the residual itself.",
     )
     resolved_stds: float = setting(
         2.0,
-        "Distance of an effect's size from zero in half of the records from which that half shows it.",
+        "Distance of an effect from zero in half of the records from which that half confirms it.",
         "convention",
         unit="std",
     )
     gravity_cancels: float = setting(
         0.8,
-        "Share of an unstated spring up to which gravity may cancel it.",
+        "Greatest share of an unstated spring that gravity may cancel.",
         "judgement",
-        "What both leave is else called a spring that is not linear. Silverbox was in sight.",
+        "Beyond it the two imitate a nonlinear spring. Silverbox does not test it.",
         decision="0029",
     )
     plausible_runs: float = setting(
         0.5, "Least share of the runs in which an effect must still be what its name means.", "convention"
     )
     mode_runs: float = setting(
-        0.5, "Least share of the runs in which a second mode must be beside the motion.", "convention"
+        0.5, "Least share of the runs in which a second mode must be distinct from the motion.", "convention"
     )
     turned_as_well: float = setting(
         1.01, "Ratio of χ² up to which a fit half a turn away explains the readings as well.", "judgement"
@@ -189,11 +191,11 @@ class SearchSettings:
 
 @dataclass(frozen=True)
 class RandomMomentSettings:
-    """Whether a random moment acts, and what acts beside it."""
+    """Random moments, and the effects beside them."""
 
     acts_from: float = setting(
         20.0,
-        "Fall of −2 ln L from which a random moment acts.",
+        "Drop of −2 ln L from which a random moment acts.",
         "judgement",
         BY_CHANCE,
         unit="χ²",
@@ -201,35 +203,36 @@ class RandomMomentSettings:
     )
     part_price: float = setting(
         20.0,
-        "Fall of −2 ln L that a centre or a second part of its spectrum must bring.",
+        "Least drop of −2 ln L by a centre or a second part of its spectrum.",
         "judgement",
         BY_CHANCE,
         unit="χ²",
     )
     part_stds: float = setting(
-        2.0, "Scatter between the runs by which that fall must exceed its price.", "convention", unit="std"
+        2.0, "Scatter between the runs by which that drop must exceed its price.", "convention", unit="std"
     )
     alike_within: float = setting(
         20.0,
         "Difference of −2 ln L below which two kinds of random moment explain the residuals alike.",
         "judgement",
-        "As the fall from which one acts: a real spectrum is not first-order, and less is its form.",
+        "The drop from which one acts: a real spectrum is not first-order, and a smaller difference is "
+        "its form.",
         unit="χ²",
         decision="0046",
     )
     effect_price: float = setting(
-        20.0, "Fall of −2 ln L that an effect beside it must bring.", "judgement", BY_CHANCE, unit="χ²"
+        20.0, "Least drop of −2 ln L by an effect beside it.", "judgement", BY_CHANCE, unit="χ²"
     )
     evident_from: float = setting(
         20.0,
-        "Fall of χ² from which a further effect is evident beside it.",
+        "Drop of χ² from which a further effect is evident beside it.",
         "judgement",
         BY_CHANCE,
         unit="χ²",
     )
     further_effects: int = setting(
         2,
-        "Effects added at most so that the innovations are white.",
+        "Greatest number of effects added to make the innovations white.",
         "judgement",
         "Time against coverage.",
         unit="effects",
@@ -248,12 +251,12 @@ class RandomMomentSettings:
     )
     burst_power: float = setting(
         1.5,
-        "Greatest power of short innovations, over what chance explains, of a steady moment.",
+        "Greatest power of short innovations of a steady moment, over that by chance.",
         "judgement",
         "Real turbulence is not quite steady.",
     )
     one_run_rate: float = setting(
-        0.001, "Rate at which a moment of all runs is said to be that of one run.", "convention", ONE_IN_1000
+        0.001, "Rate at which a moment of all runs is said to be in one run only.", "convention", ONE_IN_1000
     )
     phase_rate: float = setting(
         0.001,
@@ -263,21 +266,22 @@ class RandomMomentSettings:
     )
     law_share: float = setting(
         0.5,
-        "Share of what is left that a law of the wind must close on held-out runs to take its place.",
+        "Share of the residual that a law of the wind must explain on held-out runs to replace it.",
         "convention",
         "The greater part, by the word.",
     )
     no_noise_share: float = setting(
         0.9,
-        "Share of what is left that one law must close on held-out runs for no random moment to be sought.",
+        "Share of the residual explained by one law on held-out runs from which no random moment is sought.",
         "judgement",
-        "At most a tenth of what is left is then another in every run.",
+        "At most a tenth of the residual then differs from run to run.",
     )
     steady_line_share: float = setting(
         0.9,
-        "Share of what is left that a line with a phase of its own in every run closes where the moment is a line.",
+        "Share of the residual explained by a line, with a phase per run, from which the moment is a line.",
         "judgement",
-        "A random moment of half-width b leaves a tenth to such a line where b is a twentieth over the duration.",
+        "A random moment of half-width b leaves a tenth to such a line where b is a twentieth over the "
+        "duration.",
         decision="0046",
     )
     law_stds: float = setting(2.0, "Scatter by which that share must be exceeded.", "convention", unit="std")
@@ -295,7 +299,7 @@ class ScatterSettings:
     )
     which_scatters_rate: float = setting(
         0.05,
-        "Rate at which a number is said to scatter beside others that do.",
+        "Rate at which a quantity is said to scatter beside others that do.",
         "convention",
         "Whether the runs differ at all is tested at the rate above.",
     )
@@ -313,25 +317,25 @@ class ScatterSettings:
     )
     shown_stds: float = setting(
         4.0,
-        "Size of an effect from which runs show it by themselves, without their comparison.",
+        "Size of an effect from which runs show it without their comparison.",
         "convention",
         "By chance one effect in 16,000 is as large.",
         unit="std",
     )
     widths_settled: float = setting(
         1.0,
-        "Fall of −2 ln L from which a fit is repeated with other widths.",
+        "Drop of −2 ln L from which a fit is repeated with other widths.",
         "convention",
-        "A change of less says nothing.",
+        "A smaller change is insignificant.",
         unit="χ²",
     )
 
 
 @dataclass(frozen=True)
 class WeighingSettings:
-    """How sets of effects are weighed, and when none of them is named."""
+    """How sets of effects are weighed, and when none is named."""
 
-    steepness: float = setting(1.25, "Exponent of what is left in a channel.", "tuned", decision="0007")
+    steepness: float = setting(1.25, "Exponent of the misfit in a channel.", "tuned", decision="0007")
     scatter_exponent: float = setting(
         1.0,
         "Exponent of the evidence of chance differences between the runs.",
@@ -341,11 +345,11 @@ class WeighingSettings:
     )
     needless_scatter: float = setting(
         4.0,
-        "−2 ln of that evidence by which a needless effect that no run shows by itself may lower it.",
+        "Greatest drop of −2 ln of that evidence by a superfluous effect that no run shows by itself.",
         "estimated",
-        "With the price of an effect it is 10. In 72 campaigns whose runs differ by chance alone, the best of all "
-        "effects lowered it by more than 10 in two (11.9 and 13.7), by 8.9 and 6.4 in two, and by 3.1 at most in "
-        "the rest: two or three in 100 exceed 10.",
+        "With the price of an effect it is 10. In 72 campaigns whose runs differ by chance alone, the "
+        "best of all effects lowered it by more than 10 in two (11.9 and 13.7), by 8.9 and 6.4 in two, "
+        "and by 3.1 at most in the rest: two or three in 100 exceed 10.",
         unit="χ²",
         decision="0036",
     )
@@ -353,15 +357,14 @@ class WeighingSettings:
         3.0,
         "Logarithm of the weight that every effect costs.",
         "tuned",
-        "A further effect must leave less than an eleventh of one channel, or close as much of "
-        "several together.",
+        "A further effect must reduce one channel to less than an eleventh, or as much of several together.",
         decision="0007",
     )
     form_price: float = setting(
         1.0,
         "Logarithm of the weight that every freed form and instant costs.",
         "tuned",
-        "That an instant costs as a form does is a judgement.",
+        "The equal price of an instant is a judgement.",
         decision="0007",
     )
     model_error: float = setting(
@@ -375,31 +378,31 @@ class WeighingSettings:
         0.1,
         "Misfit of a channel that needs no cause, as a share of the gap.",
         "judgement",
-        "The form of a real effect departs from the textbook by about a tenth of what it does. 20 "
-        "small causes and the open records, which were in sight, do not tell 0.05 from 0.3.",
+        "A real effect departs from its textbook form by about a tenth. 20 small causes and the open "
+        "records, which do not test it, do not separate 0.05 from 0.3.",
         decision="0007",
     )
     leak: float = setting(
         0.02,
         "Share of the misfit in other channels that counts in a channel.",
         "tuned",
-        "An error of the phase, squared, is one of the amplitude. All open records were in sight.",
+        "A phase error, squared, is an amplitude error. The open records do not test it.",
         decision="0007",
     )
     needless_chi2: float = setting(
         20.0,
-        "χ² of a channel by which a set with a needless effect may be better than one without.",
+        "Chance gain of χ² in a channel by a superfluous effect.",
         "judgement",
-        "By chance alone two numbers lower χ² by more than 20 once in 22,000 effects tried. Of 25 "
-        "effects one does in one campaign of 900.",
+        "By chance alone two numbers lower χ² by more than 20 once in 22,000 effects tried: with 25 "
+        "effects, in one campaign of 900.",
         unit="χ²",
         decision="0007",
     )
     own_number_gain: float = setting(
         10.0,
-        "χ² that an instant or phase of a run's own may gain by chance.",
+        "Chance gain of χ² by an instant or phase of a single run.",
         "judgement",
-        "It is one number, and the best of many tried.",
+        "It is one number, the best of many tried.",
         unit="χ²",
     )
     needless_spring: float = setting(
@@ -407,37 +410,37 @@ class WeighingSettings:
         "Stiffness of an unstated spring, as a share of that with gravity, below which the rig "
         "needs no spring.",
         "judgement",
-        "The set then counts as one with two numbers less: a spring would have to soften by chance,"
-        " and as much as gravity does.",
+        "The set then counts two parameters less: a spring would have to soften by chance, and as much "
+        "as gravity does.",
         decision="0018",
     )
     chance_stds: float = setting(
-        2.0, "χ² of a channel, against an unknown cause, that is chance.", "convention", unit="std"
+        2.0, "χ² of a channel that is chance, in the odds against an unknown cause.", "convention", unit="std"
     )
     unknown_at: float = setting(
         0.6,
-        "Logarithm of the odds that a set is the cause: the number.",
+        "Constant of the log odds that a set is the cause.",
         "tuned",
-        "Raised from a logistic regression on simulated and measured fits, with all open records in sight.",
+        "Raised from a logistic regression on simulated and measured fits, which do not test it.",
         decision="0007",
     )
     unknown_gap: float = setting(
         0.21,
-        "How much these odds rise with the significance of the gap.",
+        "Increase of these log odds with the significance of the gap.",
         "estimated",
         "A logistic regression on fits with and without the true effects, simulated and measured.",
         decision="0007",
     )
     unknown_left: float = setting(
         2.0,
-        "How much these odds fall with the logarithm of what is left over the share closed.",
+        "Decrease of these log odds with the logarithm of the residual over the explained share.",
         "estimated",
         "A logistic regression on fits with and without the true effects, simulated and measured.",
         decision="0007",
     )
     least_closed: float = setting(
         0.02,
-        "Share added to the share closed in these odds.",
+        "Share added to the explained share in these odds.",
         "judgement",
         "It keeps the logarithm finite.",
         decision="0007",
@@ -452,33 +455,32 @@ class WeighingSettings:
         0.03,
         "Share of the probability that is spread evenly over all answers.",
         "tuned",
-        "How often an answer of overwhelming weight was wrong, where something acted that neither "
-        "fits nor rivals know.",
+        "The rate of wrong answers of overwhelming weight, from causes that neither fits nor rivals include.",
         decision="0007",
     )
     choice_kept: float = setting(
         0.05, "Probability from which the choice of a spring is stated.", "judgement"
     )
     hum_left: float = setting(
-        0.02, "Share of a hum that a line leaves and no cause has to explain.", "judgement"
+        0.02, "Residual share of a removed hum that no cause has to explain.", "judgement"
     )
     noise_explains: float = setting(
         1.0,
-        "Gap below which noise that misbehaves explains all of it.",
+        "Gap below which misbehaving noise explains all of it.",
         "judgement",
-        "As much again as the noise itself.",
+        "The noise itself once more.",
         unit="noise variances of a sample",
     )
     shares_chance: float = setting(
         1.0,
-        "Standard deviation of a share of the gap above which the shares that sets leave are chance.",
+        "Standard deviation of a share of the gap above which the shares of all sets are chance.",
         "convention",
         "As large as the gap itself.",
     )
     noise_excused: float = setting(
         0.8,
-        "Share of so small a gap beyond which effects that close it are no misbehaving noise.",
+        "Explained share of so small a gap from which misbehaving noise is not its cause.",
         "judgement",
-        "Effects of a few numbers close little of any noise.",
+        "Effects with few parameters explain little of any noise.",
         decision="0007",
     )

@@ -1,4 +1,4 @@
-"""Settings of how the work is shared out."""
+"""Settings of the division of the work."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from diagnosis.settings.origin import setting
 
 @dataclass(frozen=True)
 class WorkSettings:
-    """How the work is shared out; every answer has the same bits with any of these."""
+    """The division of the work; answers are bit-identical with any of these."""
 
     threads: int = setting(
         2,
         "Threads in which runs are integrated.",
         "judgement",
-        "What is done between two predictions waits for all of them.",
+        "The work between two predictions waits for all of them.",
         unit="threads",
     )

@@ -3,8 +3,9 @@
 A linear rig has level backbone curves. Their slope and curvature are signs of an effect on stiffness or on damping.
 
 A small moment m added to the model changes the angle by ρ with I ρ̈ + C ρ̇ + K ρ = m: the residual, inserted in
-the equation of the fitted run, gives the missing moment, smoothed over part of a cycle. This is the restoring-force
-surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568, from residuals instead of readings.
+the equation of the fitted run, gives the missing moment, smoothed over part of a cycle. This is the
+restoring-force surface of Masri & Caughey, J. Appl. Mech. 46 (1979) 433, doi 10.1115/1.3424568, from residuals
+instead of readings.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Backbone:
         frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
         zeta: damping ratio, shape (n,).
         zeta_std: of each, shape (n,).
-        nominal_frequency: of the nominal model, Hz; of a body that nothing holds, as `resonance` gives it.
+        nominal_frequency: of the nominal model, Hz; for a body without a spring, from `resonance`.
         nominal_zeta: of the nominal model, dimensionless.
         alone_frequency: frequency of a linear fit to this run alone, Hz; None where that fails.
         alone_zeta: damping ratio of the same fit.
@@ -57,7 +58,7 @@ class Backbone:
 
 
 def backbones(fit: Fit) -> list[Backbone]:
-    """The backbone of every run by a fit of the nominal model, in the measured rig's units."""
+    """The backbone of every run, by a fit of the nominal model, in the measured rig's units."""
     found = []
     seconds, hertz = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz"))
     for index, run in enumerate(fit.problem.data.runs):
@@ -95,10 +96,10 @@ def backbones(fit: Fit) -> list[Backbone]:
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:
-    """How far the curves are from level: χ² beyond that of level lines, of frequency and of damping.
+    """Departure of the curves from level: χ² beyond that of level lines, of frequency and of damping.
 
-    An effect on stiffness raises the first, one on damping the second. In each window the two are known equally
-    well in ω, so that they can be compared.
+    An effect on stiffness raises the first, one on damping the second. In each window both are equally well
+    determined in ω, so they can be compared.
     """
     return (
         sum(_departure(c.frequency, c.frequency_std) for c in curves),
@@ -154,7 +155,7 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
 
 
 def apparent_moment(fit: Fit, index: int) -> Apparent | None:
-    """The moment that the model lacks in a run; None where that is too short, too slow or not of an angle."""
+    """The moment missing from the model in a run; None where the run is too short, too slow or not of an angle."""
     run = fit.problem.data.runs[index]
     inertia, damping, stiffness = linear_coefficients(fit, index)
     frequency = resonance(fit, index)
@@ -207,7 +208,7 @@ class PhasePlane:
 
 
 def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
-    """The map of the moment that the model lacks in some runs, or in all where none is named; None without any."""
+    """The map of the missing moment in some runs, or in all where none is named; None without any."""
     data = fit.problem.data
     chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]
     found = [(data.runs[i].id, a) for i in chosen if (a := apparent_moment(fit, i)) is not None]

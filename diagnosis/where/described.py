@@ -1,4 +1,4 @@
-"""What is said of the place of a gap, as facts."""
+"""The place of a gap as facts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def nowhere(found: Survey, *, within_step: bool) -> Nowhere:
 
 
 def described(where: Where, place: Place, compared: Sequence[type[Effect]], settings: Settings) -> PlaceFound:
-    """What is said of a place.
+    """The facts about a place.
 
     Args:
         compared: causes that have to agree with it.

@@ -1,4 +1,4 @@
-"""How the squared residual is distributed over frequency, time and amplitude, and narrow lines in it.
+"""Distribution of the squared residual over frequency, time and amplitude, and narrow lines in it.
 
 Residuals are decomposed by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
 (1974) 90, doi 10.1109/T-C.1974.223784): it keeps the sum of squares, so that under white noise every squared
@@ -113,7 +113,7 @@ class BandExcess:
 
     Args:
         excess: sum of power beyond that of white noise, in units of the noise variance.
-        mean: the same by coefficient, a ratio.
+        mean: excess per coefficient, a ratio.
         p_value: probability of as much without a gap.
     """
 
@@ -124,7 +124,7 @@ class BandExcess:
 
 
 def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
-    """The bands of a campaign's residual that hold coefficients."""
+    """The bands of a campaign's residual that contain coefficients."""
     result = []
     for index, (name, _) in enumerate(BANDS):
         power = np.concatenate([run.power[run.band == index] for run in runs])
@@ -146,7 +146,7 @@ def bands_beyond_chance(bands: tuple[BandExcess, ...], chosen: WhereSettings) ->
 
 
 def within_bands(residual: Array, run: RunExcess, bands: tuple[str, ...]) -> tuple[Array, float]:
-    """The part of a residual that lies in some bands.
+    """The part of a residual in some bands.
 
     Args:
         residual: scaled, shape (n,).
@@ -166,7 +166,7 @@ class Profile:
     Args:
         edges: of the bins, shape (n + 1,), in the quantity's unit.
         energy: sum over a bin of power beyond that of white noise, shape (n,), in noise variances.
-        mean: the same by residual, shape (n,); NaN where a bin is empty.
+        mean: excess per residual, shape (n,); NaN where a bin is empty.
         std: of the mean where there is no gap, shape (n,).
     """
 
@@ -176,7 +176,7 @@ class Profile:
     std: Array
 
     def interval(self, share: float) -> tuple[float, float] | None:
-        """The shortest interval that holds a share of the excess, a fraction; None where there is no excess."""
+        """The shortest interval with a share of the excess, a fraction; None where there is no excess."""
         return shortest_interval(self.edges, self.energy, share)
 
 
@@ -187,10 +187,10 @@ def profile(
 
     Args:
         edges: of the bins, ascending, shape (n + 1,).
-        place: where every residual belongs, by run, arrays of one shape with ``power``.
+        place: value of the quantity at every residual, by run, arrays of one shape with ``power``.
         power: squared residuals in noise variances, by run, arrays of shape (m,).
         expected: mean of these under white noise, by run.
-        variance: what each adds to the variance of a sum of them under white noise, by run.
+        variance: contribution of each to the variance of a sum of them under white noise, by run.
     """
     where = np.concatenate(place)
     excess = np.concatenate([p - e for p, e in zip(power, expected, strict=True)])
@@ -204,7 +204,7 @@ def profile(
 
 
 def shortest_interval(edges: Array, energy: Array, share: float) -> tuple[float, float] | None:
-    """The shortest run of bins that holds a share of the whole.
+    """The shortest sequence of bins with a share of the whole.
 
     Args:
         edges: of the bins, shape (n + 1,).
@@ -234,8 +234,8 @@ _MOTION = 0.4  # of the run's frequency: the same for the motion itself, whose f
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
 _APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
 _PER_RUN = 2
-_OF_INPUT = 1e-3  # of the power of a run's input: less at a frequency may have been picked up by its wires
-_MULTIPLES = 3  # of the frequency of an input: of higher ones no response is the greater part of a gap
+_OF_INPUT = 1e-3  # of the power of a run's input: less may be interference in its wires
+_MULTIPLES = 3  # of the frequency of an input: responses at higher ones are never most of a gap
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,7 @@ class ResidualLine:
 def residual_lines(
     runs: list[RunExcess], data: Sequence[RunData], chosen: WhereSettings
 ) -> tuple[ResidualLine, ...]:
-    """The lines that stand out of the residual of single runs: at most two in each, the stronger first."""
+    """The prominent lines in the residual of single runs: at most two in each, the stronger first."""
     lines: list[ResidualLine] = []
     for run, own in zip(runs, data, strict=True):
         local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
@@ -288,7 +288,7 @@ def residual_lines(
 
 
 def of_drive(size: int, own: RunData) -> NDArray[np.bool_]:
-    """Where a line may be the response to the input of a driven run: where that has power, and at its multiples.
+    """Frequencies at which a line may be the response to a run's input: where that has power, and its multiples.
 
     Args:
         size: number of coefficients, n; the result has the shape (n,).

@@ -1,9 +1,9 @@
-"""Whether the oscillation of a run jumps at an instant, by its reading alone.
+"""Jumps of a run's oscillation at an instant, from its reading alone.
 
 A blow changes angle and rate of a free decay at once. Causes change its amplitude, frequency and harmonics along
-the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted by smooth harmonics
-of the run's own oscillation, whose slope may change there, and then with a jump of the oscillation as well. No
-model of the rig is needed, so that a large gap from any cause does not hide a blow.
+the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted by smooth
+harmonics of the run's own oscillation, whose slope may change there, and then with a jump of the oscillation as
+well. No model of the rig is needed, so a large gap from any cause does not hide a blow.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ _HALF = 2.0  # cycles on either side of an instant that are fitted; nearer to an
 _APART = 0.25  # cycles between the instants
 _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
-_ROUNDS = 3  # of finding that change, each from the one before
+_ROUNDS = 3  # of finding that change, each from the previous one
 _CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
 _QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
 
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """How clearly the oscillation of a run jumps, by instant.
+    """Evidence for a jump of a run's oscillation, by instant.
 
     Args:
         id: of the run.
-        time: the instants since the start of what is fitted, shape (n,), s.
-        drop: of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of what departs from
-            smooth harmonics around the instant, or of the run's other jumps, whichever is largest.
+        time: the instants since the start of the fitted part, shape (n,), s.
+        drop: of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of the departure
+            from smooth harmonics around the instant, or of the run's other jumps, whichever is largest.
         chance: probability of as large a drop at that instant by chance, shape (n,).
     """
 
@@ -69,7 +69,7 @@ class _Oscillation:
 
     @classmethod
     def of(cls, fit: Fit, index: int) -> _Oscillation:
-        """The oscillation of a run, whose frequency and decay are at first those of a fit."""
+        """The oscillation of a run, with the frequency and decay of a fit as first values."""
         run, frequency = fit.problem.data.runs[index], resonance(fit, index)
         inertia, damping, _ = linear_coefficients(fit, index)
         group = max(1, round(1.0 / (frequency * run.interval * _ROWS)))
@@ -158,7 +158,7 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
 
 
 def _compared(motion: _Oscillation, instants: Array) -> Iterator[tuple[float, float, float]]:
-    """By instant, the drop of χ², what is left over its degrees of freedom, and these."""
+    """By instant, the drop of χ², the residual χ² per degree of freedom, and these degrees."""
     for instant in instants:
         reading, smooth, jump = motion.around(float(instant))
         basis = np.linalg.qr(smooth)[0]

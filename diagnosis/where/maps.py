@@ -61,18 +61,18 @@ class GroupExcess:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One run against time: what was measured, and what the models leave of it.
+    """One run against time: the readings and the residuals of the models.
 
-    What a model predicts is the reading minus its residual.
+    A model's prediction is the reading minus its residual.
 
     Args:
         time: s, shape (n,); without the times at which the record has no sample.
-        reading: means of the reading as it is fitted, shape (n,), rad.
+        reading: means of the fitted reading, shape (n,), rad.
         before: residuals of the nominal model, shape (n,), rad.
         after: residuals with the causes added, shape (n,), rad; None where nothing was added.
         noise_std: of one value, rad.
         differ: the few cycles in which the models differ most, s; where nothing was added, in which the nominal
-            model misses most.
+            model has its largest misfit.
     """
 
     id: str
@@ -198,7 +198,7 @@ def _fields(value: object, **names: str) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A field in JSON's types: arrays as lists, by row, of rounded numbers; None for those that are not finite."""
+    """A field in JSON's types: arrays as lists, by row, of rounded numbers; None for values that are not finite."""
     if isinstance(value, np.ndarray) and value.ndim > 1:
         return [_plain(row) for row in value]
     if isinstance(value, np.ndarray):

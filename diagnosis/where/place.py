@@ -1,4 +1,4 @@
-"""Where the nominal model departs from the runs, from its residuals alone: no effect is known here."""
+"""The place where the nominal model departs from the runs, from its residuals alone, without any effect."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a gap is.
+    """The place of a gap.
 
     Args:
         runs: ids of the runs beyond chance.
@@ -51,9 +51,10 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
     Args:
         campaign: as measured, of the units of the fit.
         nominal: fit of the nominal model.
-        hum_removed: whether a hum was removed before the fit. It is part of the gap: the residuals get it back.
-        noise_ratio: of the noise variance of the fit to the one that counts: where the readings' step is coarser
-            than stated, it raises the noise found in the records, and the stated noise is the measure.
+        hum_removed: whether a hum was removed before the fit. It is part of the gap, so it is restored to the
+            residuals.
+        noise_ratio: noise variance of the fit over the reference one: a step of the readings that is coarser than
+            stated raises the noise found in the records, and the stated noise is the reference.
     """
     data, residuals = nominal.problem.data, nominal.residuals
     if hum_removed:
@@ -74,7 +75,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 
 
 def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> tuple[str, ...]:
-    """The runs beyond chance that have a good part of the largest excess among them."""
+    """The runs beyond chance with a good part of the largest excess among them."""
     clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < chosen.run_rate}
     least = chosen.named_run * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
@@ -127,7 +128,7 @@ def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[f
 
 
 def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding:
-    """What the gap acts on, from features of the residual; the condition is the one inferred."""
+    """The channel on which the gap acts, from features of the residual and the inferred condition."""
     chosen = nominal.settings.where
     blow = blow_interval(found, chosen.blow_share, chosen)
     if blow is not None:

@@ -1,4 +1,4 @@
-"""Drawing up the maps of a campaign's residuals."""
+"""Computing the maps of a campaign's residuals."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ _SHOWN_CYCLES = 6  # in which the models differ most
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Maps, and what else the text about them needs.
+    """Maps, and further figures for the text about them.
 
     Args:
-        frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
+        frequency_interval: shortest interval of frequency with most of the excess, Hz.
         moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """
@@ -55,7 +55,7 @@ class Survey:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Squared residuals by run, and where they lie.
+    """Squared residuals by run, and their places.
 
     The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
     size. Powers are therefore shares of the variance of one sample.
@@ -65,7 +65,7 @@ class _Samples:
     amplitude: list[Array]  # rad
     power: list[Array]
     expected: list[float]  # of the power under noise
-    variance: list[float]  # likewise
+    variance: list[float]  # of the power under noise
 
     @classmethod
     def of(cls, nominal: Fit, scaled: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]) -> _Samples:
@@ -89,9 +89,9 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     """Draw up all maps of the nominal model's residuals.
 
     Args:
-        scaled: the nominal fit with residuals in units of the noise that counts.
+        scaled: the nominal fit with residuals in units of the reference noise.
         excesses: its squared residuals, by run.
-        chosen: ids of the runs the phase plane is taken over; all where empty.
+        chosen: ids of the runs for the phase plane; all where empty.
 
     Returns:
         Maps and interval in the measured rig's units.
@@ -140,7 +140,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
 
 
 def _moment_energy(nominal: Fit, times: Sequence[Array], instants: Array) -> tuple[Array, float]:
-    """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance.
+    """Energy of the apparent moment by time, in variances of its noise, and its sum over the scatter by chance.
 
     Args:
         times: of the residuals, by run, shape (n,), s.
@@ -162,7 +162,7 @@ def _moment_energy(nominal: Fit, times: Sequence[Array], instants: Array) -> tup
 def _frequency_interval(
     nominal: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]
 ) -> tuple[float, float] | None:
-    """The shortest interval of frequency that holds most of the excess of the bands that show the gap, Hz."""
+    """The shortest interval of frequency with most of the excess of the bands that show the gap, Hz."""
     kept = [replace(run, power=np.where(run.inside(beyond), run.power, 1.0)) for run in excesses]
     high = max(float(run.frequency[-1]) for run in excesses)
     # no bin is narrower than the shortest record resolves
@@ -174,7 +174,7 @@ def _frequency_interval(
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
-    """The maps with what a fit with the causes leaves beside the nominal model's residuals."""
+    """The maps with the residuals of a fit with the causes beside those of the nominal model."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
     return replace(found.maps, frequency_after=after, traces=_traces(nominal, answer, found.excesses))
 
@@ -286,7 +286,7 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
     traces = []
     for index in order:
         run, frequency = nominal.problem.data.runs[index], resonance(nominal, index)
-        # more points show no more of a cycle
+        # more points would not show more of a cycle
         enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))
         group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
         seen = [_times(nominal, index), run.reading, run.unscaled(nominal.residuals[index])]
@@ -294,7 +294,7 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
             seen.append(run.unscaled(best.residuals[index]))
         filled = _means(run.counts.astype(np.float64), group) > 0.0
         time, reading, before, *after = (_means(values, group)[filled] for values in seen)
-        # the few cycles that hold the most of the difference's energy; the whole where that is shorter
+        # the few cycles with most of the difference's energy; the whole record where it is shorter
         first, last, length = float(time[0]), float(time[-1]), _SHOWN_CYCLES / frequency
         if last - first > length:
             difference = before - after[0] if after else before

@@ -1,4 +1,4 @@
-"""The answers in the order of their probabilities, and what the one is called that is set out."""
+"""The answers in the order of their probabilities, and the name of the answer that is set out."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from diagnosis.words.numbers import Document
 def ranked(document: Document) -> list[Mapping[str, Any]]:
     """The answers of a document, the most probable first.
 
-    The document has the answer first. Of an undecided one that is the most probable set of effects, which an
-    unknown cause may exceed.
+    The document starts with its answer. If undecided, that is the most probable set of effects, and an unknown
+    cause may be more probable.
     """
     return sorted(document["candidates"], key=lambda one: -one["probability"])
 
 
 def set_out(document: Document) -> str:
-    """What the answer is called whose parameters are stated, such as ``most probable answer``."""
+    """The name of the answer whose parameters are stated, such as ``most probable answer``."""
     if document.get("decided", True):
         return "answer"
     first = document["candidates"][0]

@@ -1,4 +1,4 @@
-"""The causes as a person says them: what is certain first, then what is open; their sizes, and what they change."""
+"""The causes in words: first those that are certain, then the open ones; their sizes and consequences."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from tunnel_sim.effects import known_effects
 
 
 def known_and_open(document: Document, *, sized: bool = True) -> str:
-    """What the likely answers have in common, each cause with its own probability, and what is open between them.
+    """The causes common to the likely answers, each with its probability, and the alternatives beside them.
 
     Args:
-        sized: whether springs of which one is off are stated with their errors, which another sentence may do.
+        sized: whether springs of which one is off are given with their errors; False where another sentence does
+            so.
 
     Returns:
         Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
@@ -38,7 +39,7 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
 
 
 def from_causes(document: Document) -> str:
-    """The causes of a decided answer with their probabilities, in the middle of a sentence."""
+    """The causes of a decided answer with their probabilities, as part of a sentence."""
     if document["ambiguous_with"]:
         return known_and_open(document, sized=False)
     proper = without_scatter(document["causes"])
@@ -47,9 +48,9 @@ def from_causes(document: Document) -> str:
 
 
 def _parted(document: Document, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
-    """Effects that all likely answers have, and what each of them has beside these, with its probability.
+    """Effects common to all likely answers, and the further effects of each answer with its probability.
 
-    What is read off the records before anything is fitted is part of every answer.
+    Causes detected in the records before the fits are part of every answer.
     """
     least = settings_of(document).answer.rivals_from
     first, *others = document["candidates"]
@@ -72,7 +73,7 @@ def _effects(answer: Mapping[str, Any]) -> set[str]:
 
 
 def _called(document: Document, answer: Mapping[str, Any], name: str, sized: bool) -> str:
-    """An effect by its name; an error of a spring by which spring and how far off, which its name does not say."""
+    """An effect by its name; a spring error by the spring and its relative error, which the name does not give."""
     kind = {kind.name: kind for kind in known_effects()}.get(name)
     if kind is None or not kind.chosen_spring():
         return plain(name)
@@ -83,12 +84,12 @@ def _called(document: Document, answer: Mapping[str, Any], name: str, sized: boo
 
 
 def _of(document: Document, name: str) -> str:
-    """The probability that an effect is among the causes, whatever acts beside it."""
+    """The probability that an effect is among the causes, in any combination."""
     return probability(document.get("inclusion", {}).get(name, document["candidates"][0]["probability"]))
 
 
 def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
-    """The size of an effect of an answer as a person says it; empty for an effect without such a phrase.
+    """The size of an effect of an answer in words; empty for an effect without a phrase.
 
     Args:
         answer: one of the candidates.
@@ -106,13 +107,13 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
     def text(value: float, std: float | None, unit: str) -> str:
         return for_people(
             value, std, said.get(unit, unit)
-        )  # moments are per inertia where nothing states one
+        )  # moments are per unit inertia where no inertia is stated
 
     return kind.phrase(values, {full: one["std"] for full, one in given.items()}, text)
 
 
 def hold_words(document: Document) -> str:
-    """That a delay of the input may be a wrong hold between samples, in sentences; empty where it may not."""
+    """Sentences on a delay of the input that may be a wrong hold between samples; empty where it may not."""
     found = document["found"].get("hold")
     if found is None:
         return ""
@@ -131,7 +132,7 @@ def hold_words(document: Document) -> str:
 
 
 def hold_step(document: Document) -> str:
-    """What tells a delay of the input from a wrong hold, without a full stop; empty where nothing need do so."""
+    """How to distinguish a delay of the input from a wrong hold, without a full stop; empty where not needed."""
     found = document["found"].get("hold")
     if found is None:
         return ""
@@ -142,7 +143,7 @@ def hold_step(document: Document) -> str:
 
 
 def one_of_springs(document: Document) -> str:
-    """That one of the springs is off that the runs cannot tell apart."""
+    """The statement that one of several indistinguishable springs is off."""
     return f"one of the {_count_of_springs(document)} springs is off"
 
 
@@ -152,7 +153,7 @@ def _count_of_springs(document: Document) -> str:
 
 
 def _choices_of_spring(document: Document) -> str:
-    """The errors of which one is there: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
+    """The alternative errors of springs: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
     each = (
         f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
         for one in document["found"]["choices"]
@@ -161,7 +162,7 @@ def _choices_of_spring(document: Document) -> str:
 
 
 def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:
-    """The parameters of one effect of an answer, by their own names."""
+    """The parameters of one effect of an answer, without the effect's name."""
     alone = answer["effect"] == name
     return {
         full.rpartition(".")[2]: given
@@ -183,7 +184,7 @@ def advice(document: Document, name: str) -> str:
 
 
 def consequence(document: Document) -> str:
-    """What the causes do to the coefficients, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
+    """Change of the coefficients by the causes, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
 
     Empty where no coefficient is known before and after, or no cause is named.
     """
@@ -216,11 +217,11 @@ def consequence(document: Document) -> str:
     return f"{first}{text[1:]}."
 
 
-_OPEN = 0.5  # standard deviations, as a share of the value, beyond which its change says nothing
+_OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
 
 
 def _apart(before: float, after: float) -> str:
-    """Two coefficients to three digits, or as many as show that they differ."""
+    """Two coefficients to three digits, or to as many as distinguish them."""
     for digits in range(3, 7):
         one, two = _digits(before, digits), _digits(after, digits)
         if one != two:

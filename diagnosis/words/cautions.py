@@ -1,6 +1,6 @@
 """Caveats, remarks on the noise, and notes, each under the kind of its fact.
 
-A sentence is a template of the fact's figures, or a function of them where it depends on them otherwise.
+A sentence is a template of the fact's figures, or a function of them where a template is not enough.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     "the wind off or faster: {runs}. Diagnose these separately.",
     "no sensor effect tried": "No effect of the sensor is tried on {quantity}s.",
     "only a second mode tried": "A second mode is the only effect of the sensor that is tried on {quantity}s.",
-    "by moment": "Nothing holds the body, so that small errors of the moment add up in its angle, which departs "
-    "from every model. Effects are therefore compared by the moment that they leave. It counts as random noise "
+    "by moment": "The body has no restoring moment, so small errors of a moment add up in its angle, which departs "
+    "from every model. Effects are therefore compared by the residual moment. It counts as random noise "
     "beside the answer: parameters, coefficients and the shares in the table of answers come from fits with that "
     "noise. All other sizes and shares are those of the angle.",
     "unpatched": f"{UNPATCHED}: {{reason}}.",
@@ -97,7 +97,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "at rest. The coefficients before the causes may therefore differ from those of identify, which uses the "
     "whole record.",
     "unresolved": _unresolved,
-    "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the place where friction "
+    "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
         f'A zero of each run\'s own would close {share(given["share"])} of the gap. State zero = "per_run" under '
@@ -107,10 +107,10 @@ CAUTIONS: Mapping[str, Sentence] = {
         f"By linear theory all known effects together would leave {share(given['left'])} of the gap or more, so "
         "no larger sets of effects were tried."
     ),
-    "remainder not sought": "What could be closed of what remains, and by which formula, is not sought where "
-    "nothing holds a driven body: every small error of a moment adds up in its angle.",
-    "remainder not solved": "How much of what remains could be closed was not found: its equations cannot be "
-    "solved.",
+    "remainder not sought": "No formula for the remaining gap is sought for a driven body without a restoring "
+    "moment: every small error of a moment adds up in its angle.",
+    "remainder not solved": "The share of the remaining gap that could be closed was not found: its equations "
+    "cannot be solved.",
 }
 """Caveats of an answer."""
 
@@ -125,7 +125,7 @@ NOISE: Mapping[str, Sentence] = {
     "differs by run": "the records contradict the stated {stated_rad:3}: their noise differs by run, "
     "{least_rad:3} to {most_rad:3}",
 }
-"""Why the noise is taken as it is: clauses."""
+"""Reasons for the noise used: clauses."""
 
 REMARKS: Mapping[str, tuple[Sentence, str]] = {
     "within step": (
@@ -155,10 +155,10 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
     ),
     "other mains": (
         "mains of {other_hz:.5g} Hz would show the same line as mains of {mains_hz:.5g} Hz at this sample rate",
-        "sample faster to tell them apart",
+        "sample faster to distinguish them",
     ),
 }
-"""What is noted of the noise, and its remedy."""
+"""Remarks on the noise, with their remedies."""
 
 PATCH: Mapping[str, Sentence] = {
     "polynomial": "The {moment} is written as a polynomial of third order, which misses {missed_percent:.2g} % of "
@@ -176,19 +176,19 @@ PATCH: Mapping[str, Sentence] = {
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",
     "air": "The air's moment is left out: the patched model is that of the runs with the wind off.",
     "sensor": lambda given: (
-        f"Of the sensor, and not part of the model: {', '.join(plain(name) for name in given['effects'])}; the "
-        "comparison applies it to the reading."
+        f"Effects of the sensor are not part of the model: {', '.join(plain(name) for name in given['effects'])}; "
+        "the comparison applies them to the reading."
     ),
     "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input "
-    "asks for it; RK4 and shorter steps do not. The inertia that dampers seem to add in such steps is taken off "
-    "what is written.",
+    "asks for it; RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from "
+    "the value written.",
 }
-"""Where a patched model is not the same law."""
+"""Differences between the patched model and the law found."""
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """A reading in a sentence, written with as many digits as its format says.
+    """A reading in a sentence, with as many digits as its format asks for.
 
     Args:
         value: in the unit.
@@ -230,7 +230,7 @@ _NO_DECAY = "no damping ratio and no derivative is stated, since no run is a fre
 
 
 def coefficient_note(document: Document) -> str:
-    """How to read the coefficients: where a cause changes their meaning, and what unstated sizes leave open."""
+    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
     if document["found"]["limit_cycles"]:
         return _NO_DECAY
     before, causes = document["coefficients"]["before"], document["causes"]
@@ -241,10 +241,10 @@ def coefficient_note(document: Document) -> str:
 
 
 def size_note(beta: str) -> str:
-    """What is identified in place of the coefficients where sizes are not stated.
+    """The quantities identified in place of the coefficients where sizes are not stated.
 
     Args:
-        beta: name of what is identified in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
+        beta: name of the quantity in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
 
     Returns:
         A sentence; empty where the sizes are stated.

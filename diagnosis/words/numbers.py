@@ -1,4 +1,4 @@
-"""How names and numbers are written: effects, channels, probabilities, shares, and gaps in the units of people."""
+"""The format of names and numbers: effects, channels, probabilities, shares, and gaps in customary units."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def share(value: float) -> str:
     """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
 
     Args:
-        value: a fraction; below 0, where more is left than was there, it is ``none``.
+        value: a fraction; ``none`` below 0, where the residual has grown.
     """
     if value < 0.0:
         return "none"
@@ -81,7 +81,7 @@ _UNITS = {"l/V": "the time in which the air passes the reference length"}
 
 
 def explained(units: Iterable[str]) -> str:
-    """What units are that only this field uses, in brackets after a blank; empty where all are known."""
+    """Explanation of units that only this field uses, in brackets after a blank; empty where all are common."""
     said = [f"{unit}: {_UNITS[unit]}" for unit in units if unit in _UNITS]
     return f" ({'; '.join(said)})" if said else ""
 
@@ -108,11 +108,11 @@ def size_change(before: float, after: float) -> str:
 
 
 def change_up_to(size: float, given: Mapping[str, Any]) -> str:
-    """A change of a coefficient as its share, rounded up; in its unit where the coefficient itself is uncertain.
+    """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
 
     Args:
         size: the change, in the coefficient's unit.
-        given: the coefficient, as the document has it.
+        given: the coefficient, from the document.
     """
     if given["std"] is not None and given["std"] < abs(given["value"]):
         return f"{rounded_up(100.0 * size / abs(given['value']))} %"
@@ -120,12 +120,12 @@ def change_up_to(size: float, given: Mapping[str, Any]) -> str:
 
 
 def unit_shown(unit: str) -> tuple[str, float]:
-    """The mark of the unit in which readings are shown to people, and the factor on values in the unit given."""
+    """The mark of the displayed unit of readings, and the factor on values in the given unit."""
     return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
 
 
 def misfit_of(document: Document) -> Misfit | None:
-    """The misfit of a diagnosis' document; None where it has none, as a document of an earlier version."""
+    """The misfit of a diagnosis' document; None where it has none, as in a document of an earlier version."""
     given = document["gap"].get("misfit")
     return None if given is None else Misfit(given["noise"], given["swing"], given["unit"])
 
@@ -160,7 +160,7 @@ def times_noise(value: float, decimals: int = 2) -> str:
 
 
 def left_over(excess: float) -> str:
-    """What is left, such as ``9.6 times the noise power``, a ratio."""
+    """A residual gap, such as ``9.6 times the noise power``, a ratio."""
     least = 1e-3
     size = f"less than {least:g}" if excess < least else significant(excess, 2)
     return f"{size} times the noise power"
@@ -176,7 +176,7 @@ def beside_noise(excess: float) -> str:
 
 
 def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
-    """A reading, or an error of one, in the unit that people read, such as ``0.0226°``.
+    """A reading, or an error of one, in the displayed unit, such as ``0.0226°``.
 
     Args:
         value: in the unit.
@@ -193,15 +193,15 @@ def unit_of(document: Document) -> str:
 
 
 def held_out_excess(value: float) -> str:
-    """An excess in noise powers, a ratio: three decimals where it is small, or four significant digits."""
+    """An excess in noise variances, a ratio: three decimals where it is small, or four significant digits."""
     return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
 def misfit_text(document: Document, excess: float) -> str:
-    """A gap in the units that people use, and in multiples of the noise power.
+    """A gap in customary units, and in noise variances.
 
     Args:
-        excess: in noise powers, a ratio.
+        excess: in noise variances, a ratio.
 
     Returns:
         Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``.
@@ -211,7 +211,7 @@ def misfit_text(document: Document, excess: float) -> str:
 
 
 def misfit_shown(document: Document, value: float) -> str:
-    """A gap as a root mean square; in noise powers for a document without ``misfit``.
+    """A gap as a root mean square; in noise variances for a document without ``misfit``.
 
     Args:
         value: the gap as an excess, in noise variances, a ratio.
@@ -221,7 +221,7 @@ def misfit_shown(document: Document, value: float) -> str:
 
 
 def excess_std(document: Document) -> float | None:
-    """Standard deviation of the campaign's excess by chance, in noise powers; None where there are no maps."""
+    """Standard deviation of the campaign's excess by chance, in noise variances; None where there are no maps."""
     runs = (document.get("maps") or {"runs": []})["runs"]
     return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 
@@ -236,7 +236,7 @@ CHANNELS = {
     "sensor": "the angle sensor",
     "calibration": "a stated value",
 }
-"""What a cause acts on, in the verdict."""
+"""The object on which a cause acts, for the verdict."""
 
 PLACES = {
     "stiffness": "the restoring moment (stiffness)",
@@ -245,10 +245,10 @@ PLACES = {
     "sensor": "the reading of the sensor",
     "calibration": "a value stated for the runs (calibration)",
 }
-"""What a gap acts on, by its residuals."""
+"""The object on which a gap acts, by its residuals."""
 
 CONDITIONS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
-"""When a gap shows."""
+"""The condition under which a gap shows."""
 
 BANDS = {
     "0": "slower than the oscillation",
@@ -267,7 +267,7 @@ MISFITS = {
     "zero": "the zero",
     "harmonics": "the harmonics",
 }
-"""Channels in which a set of effects may leave a misfit."""
+"""Channels in which a set of effects may have a misfit."""
 
 KINDS: Mapping[str, str] = {
     "angle": "a moment of the angle alone",
@@ -282,11 +282,11 @@ KINDS: Mapping[str, str] = {
     "wander": "a wandering or jumping zero of each run's own",
     "noise": "nothing smooth: the rest is noise",
 }
-"""Kinds of what may be missing (`diagnosis.facts.remainder.KINDS`)."""
+"""Kinds of missing law (`diagnosis.facts.remainder.KINDS`)."""
 
 _ACTS_ON = {**CHANNELS, "sensor": "the reading"}
 ACTS_WHEN = {"always": "with or without wind", "wind_on": "only with the wind on"}
-"""When a cause acts, beside what it acts on."""
+"""The condition under which a cause acts."""
 
 
 def plain(*names: str) -> str:
@@ -307,7 +307,7 @@ def windy(document: Document) -> bool:
 
 
 def acts_on(document: Document, effect: str) -> str:
-    """What an effect acts on and when, such as ``the damping, with or without wind``; empty for an unknown one."""
+    """The object and condition of an effect, such as ``the damping, with or without wind``; empty if unknown."""
     kind = {kind.name: kind for kind in known_effects()}.get(effect)
     if kind is None:
         return ""

@@ -1,4 +1,4 @@
-"""A model of one's own beside what the runs say of it: the values in its file, and those fitted."""
+"""The user's model compared with the runs: the values in its file, and the fitted ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from diagnosis.settings import settings_of
 from diagnosis.words.numbers import Document
 from identification.printing import significant, unit_mark, with_std
 
-#: By the attribute in which it is written: what a fit leaves free, and the coefficient that it is a part of.
+#: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
 _FREE = {
     "joint armature": ("inertia", "yaw_inertia"),
     "joint damping": ("damping", "mechanical_damping"),
@@ -18,7 +18,7 @@ _FREE = {
 
 
 def corrected(document: Document) -> list[tuple[Mapping[str, Any], float]]:
-    """The attributes of the model that the runs do not agree with, as the patch has them.
+    """The attributes of the model that disagree with the runs, as in the patch.
 
     Returns:
         With the standard deviation of each new value, in its unit; none without a model.
@@ -38,7 +38,7 @@ def corrected(document: Document) -> list[tuple[Mapping[str, Any], float]]:
 
 
 def model_words(document: Document) -> str:
-    """How the values in the model's file differ from those of the runs, in a sentence; empty where they do not."""
+    """Differences of the values in the model's file from those of the runs, in a sentence; empty without any."""
     said = []
     for one, std in corrected(document):
         before, unit = significant(one["before"][0], 3), unit_mark(one["unit"].split(",")[0])
@@ -48,7 +48,7 @@ def model_words(document: Document) -> str:
 
 
 def model_step(document: Document) -> str:
-    """What to do where the values in the model's file do not fit, without a full stop; empty where they do."""
+    """What to do where the values in the model's file do not fit, without a full stop; empty where they fit."""
     if not corrected(document):
         return ""
     return f"Correct these values in {document['model']['file']}; --patch FILE writes a model with them"

@@ -1,4 +1,4 @@
-"""What remains of a gap, and what could be closed of that, in sentences."""
+"""The remaining gap, and the part of it that could be explained, in sentences."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tunnel_sim.effects import known_effects
 
 
 def rest_words(document: Document) -> str:
-    """What remains, in sentences; empty for a document without it."""
+    """The remaining gap, in sentences; empty for a document without it."""
     rest, causes = document["rest"], document["causes"]
     if rest is None:
         return ""
@@ -65,7 +65,7 @@ def _each(sizes: dict[str, str]) -> str:
 
 
 def closable_words(document: Document) -> str:
-    """What could be closed of what is left, in a few sentences; empty where the document does not say."""
+    """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
     found = document["closable"]
     if found is None:
         return ""
@@ -86,7 +86,7 @@ def closable_words(document: Document) -> str:
 
 
 def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
-    """How much the kind closes, beside the others, where, and by which formula."""
+    """The share of the kind beside those of the others, its place, and its formula."""
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
     said = [
@@ -130,7 +130,7 @@ _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of
 
 
 def formula_step(document: Document) -> str:
-    """How to try the formula that may be what is missing, without a full stop; empty where there is none."""
+    """How to try the formula of the remainder, without a full stop; empty where there is none."""
     found = document["closable"]
     if found is None or found["law"] is None:
         return ""
@@ -141,9 +141,9 @@ def formula_step(document: Document) -> str:
 
 
 def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) -> list[str]:
-    """The kind that closes more than the one named, on other readings held out, and why it is not named.
+    """The kind that explains more than the named one, on other held-out readings, and why it is not named.
 
-    None where no kind does.
+    Empty where no kind does.
     """
     chosen = settings_of(document).remainder
     best = next(one for one in ceilings if one.kind == kind)
@@ -174,17 +174,17 @@ def _line(found: dict[str, Any] | None) -> list[str]:
 
 
 def ceiling(given: Document) -> Ceiling:
-    """A kind's share, as the document has it."""
+    """A kind's share, from the document."""
     return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
 
 
 def rest_line(document: Document) -> str:
-    """What remains, as the document says it; empty for a document without it."""
+    """The remaining gap, from the document; empty for a document without it."""
     return str((document["rest"] or {"words": ""})["words"])
 
 
 def closable_line(document: Document) -> str:
-    """What could be closed, in a line; empty where there is no gap, or it was not found."""
+    """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
     if found := document.get("closable"):
         return f"What could be closed: {found['words']}"
     rest = document.get("rest")

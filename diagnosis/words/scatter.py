@@ -1,4 +1,4 @@
-"""How the runs repeat, in sentences: by how much they differ by chance, and the run that deviates far beyond."""
+"""Repeatability of the runs, in sentences: chance differences, and the run that deviates far beyond them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from identification.printing import TextTable, concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
 
 SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
-"""The number that differs between runs, by the name of the scatter."""
+"""The quantity that differs between runs, by the name of the scatter."""
 NUMBERS = {
     "wind_speed": "the wind speed",
     "spring_stiffness": "the spring",
     "mechanical_damping": "the damping",
 }
-"""The numbers that may differ between runs, in words."""
+"""The quantities that may differ between runs, in words."""
 BETWEEN_RUNS = "scatter between runs"
-"""Chance differences between runs, of whatever number, in a few words."""
+"""Chance differences between runs, in any quantity, in a few words."""
 _MEANT = (
     "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
     "them."
@@ -42,12 +42,12 @@ def scattering(names: Iterable[str]) -> list[str]:
 
 
 def spreads_of(document: Document) -> list[Mapping[str, Any]]:
-    """The chance differences between the runs, as the document has them; none for a document without them."""
+    """The chance differences between the runs, from the document; none for a document without them."""
     return list((document.get("repeatability") or {"spreads": ()})["spreads"])
 
 
 def repeats(document: Document) -> bool:
-    """Whether no scatter between the runs shows, and none is stated."""
+    """Whether the runs show no scatter, and none is stated."""
     return not any(one["width"] for one in spreads_of(document))
 
 
@@ -64,12 +64,12 @@ def percent_of(value: float, digits: int = 2, *, sign: bool = False) -> str:
 
 
 def _stated(spread: Mapping[str, Any]) -> str:
-    """What the campaign states, as it states it."""
+    """The scatter stated by the campaign, in its own form."""
     return f"{100.0 * spread['stated']:.4g} %"
 
 
 def width_text(spread: Mapping[str, Any]) -> str:
-    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; alone where it is as stated."""
+    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; without it for a stated width."""
     low, high = spread["interval"]
     text = percent_of(spread["width"])
     return text if low == high else f"{text} ({percent_of(low).removesuffix(' %')} to {percent_of(high)})"
@@ -90,11 +90,11 @@ def answer_name(effect: str) -> str:
 
 
 def spread_estimate(document: Document, effect: str, given: Mapping[str, Any]) -> str | None:
-    """The parameter of a scatter in per cent, with its interval in the answer; None of other effects.
+    """The parameter of a scatter in per cent, with its interval in the answer; None for other effects.
 
     Args:
-        effect: that the parameter is of.
-        given: the parameter, as the document has it.
+        effect: that the parameter belongs to.
+        given: the parameter, from the document.
     """
     if effect not in SCATTERS:
         return None
@@ -103,12 +103,12 @@ def spread_estimate(document: Document, effect: str, given: Mapping[str, Any]) -
 
 
 def repeats_words(document: Document) -> str:
-    """How the runs repeat, in sentences; empty where they do, or the document does not say."""
+    """Repeatability of the runs, in sentences; empty where they repeat, or it is not known."""
     return " ".join(filter(None, (scatter_words(document), outlier_words(document))))
 
 
 def scatter_words(document: Document) -> str:
-    """By how much the runs differ by chance or drift, and what that means; empty where they do not."""
+    """Chance differences or drifts of the runs and their meaning; empty where there are none."""
     spreads = spreads_of(document)
     shown = [one for one in spreads if one["shown"]]
     if not shown:
@@ -136,7 +136,7 @@ def _start(document: Document) -> str:
 
 
 def _differs(spread: Mapping[str, Any], trends: Mapping[str, Any]) -> str:
-    """One number that differs: by how much, beyond what, and in which runs most."""
+    """One quantity that differs: its width, the reference, and the runs that deviate most."""
     text = f"{NUMBERS[SCATTERS[spread['effect']]]} by {width_text(spread)}"
     if spread["stated"] is not None:
         text += f", beyond the {_stated(spread)} stated"
@@ -147,7 +147,7 @@ def _differs(spread: Mapping[str, Any], trends: Mapping[str, Any]) -> str:
 
 
 def trend_words(trend: Mapping[str, Any]) -> str:
-    """That a number drifts over the campaign, in a sentence."""
+    """The drift of a quantity over the campaign, in a sentence."""
     number = SCATTERS[trend["effect"]]
     change, std = 100.0 * abs(trend["change"]), 100.0 * trend["std"]
     goes = "rises" if trend["change"] > 0.0 else "falls"
@@ -161,7 +161,7 @@ def trend_words(trend: Mapping[str, Any]) -> str:
 
 
 def stated_words(document: Document) -> str:
-    """That the runs differ no more than the campaign states; empty where it states nothing."""
+    """The statement that the runs differ no more than the campaign states; empty where it states nothing."""
     stated = [one for one in spreads_of(document) if one["stated"]]
     if not stated or document["causes"] == ["unknown"]:
         return ""
@@ -170,7 +170,7 @@ def stated_words(document: Document) -> str:
 
 
 def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> list[str]:
-    """That the runs tell two numbers apart poorly, where they do."""
+    """The statement that the runs hardly distinguish two quantities, where so."""
     both = [one for one in spreads if SCATTERS[one["effect"]] in ("wind_speed", "spring_stiffness")]
     if len(both) < 2 or not any(one["shown"] for one in both):
         return []
@@ -224,7 +224,7 @@ def _without_outlier(document: Document, other: Document | None) -> str:
 
 
 def repeat_steps(document: Document) -> list[str]:
-    """What to do next about a run that deviates far beyond the others, and about numbers told apart poorly."""
+    """Next steps for a run that deviates far beyond the others, and for poorly distinguished quantities."""
     run = (document.get("repeatability") or {}).get("outlier")
     steps = (
         [f"Repeat run {run}, or look for what disturbed it: it deviates far beyond the others."]
@@ -233,13 +233,13 @@ def repeat_steps(document: Document) -> list[str]:
     )
     poorly = _told_apart(spreads_of(document), settings_of(document).words)
     named = {SCATTERS[name] for name in scattering(document["causes"])}
-    if poorly and "wind_speed" not in named:  # whose advice says it too
+    if poorly and "wind_speed" not in named:  # whose advice includes this
         steps.append("Log the wind speed of every run: the runs do not tell it from the spring.")
     return steps
 
 
 def repeatability_line(document: Document) -> str:
-    """How well the runs repeat, in a line; empty for a document without it."""
+    """Repeatability of the runs, in a line; empty for a document without it."""
     found = document.get("repeatability")
     if not found or len(found["runs"]) < 2:
         return ""
@@ -251,7 +251,7 @@ def repeatability_line(document: Document) -> str:
 
 
 def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
-    """Of the scatter of a number over the runs, in per cent."""
+    """Root mean square scatter of a quantity over the runs, in per cent."""
     return percent_of((sum(one[f"{name}_band"] ** 2 for one in runs) / len(runs)) ** 0.5)
 
 

@@ -48,7 +48,7 @@ _IN_BRACKETS = "root mean square (in brackets: its power over that of the noise)
 
 
 def candidates_table(document: Document) -> TextTable:
-    """The answers considered and the shares that they close, most probable first; a last row counts the others."""
+    """The answers considered and their shares of the gap, most probable first; a last row counts the others."""
     rows, given, chosen = [], ranked(document), settings_of(document).words
     probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
     shown = probable or given[:1]
@@ -111,7 +111,7 @@ def waterfall_table(document: Document) -> TextTable:
 
 
 def closable_table(document: Document) -> TextTable:
-    """Share that each kind could close, in per cent, the kind that is named first.
+    """Share that each kind could explain, in per cent, the named kind first.
 
     A table without rows where nothing remains beyond chance.
     """
@@ -154,13 +154,13 @@ SOURCES = {
     "freed form": "freedom of the causes' forms",
     "rivals": "other answers, by their probability",
 }
-"""What each share of a coefficient's variance comes from."""
+"""The sources of a coefficient's variance."""
 _MOST = 0.5  # of a variance: more than all its other sources together
 _COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
 
 
 def coefficients_line(document: Document) -> str:
-    """What the standard deviations of the coefficients include, and those of ``identify`` do not.
+    """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
 
     Empty where none is known.
     """
@@ -197,7 +197,7 @@ def hidden_table(document: Document) -> TextTable:
 
 
 def patch_table(document: Document) -> TextTable:
-    """What the patch changes; a table without rows where no model was given."""
+    """The changes of the patch; a table without rows where no model was given."""
     model = document.get("model") or {"written": (), "file": ""}
     rows = []
     for one in model["written"]:
@@ -213,7 +213,7 @@ def _numbers(values: list[float]) -> str:
 
 
 def diagnosis_parts(document: Document) -> list[str | TextTable]:
-    """What is printed of a diagnosis, in order."""
+    """The printed parts of a diagnosis, in order."""
     return [
         str(document["verdict"]),
         where_line(document),
@@ -235,7 +235,7 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
 
 
 def diagnosis_brief(document: Document) -> str:
-    """An answer in three lines: its causes, its gap, and where to go from here."""
+    """An answer in three lines: its causes, its gap, and the next step."""
     gap, first = document["gap"], document["candidates"][0]
     causes = document["causes"]
     named = named_answer(causes).lower() if causes else "no gap"
@@ -257,7 +257,7 @@ def diagnosis_brief(document: Document) -> str:
 
 
 def where_line(document: Document) -> str:
-    """Where the gap is, in a line; empty where the document has no words on it."""
+    """The place of the gap, in a line; empty where the document does not give one."""
     words = document["where"]["words"]
     return f"Where: {words}" if words else ""
 
@@ -290,14 +290,14 @@ def inclusion_line(document: Document) -> str:
     least = settings_of(document).words.effect_listed
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
     listed = [name for name, value in found if value >= least]
-    last = scattering(listed)  # of every answer
+    last = scattering(listed)  # scatter is common to every answer
     likely = dict(found)
     shown = [f"{name} {probability(likely[name])}" for name in [n for n in listed if n not in last] + last]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 
 def patch_lines(document: Document) -> list[str]:
-    """How far the patched model closes the gap, and each difference from the law found; none without a model."""
+    """The share of the gap that the patched model closes, and its differences; none without a model."""
     model = document.get("model")
     if model is None:
         return []

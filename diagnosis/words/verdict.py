@@ -88,7 +88,7 @@ def verdict(document: Document, rest: str) -> str:
     """The answer in one paragraph.
 
     Args:
-        rest: what remains, in sentences.
+        rest: the remaining gap, in sentences.
     """
     found = document["found"]
     if cycling := found["limit_cycles"]:
@@ -139,7 +139,7 @@ def _answer(document: Document, rest: str) -> str:
         said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
         return " ".join(filter(None, (said, *last)))
     sources = []
-    for name in proper:  # what each acts on and, where the campaign can show it, whether it needs the wind
+    for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
         wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
         wind = wind if found["both_winds"] else ""
@@ -155,7 +155,7 @@ def _answer(document: Document, rest: str) -> str:
 
 
 def undecided_words(document: Document) -> str:
-    """What an undecided diagnosis does say, in sentences."""
+    """Sentences on an undecided diagnosis: the common part of its answers and the alternatives."""
     common, credible = document["common"], document["credible"]
     most_named = settings_of(document).words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
@@ -180,7 +180,7 @@ def undecided_words(document: Document) -> str:
 
 
 def _among_answers(effect: str) -> str:
-    """An answer, whose scatter between runs is said of all answers together."""
+    """An answer by name, without scatter between runs, which is stated for all answers together."""
     names = effect.split(" + ")
     proper = without_scatter(names)
     if effect == "unknown":
@@ -189,7 +189,7 @@ def _among_answers(effect: str) -> str:
 
 
 def _nearly(found: Mapping[str, Any]) -> str:
-    """The effects that explain most of a gap without being named, and why they are not."""
+    """The effects that explain most of a gap without being named, and the reason."""
     said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of it"
     if found["noisy"]:
         return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
@@ -203,7 +203,7 @@ def _nearly(found: Mapping[str, Any]) -> str:
 
 
 def _immaterial(changes: Mapping[str, float]) -> str:
-    """That the causes change no coefficient materially; empty where they do."""
+    """The statement that the causes change no coefficient materially; empty where they do."""
     if not changes:
         return ""
     said = (
@@ -213,21 +213,21 @@ def _immaterial(changes: Mapping[str, float]) -> str:
     return f"The gap is immaterial: its causes change {' and '.join(said)}."
 
 
-_NO_CHANGE = 0.01  # %: a smaller change is no more than none to people
+_NO_CHANGE = 0.01  # %: smaller changes are shown as this
 
 
 def _disturbed(found: Mapping[str, Any]) -> str:
-    """A run that was disturbed, and how much of it is used."""
+    """A disturbed run, and how much of it is used."""
     kept = found["kept_until_s"]
     if found["used"]:
         why = "the other runs do not determine the model"
         return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used all the same: {why}."
-    without = "without this run" if kept is None else f"without what it recorded from {kept:.4g} s on"
+    without = "without this run" if kept is None else f"without its readings from {kept:.4g} s on"
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 
 
 def _with_second_modes(answer: str, document: Document) -> list[str]:
-    """The answer and the second modes that single runs contain; these come first where every run has one."""
+    """The answer and the second modes of single runs; the modes come first where every run has one."""
     modes = document["found"]["second_modes"]
     said = [_second_mode(one, unit_of(document)) for one in modes]
     of_all = {one["run"] for one in modes} >= {run["id"] for run in document["gap"]["runs"]}
@@ -261,7 +261,7 @@ def _choices(document: Document) -> str:
 
 
 def choice_steps(document: Document) -> list[str]:
-    """What tells the springs apart of which one is off; none where the runs do."""
+    """How to tell which spring is off; none where the runs tell."""
     found = sorted(one["stiffness"] for one in document["found"]["choices"])
     if not found:
         return []
@@ -293,15 +293,15 @@ RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "two springs off": _two_springs_off,
     "stated": lambda found: str(found["words"]),
 }
-"""What is said of a rival that is not among the effects, by kind."""
+"""Sentences on a rival that is not an effect of the vocabulary, by kind."""
 
 
-_VISIBLE = 0.005  # of a damping ratio: a change that is said
-_VISIBLE_FREQUENCY = 5e-5  # as a fraction, likewise
+_VISIBLE = 0.005  # least change of a damping ratio that is stated
+_VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
 
 
 def size_words(document: Document, size: Document) -> str:
-    """What a cause of ``sizes`` does to a swing, in a sentence; damping and frequency where they change visibly."""
+    """A cause's effect on a swing, in a sentence; damping and frequency where they change visibly."""
     mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
     angle = unit_shown("rad")[1]
     said = []
@@ -335,7 +335,7 @@ def run_to_make(document: Document) -> Document | None:
 
 
 def unplannable(document: Document) -> str:
-    """Why no run can be planned from these runs, in a sentence; empty where one can."""
+    """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
     known = document["coefficients"]["before"]
     if not known:
         return "No run can be planned: the nominal model was not fitted to any run."
@@ -345,7 +345,7 @@ def unplannable(document: Document) -> str:
 
 
 def too_close(run: Mapping[str, float]) -> str:
-    """That no run distinguishes two answers, in a sentence."""
+    """The statement that no run distinguishes two answers."""
     return (
         "No run that can be set distinguishes these answers: with the best one they differ by "
         f"{run['separation']:.1f} standard deviations of the noise."

@@ -1,4 +1,4 @@
-"""Where a gap is, in sentences, and why."""
+"""The place of a gap and its reason, in sentences."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
     "stated value is wrong, a stiffness is missing, or the runs differ by chance",
     "damping between runs": "each run alone is linear, but the runs' damping does not agree with one model",
 }
-"""Why a gap is said to act on a channel, or to need wind: clauses by the kind of the reason."""
+"""Reasons why a gap acts on a channel, or needs wind: clauses by kind."""
 
 
 _BETWEEN_RUNS = ("frequency between runs", "damping between runs")
@@ -58,7 +58,7 @@ def reason(given: Mapping[str, Any]) -> str:
 
 
 def where_words(document: Document) -> str:
-    """Where the gap is, in sentences; empty where the document has no place."""
+    """The place of the gap, in sentences; empty where the document has none."""
     found = document["found"]
     if found["nowhere"]:
         return _nowhere(found["nowhere"])
@@ -100,7 +100,7 @@ def _nowhere(found: Mapping[str, Any]) -> str:
 
 
 def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: WordsSettings) -> str:
-    """Which runs show the gap, and how much more of it is with the wind on or off."""
+    """The runs that show the gap, and the ratio between wind on and off."""
     runs, count = where["runs"], place["runs"]
     share = f"{100.0 * place['share']:.0f} % of the gap"
     named = f" ({', '.join(runs)})" if len(runs) <= chosen.runs_listed else ""
@@ -141,7 +141,7 @@ def _places(where: Mapping[str, Any], place: Mapping[str, Any]) -> list[str]:
 
 
 def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
-    """Whether causes act where the residuals say that the gap is; empty where there is nothing to compare."""
+    """Whether causes act at the place that the residuals show; empty where there is nothing to compare."""
     if not place["compared"] or where["channel"] is None:
         return ""
     kinds = [effect_class(name) for name in place["compared"]]

@@ -14,18 +14,18 @@ from identification.status import Remark
 
 @dataclass(frozen=True)
 class Sentences:
-    """What is written from the facts of a document; empty where there is nothing to say.
+    """Sentences written from the facts of a document; empty where there is nothing to say.
 
     Args:
         verdict: the answer in one paragraph.
-        where: where the gap is.
-        rest: what remains of it.
-        closable: what could be closed of that.
-        note: how to read the coefficients.
-        noise: why the noise is taken as it is.
+        where: the place of the gap.
+        rest: the remaining gap.
+        closable: the part of it that could be explained.
+        note: notes on the coefficients.
+        noise: reasons for the noise used.
         cautions: caveats.
-        remarks: what is noted of the noise.
-        patch: where the patched model is not the same law.
+        remarks: remarks on the noise.
+        patch: differences between the patched model and the law found.
     """
 
     verdict: str
@@ -40,10 +40,10 @@ class Sentences:
 
 
 def sentences(document: Document) -> Sentences:
-    """Write what people read of a diagnosis.
+    """Write the sentences of a diagnosis.
 
     Args:
-        document: the diagnosis in JSON's types, whose text fields do not matter.
+        document: the diagnosis in JSON's types; its text fields are ignored.
     """
     found, rest, model = document["found"], rest_words(document), document["model"]
     unit = unit_of(document)

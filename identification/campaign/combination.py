@@ -27,7 +27,7 @@ from identification.policy import MISFIT_RATE
 from identification.printing import with_std
 from identification.progress import counted
 from identification.signal.decay_fit import Reading, RunFit, project_run
-from identification.signal.driven_fit import DrivenRun, Gained, fit_with_inputs
+from identification.signal.driven_fit import DrivenRun, Gained, constant_gain, fit_with_inputs
 from identification.signal.free_decay import Decay
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import (
@@ -101,11 +101,11 @@ def combined_estimate(
     linked = with_gains(design, runs) if campaign.driven else design
     # (a, k) of the runs; with driven runs (a, k, g), zeros for the gain of a free one.
     decays, informations = [], []
-    for _, _, item in pairs:
+    for _, run, item in pairs:
         assert item.decay is not None
         assert item.covariance is not None
         if item.gained is not None:
-            decays.append(item.gained.coefficients)
+            decays.append(item.gained.coefficients - constant_gain(run))
             informations.append(item.gained.weight)
             continue
         size = 3 if campaign.driven else 2
@@ -245,9 +245,9 @@ _Pairs = Sequence[tuple[Run, FittedRun]]
 def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[Status]) -> Estimate:
     """Output error of driven and free runs together: maximum likelihood with the input exact between its samples.
 
-    Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ: with a stated spring, gᵢ is 1/Izz for a known moment, Kr/Izz
-    for the motion of the spring's root, and a parameter common to the campaign for an input of unknown gain. That
-    gain, and what a body without a spring shows, are remarks.
+    Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ: with a stated spring, gᵢ is 1/Izz for a known moment,
+    Kr/Izz for the motion of the spring's root, −1 for the rotation of the base, and a parameter common to the
+    campaign for an input of unknown gain. That gain, and what a body without a spring shows, are remarks.
 
     Args:
         pairs: every run and its own fit, which starts the joint one.
@@ -269,9 +269,9 @@ def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statu
     linked = with_gains(design, runs)
     # (a, k, g) of the runs' own fits, and their weights; zeros for the gain of a free run.
     coefficients, weights = np.zeros((len(pairs), 3)), []
-    for i, (_, item) in enumerate(pairs):
+    for i, (run, item) in enumerate(pairs):
         if isinstance(item, DrivenRun):
-            coefficients[i] = item.gained.coefficients
+            coefficients[i] = item.gained.coefficients - constant_gain(run)
             weights.append(item.gained.weight)
             continue
         fit, weight = _fit_of(item), np.zeros((3, 3))
@@ -320,21 +320,33 @@ def _fit_of(item: FittedRun) -> RunFit:
 def with_gains(design: Design, runs: Sequence[Run]) -> Design:
     """A design whose links, of shape (3, p), give the gains of the inputs too: gᵢ, 0 in free runs.
 
-    Where the gain of an input is unknown, φ has it, per unit inertia and common to the runs, as last number:
-    shape (3, p + 1).
+    A gain that is a known number over the inertia depends on no parameter, and its row is zero too. Where the gain
+    of an input is unknown, φ has it, per unit inertia and common to the runs, as last number: shape (3, p + 1).
     """
     place = design.columns.get("g")
-    unknown = any(run.drive is not None and (run.input_gain is None or place is None) for run in runs)
+    sought = [_gain_sought(run, place) for run in runs]
+    unknown = any(sought)
     links = []
-    for link, run in zip(design.links, runs, strict=True):
+    for link, run, own in zip(design.links, runs, sought, strict=True):
         whole = np.zeros((3, design.size + unknown))
         whole[:2, : design.size] = link
-        if run.drive is not None and run.input_gain is not None and place is not None:
+        if own and run.drive is not None:
+            whole[2, -1] = run.drive.kind.scale
+        elif run.input_gain is not None and place is not None:
             whole[2, place] = run.input_gain
-        elif run.drive is not None:
-            whole[2, -1] = 1.0
         links.append(whole)
     return replace(design, links=tuple(links))
+
+
+def _gain_sought(run: Run, place: int | None) -> bool:
+    """Whether the gain of a run's input is a parameter of its own.
+
+    Args:
+        place: of 1/Izz among the parameters; None where the runs do not determine it.
+    """
+    if run.drive is None or run.drive.kind.by_inertia:
+        return False
+    return run.input_gain is None or place is None
 
 
 def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
@@ -351,12 +363,14 @@ def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
 def is_remarked(run: Run, joined: set[str]) -> bool:
     """Whether a note says what a driven run shows by itself: without a spring, or where it gives no coefficient."""
     apart = run.id not in joined and run.drive is not None and run.drive.on_body
-    return run.unrestrained or apart
+    return run.unrestrained or (apart and run.known_gain is None)
 
 
 def run_remark(run: Run, gained: Gained) -> Remark:
     """What a driven run shows by itself, per unit inertia, and what it does not show."""
+    assert run.drive is not None
     (rate, _, gain), (rate_std, _, gain_std) = gained.coefficients, gained.deviations
+    gain *= run.drive.kind.scale  # of a base the moment is opposite to the acceleration
     said = f"the gain of the input is {with_std(gain, gain_std)} rad/s² per unit"
     if gained.offset is None:
         return Remark(Outcome.NOTED, (run.id,), said, "state spring_stiffness for a gain in N m per unit")
@@ -388,7 +402,7 @@ def gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inert
     absolute = "" if inertia is None else f", {value * inertia:.5g} N m per unit"
     return Remark(
         Outcome.NOTED,
-        tuple(run.id for run in runs if run.drive is not None),
+        tuple(run.id for run in runs if run.drive is not None and not run.drive.kind.by_inertia),
         f"the gain of the input is {with_std(value, std)} rad/s² per unit{absolute}",
         "state drive_gain if it is known",
     )

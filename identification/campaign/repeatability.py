@@ -62,8 +62,8 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
         move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
         move[1, 1] = spring
         move[0, 2] = 0.5 * still
-        if run.driven_by_stiffness and len(link) > 2:
-            move[2, 1] = spring
+        if run.known_gain is not None and len(link) > 2:
+            move[2, 1] = run.known_gain.per_stiffness * spring
         moves.append(move)
     return moves
 

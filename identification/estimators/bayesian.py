@@ -34,6 +34,7 @@ from identification.signal.run_fit import decay_covariance_of, describe_run, noi
 from identification.statistics import determined, inner, inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
 # Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.
@@ -122,11 +123,11 @@ class Forced:
     Args:
         response: to unit gain and its derivatives with respect to a and k, at the values of the reading, shape
             (3, n), as a function of the decay.
-        by_root: whether the gain is the stiffness itself, as where the root of the spring moves.
+        known: the gain over the inertia, where the motion gives it; None where it is a linear unknown.
     """
 
     response: Callable[[Decay], Array]
-    by_root: bool
+    known: KnownGain | None
 
     def over(self, centre: Array, scale: Array, axis: Array) -> Array:
         """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through few of them.
@@ -166,7 +167,7 @@ def posterior_of(
         axis = np.arange(-width, width + 0.5 * step, step, dtype=np.float64)
         decays = centre[:, None] + scale @ _points(axis)
         rows = None if forced is None else forced.over(centre, scale, axis)
-        by_root = forced is not None and forced.by_root
+        known = None if forced is None else forced.known
         # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
         count = decays.shape[1]
         likelihood, prior = np.empty(count), np.empty(count)
@@ -174,7 +175,7 @@ def posterior_of(
         for begin in range(0, count, slice_size):
             part = slice(begin, begin + slice_size)
             driven = None if rows is None else rows[part]
-            squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part], driven, by_root)
+            squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part], driven, known)
             # Positive stiffness, and neither decay nor growth within a sample.
             real = (decays[1, part] > 0.0) & (np.abs(decays[0, part]) * float(thin.time[-1]) < _STEEPEST)
             squares = np.where(real & np.isfinite(squares), squares, np.inf)
@@ -214,7 +215,7 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
 
 
 def _squares_and_prior(
-    thin: Reading, rate: Array, stiffness: Array, driven: Array | None, by_root: bool
+    thin: Reading, rate: Array, stiffness: Array, driven: Array | None, known: KnownGain | None
 ) -> tuple[Array, Array]:
     # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
     time, limit = thin.time, _STEEPEST / float(thin.time[-1])
@@ -232,8 +233,8 @@ def _squares_and_prior(
     linear = np.stack((start, sine, np.ones_like(start)), axis=1)  # (points, 3, n)
     a, k = rate[:, None], stiffness[:, None]
     values = np.broadcast_to(thin.yaw, start.shape)
-    if driven is not None and by_root:
-        values = values - k * driven[:, 0]
+    if driven is not None and known is not None:
+        values = values - known.at(k) * driven[:, 0]
     elif driven is not None:
         linear = np.concatenate((linear, driven[:, :1]), axis=1)
     gram = linear @ linear.transpose(0, 2, 1)
@@ -247,9 +248,10 @@ def _squares_and_prior(
     by_rate = -2.0 * (k * angle + a * speed) * slope - speed * time * sine
     by_stiffness = (a * angle + speed) * slope - 0.5 * angle * time * sine
     if driven is not None:
-        gain = k if by_root else solution[:, 3, None]
+        gain = solution[:, 3, None] if known is None else known.at(k)
+        slope_of_gain = 0.0 if known is None else known.per_stiffness
         by_rate = by_rate + gain * driven[:, 1]
-        by_stiffness = by_stiffness + gain * driven[:, 2] + (driven[:, 0] if by_root else 0.0)
+        by_stiffness = by_stiffness + gain * driven[:, 2] + slope_of_gain * driven[:, 0]
     full = np.concatenate((linear, by_rate[:, None], by_stiffness[:, None]), axis=1)
     information = full @ full.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):  # a motion of only a few samples gives no information
@@ -386,16 +388,16 @@ class Bayesian(RunByRun):
             if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
                 return found
             # the gain given (a, k), as least squares has it
-            weight, known = bare.gained.weight, np.zeros((3, 3))
+            weight, information, gain = bare.gained.weight, np.zeros((3, 3)), run.known_gain
             moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
             jacobian = np.eye(3)[:, :2]
-            jacobian[2] = [0.0, 1.0] if run.driven_by_stiffness else -weight[2, :2] / weight[2, 2]
-            known[:2, :2] = inverse(found.covariance)
-            if not run.driven_by_stiffness:
+            jacobian[2] = -weight[2, :2] / weight[2, 2] if gain is None else [0.0, gain.per_stiffness]
+            information[:2, :2] = inverse(found.covariance)
+            if gain is None:
                 covariance = jacobian @ found.covariance @ jacobian.T
                 covariance[2, 2] += 1.0 / weight[2, 2]
-                known = inverse(covariance)
-            return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, known))
+                information = inverse(covariance)
+            return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, information))
         start = starting_decay(run.record)
         if start is None:
             return Status.NO_OSCILLATION
@@ -425,20 +427,22 @@ class Bayesian(RunByRun):
         means, _ = block_means(Reading(time, residual), frequency, self.blocks_per_cycle)
         known = variance if noise.source == "stated" or noise.departs else None
         within = float(inner(residual, residual) - factor * inner(means.yaw, means.yaw))
-        by_root = run.driven_by_stiffness
-        linear = _LINEAR + (rows is not None and not by_root)
+        of_input = run.known_gain
+        linear = _LINEAR + (rows is not None and of_input is None)
         knowledge = NoiseKnowledge(known, factor, max(within, 0.0), time.size - linear)
         forced = None
         if rows is not None:
-            forced = Forced(lambda at: np.array([mean_of_blocks(row, factor) for row in rows(at)]), by_root)
+            forced = Forced(lambda at: np.array([mean_of_blocks(row, factor) for row in rows(at)]), of_input)
         found = posterior_of(thin, decay, guess, knowledge, forced)
         if found is None:
             return Status.NOT_CONVERGED
         mean, covariance = found.moments()
         decay = Decay(float(mean[0]), float(mean[1]))
         if rows is not None:
-            response, gain = rows(decay)[0], decay.stiffness
-            if not by_root:
+            response = rows(decay)[0]
+            if of_input is not None:
+                gain = of_input.at(decay.stiffness)
+            else:
                 linear_rows = [response, *response_rows(time, decay)[:2], np.ones_like(time)]
                 gain = float(np.linalg.lstsq(np.transpose(linear_rows), reading.yaw, rcond=None)[0][0])
             reading = Reading(time, reading.yaw - gain * response)

@@ -62,11 +62,12 @@ class FilterError(RunByRun):
         driven = self._driven(run, bare, sensor)
         if driven is None:
             variance = bare.noise.std**2 * bare.noise.slow_ratio
-            known = bare.gained if isinstance(bare, DrivenRun) else None
-            return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, known)
+            of_run = bare.gained if isinstance(bare, DrivenRun) else None
+            return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, of_run)
         found, noise_std = driven
         decay, reading, drive = found.model.decay, bare.reading, run.drive
-        gain = decay.stiffness if run.driven_by_stiffness else found.innovations.gain
+        known = run.known_gain
+        gain = found.innovations.gain if known is None else known.at(decay.stiffness)
         if drive is not None:
             response = input_response(reading, drive, decay, sensor.derivative)
             reading = Reading(reading.time, reading.yaw - gain * response)
@@ -93,7 +94,7 @@ class FilterError(RunByRun):
         estimate = replace(estimate, process_noise=process_noise)
         if drive is None:
             return RunDecay(estimate, decay, covariance[:2, :2])
-        size, weight = 2 if run.driven_by_stiffness else 3, np.zeros((3, 3))
+        size, weight = 3 if known is None else 2, np.zeros((3, 3))
         weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
         gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
         return RunDecay(estimate, decay, covariance[:2, :2], gained)
@@ -120,6 +121,6 @@ class FilterError(RunByRun):
                 motion = Reading(bare.reading.time, driven)
                 return mean_of_blocks(even_reading(motion).yaw, factor)
 
-            known = KnownInput(response, by_root=run.driven_by_stiffness)
+            known = KnownInput(response, run.known_gain)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)

@@ -21,7 +21,14 @@ from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Estimate, Status
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.driven import driven_start
-from identification.signal.driven_fit import Gained, driven_run, input_response, linearised
+from identification.signal.driven_fit import (
+    Gained,
+    constant_gain,
+    driven_run,
+    input_response,
+    linearised,
+    own_unknowns,
+)
 from identification.signal.free_decay import Decay
 from identification.signal.run_fit import describe_run
 from identification.statistics import inverse
@@ -73,9 +80,7 @@ class FrequencyResponse(RunByRun):
         reading = bare.reading
         derivative = sensor.derivative
         start = driven_start(reading.time, reading.yaw, drive.values, derivative=derivative)
-        places = [0, 1] if run.driven_by_stiffness else [0, 1, 2]
-        link = np.eye(3)[:, places]
-        link[2, 1] = 1.0 if run.driven_by_stiffness else 0.0
+        places, link = own_unknowns(run)
         lines = _Lines.of(drive.values, self.segments)
         found = None if start is None else _fitted(run, link, np.array(start)[places], lines, derivative)
         if found is not None:
@@ -85,7 +90,7 @@ class FrequencyResponse(RunByRun):
             found = _fitted(run, link, found[0], lines, derivative)
         if found is None:
             return Status.NOT_DETERMINED
-        coefficients, gains = link @ found[0], found[2][: len(places)]
+        coefficients, gains = link @ found[0] + constant_gain(run), found[2][: len(places)]
         decay = Decay(float(coefficients[0]), float(coefficients[1]))
         if not decay.stiffness > 0.0:
             return Status.NOT_CONVERGED

@@ -1,10 +1,10 @@
 """Least squares of runs with an input, exact between its samples: one run by itself, or several together.
 
-A run has the decay rate a, the stiffness k and the gain g of its input per unit inertia, (a, k, g) = L φ, and three
-numbers of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0, and its
-zero cannot be separated from its initial angle. Its third number is instead a constant acceleration, by a moment
-beside the input. With a spring, such a moment shifts the zero. The method is that of Levenberg and Marquardt, with
-exact derivatives.
+A run has the decay rate a, the stiffness k and the gain g of its input per unit inertia, (a, k, g) = L φ + c, and
+three numbers of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0, and
+its zero cannot be separated from its initial angle. Its third number is instead a constant acceleration, by a
+moment beside the input. With a spring, such a moment shifts the zero. The method is that of Levenberg and
+Marquardt, with exact derivatives.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Gained:
     Args:
         coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
         weight: their information, all else unknown, shape (3, 3); rows of zeros for a k that is known to be 0, and
-            for a g that is k.
+            for a g that is k or a known number.
         offset: of a body without a spring, the constant moment beside the input, in the unit of the input.
     """
 
@@ -102,20 +102,18 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     reading = Reading.from_record(run.record)
     drive, drifts = run.drive, run.unrestrained
     assert drive is not None
-    places = [0, 2] if drifts else [0, 1] if run.driven_by_stiffness else [0, 1, 2]
+    places, link = own_unknowns(run)
     if reading.time.size < _LEAST_SAMPLES * (len(places) + _OWN):
         return _failed(run, reading, Status.NOT_DETERMINED)
     derivative = sensor.derivative
     start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts, derivative=derivative)
     if start is None or not (drifts or start[1] > 0.0):
         return _failed(run, reading, Status.NO_OSCILLATION)
-    link = np.eye(3)[:, places]
-    link[2, 1] = 1.0 if len(places) == 2 else 0.0
     steps = np.diff(reading.time)
     rate = max(start[0], -_GROWTH / float(reading.time[-1] - reading.time[0])) if drifts else start[0]
     began = np.array([rate, *start[1:]])[places]
     found = fit_with_inputs([run], [link], began, own_zeros=True, derivative=derivative)
-    coefficients = link @ found.parameters
+    coefficients = link @ found.parameters + constant_gain(run)
     # a record shows no resonance above half its sample rate
     fastest = np.pi / float(steps.min())
     if not found.converged or not (drifts or 0.0 < coefficients[1] < fastest**2):
@@ -148,9 +146,31 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
         gain, constant = float(found.parameters[1]), float(found.own[0, 0])
         slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
         std = float(np.sqrt(slope @ inverse(found.normal) @ slope * variance))
-        offset = Quantity(constant / gain, std, drive.unit)
+        offset = Quantity(constant / gain, std, drive.kind.unit)
     gained = Gained(coefficients, weight / variance, offset)
     return DrivenRun(reading, fit if estimate.identified else None, noise, estimate, gained)
+
+
+def own_unknowns(run: Run) -> tuple[list[int], Array]:
+    """The unknowns of a driven run by itself.
+
+    Returns:
+        Their places in (a, k, g), and the link L with which (a, k, g) = L φ + c, shape (3, unknowns).
+    """
+    if run.unrestrained:
+        return [0, 2], np.eye(3)[:, [0, 2]]
+    known = run.known_gain
+    if known is None:
+        return [0, 1, 2], np.eye(3)
+    link = np.eye(3)[:, :2]
+    link[2, 1] = known.per_stiffness
+    return [0, 1], link
+
+
+def constant_gain(run: Run) -> Array:
+    """The part c of (a, k, g) that depends on no unknown, shape (3,): that of the gain, rad/s² per unit."""
+    known = run.known_gain
+    return np.array([0.0, 0.0, 0.0 if known is None else known.constant])
 
 
 def input_response(reading: Reading, drive: Drive, decay: Decay, derivative: int) -> Array:
@@ -176,7 +196,7 @@ def fit_with_inputs(
 
     Args:
         runs: driven or free.
-        links: one per run, shape (3, p): (a, k, g) = L φ.
+        links: one per run, shape (3, p): (a, k, g) = L φ + c, with c of the run (`constant_gain`).
         start: of φ, shape (p,), SI.
         own_zeros: whether every run has its own zero; needed where one has no spring.
         derivative: 0 where the readings are angles, 1 where they are rates.
@@ -240,7 +260,7 @@ def normal_equations(
     """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
 
     Args:
-        links: one per run, shape (3, p): (a, k, g) = L φ.
+        links: one per run, shape (3, p): (a, k, g) = L φ + c.
         parameters: φ, shape (p,), SI.
         own: of each run as in `InputFit`, shape (r, 3).
         own_zeros: whether every run has its own zero.
@@ -274,7 +294,7 @@ def linearised(
     """Residual and Jacobian of one run.
 
     Args:
-        link: (a, k, g) = L φ, shape (3, p).
+        link: (a, k, g) = L φ + c, shape (3, p).
         parameters: φ, shape (p,), SI.
         own: zero (rad) or constant acceleration (rad/s²), initial angle (rad) and rate (rad/s), shape (3,).
         derivative: 0 where the readings are angles; 1 where they are rates, as are then zero and initial state,
@@ -284,7 +304,7 @@ def linearised(
         Residual in rad, shape (n,), and derivatives of the model with respect to φ and ``own``, shape (n, p + 3).
     """
     time = run.record.time_s - run.record.time_s[0]
-    rate, stiffness, gain = (float(value) for value in link @ parameters)
+    rate, stiffness, gain = (float(value) for value in link @ parameters + constant_gain(run))
     constant, angle, initial = own.tolist()
     decay = Decay(rate, stiffness)
     rows = response_rows(time, decay)

@@ -24,6 +24,7 @@ from scipy.linalg import expm
 from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_DROP_FOR_CORNER
 from identification.signal.free_decay import Decay, response_rows
 from identification.statistics import inner, inverse, scaled_solve
+from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
 _GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
@@ -247,7 +248,7 @@ class DrivenFit:
     Args:
         covariance: of (a, k, ln q), shape (3, 3).
         gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g where there is
-            none, or where it is k.
+            none, or where it is k or a known number.
     """
 
     model: Driven
@@ -263,10 +264,11 @@ class KnownInput:
 
     Args:
         response: to unit gain at the values of the fit, shape (n,), as a function of the decay.
+        gain: over the inertia, where the motion gives it; None where it is estimated.
     """
 
     response: Callable[[Decay], Array]
-    by_root: bool = False
+    gain: KnownGain | None = None
 
 
 def fit_driven(
@@ -322,8 +324,8 @@ class _DrivenLikelihood:
             return innovations(self.values, self.interval, model, self.noise_variance)
         with np.errstate(all="ignore"):  # a trial far off is refused by its columns
             row = self.known.response(model.decay)
-        if self.known.by_root:
-            left = self.values - model.decay.stiffness * row
+        if self.known.gain is not None:
+            left = self.values - self.known.gain.at(model.decay.stiffness) * row
             return innovations(left, self.interval, model, self.noise_variance)
         return innovations(self.values, self.interval, model, self.noise_variance, row)
 

@@ -175,9 +175,10 @@ def campaign_bound(
     linked = with_gains(design, runs)
     truths = []
     for run, load, damping in zip(runs, design.stiffness_loads, design.damping_loads, strict=True):
-        stated = drive_gain if run.input_gain is None else run.input_gain
-        rate = 0.5 * (mechanical_damping - damping * cn_r)
-        truths += [rate, (run.spring_stiffness or 0.0) - load * cn_beta, stated if run.drive else 0.0]
+        rate, gain = 0.5 * (mechanical_damping - damping * cn_r), 0.0
+        if run.drive is not None and not run.drive.kind.by_inertia:  # whose gain depends on no parameter
+            gain = run.drive.kind.scale * drive_gain if run.input_gain is None else run.input_gain
+        truths += [rate, (run.spring_stiffness or 0.0) - load * cn_beta, gain]
     parameters: Array = np.linalg.lstsq(
         np.vstack(linked.links), np.array(truths, dtype=np.float64) / yaw_inertia, rcond=None
     )[0].astype(np.float64)

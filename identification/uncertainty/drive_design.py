@@ -56,7 +56,7 @@ class Limits:
 
 
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
-    """The bound of a plan's coefficients at its truth, of free decays and runs driven by a moment.
+    """The bound of a plan's coefficients at its truth, of free decays and driven runs.
 
     Of its effects only random moments of a broad spectrum count; each is taken as white with the intensity that it
     has at a run's natural frequency.
@@ -90,7 +90,13 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
                 density = sum(effect.moment_density(rate, reference) for effect in effects)
                 moments.append(density / plan.truth.yaw_inertia**2)
     try:
-        bound = campaign_bound(campaign, **asdict(plan.truth), noise_std=noise, random_moments=moments)
+        bound = campaign_bound(
+            campaign,
+            **asdict(plan.truth),
+            noise_std=noise,
+            drive_gain=plan.conditions[0].gain,
+            random_moments=moments,
+        )
     except np.linalg.LinAlgError:
         bound = CampaignBound((), ())
     if not {"cn_beta", "cn_r"} <= set(bound.parameters):
@@ -115,7 +121,9 @@ def peak_response(plan: CampaignPlan, rig: Rig) -> float:
         time = np.arange(condition.drive.values.size) / plan.sensor.sample_rate
         decay = _decay(plan, condition, rig)
         with np.errstate(all="ignore"):
-            motion = driven_rows(time, condition.drive.values / inertia, *decay, held=condition.drive.held)[0]
+            drive = condition.drive
+            gain = drive.kind.true_scale(condition.gain, condition.spring_stiffness, inertia) / inertia
+            motion = driven_rows(time, gain * drive.values, *decay, held=drive.held)[0]
         if not np.isfinite(motion).all():
             raise TunnelError(
                 "the motion grows without bound", where=f"run {condition.id}", remedy="lower wind_speeds"

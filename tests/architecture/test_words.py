@@ -12,7 +12,7 @@ CALLS = ("TunnelError", "Remark")
 """What is said of bad input and in the examination is written where it arises."""
 EXCEPTIONS = {
     # what the input's gain is, and effects of a spring whose root moves
-    "diagnosable.py": 3,
+    "diagnosable.py": 2,
     # what an effect is like, which is no part of a diagnosis
     "identifiability.py": 2,
     # the description of an effect in an effects file

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.drive import Drive, Hold
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, NOISE, GEAR = 250.0, 2e-4, 20.0

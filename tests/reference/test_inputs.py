@@ -28,7 +28,12 @@ PLAIN = replace(rig(duration=0.5, sample_rate=100.0), start_rate=np.array([0.4, 
 def driven(column, held, *, gain=1.0, delay=0.0):
     """Random values at every sample, of a size that moves the rig by about 0.1 rad."""
     values = np.random.default_rng(4).standard_normal((PLAIN.samples, 2))
-    values *= {"moment_nm": 1.0, "drive": 1.0 / gain, "base_rad": 0.05}[column]
+    values *= {
+        "moment_nm": 1.0,
+        "drive": 1.0 / gain,
+        "base_rad": 0.05,
+        "base_acceleration_rad_s2": 10.0,
+    }[column]
     return replace(
         PLAIN,
         drive=Input(column, values, np.full(2, held), np.full(2, 0.1), gain, True, np.full(2, delay)),
@@ -122,7 +127,7 @@ def test_driven_families_are_those_that_a_driven_run_can_show():
     assert set(DRIVEN_FAMILIES) == set(FAMILIES) | {"input_delay"} | ACTUATORS
 
 
-@pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])
+@pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad", "base_acceleration_rad_s2"])
 def test_a_driven_campaign_is_written_in_its_scales(column):
     c = replace(
         driven(column, held=True, gain=2.0 if column == "drive" else 1.0), moment_scale=0.02, time_scale=0.1
@@ -135,6 +140,9 @@ def test_a_driven_campaign_is_written_in_its_scales(column):
     assert free.release_angle == pytest.approx(0.3)
     assert first.release_angle is None
     assert (first.drive.column, first.drive.hold) == (column, "zero")
+    if column == "base_acceleration_rad_s2":
+        assert first.drive.values == pytest.approx(c.drive.values[:, 0] * 0.1**-2)
+        return
     scale = first.spring_stiffness if column == "base_rad" else first.input_gain
     true = c.spring_stiffness[0] if column == "base_rad" else c.drive.gain
     assert first.drive.values * scale == pytest.approx(c.drive.values[:, 0] * true * 0.02)

@@ -402,7 +402,8 @@ def show_choices(
 ) -> None:
     """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
     from tunnel_sim.files.importing.tables import UNITS
-    from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
+    from tunnel_sim.vocabulary.drive import HOLDS
+    from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
     now = choices_of(session)
     angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]

@@ -13,7 +13,8 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
 from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
-from tunnel_sim.vocabulary.errors import TunnelError, counted
+from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
 _column = partial(Option, rich_help_panel="Columns")
 _unit = partial(Option, rich_help_panel="Units")
@@ -42,7 +43,7 @@ def import_files(
         _column(
             "--input-as",
             metavar="COLUMN",
-            help="What the input is: moment_nm, drive, base_rad or command_rad.",
+            help=f"What the input is: {one_of(INPUT_COLUMNS)}.",
         ),
     ] = None,
     input_hold: Annotated[

@@ -103,7 +103,7 @@ def simulate(
       drive.kind = "multisine"
       drive.from_hz = 0.5
       drive.to_hz = 5.0
-      drive.amplitudes_nm = [0.2]  # N m on the body; amplitudes_rad: the spring's root
+      drive.amplitudes_nm = [0.2]  # N m on the body; _rad: the spring's root; _rad_s2: the base
 
     [bold]Examples[/bold]
       tunnel simulate plan.toml --out my-campaign

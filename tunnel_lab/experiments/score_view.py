@@ -100,7 +100,7 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
             raise TunnelError(what, where="--check", remedy=remedy)
     if not estimators:
         remedy = f"score one of {', '.join(baseline.estimators)}"
-        raise TunnelError("the baseline has none of the estimators", where="--check", remedy=remedy)
+        raise TunnelError("the baseline does not include these estimators", where="--check", remedy=remedy)
     places = [now.grid.cells.index(cell) for cell in baseline.grid.cells]
     before, after = baseline.trials(), now.trials()
     tested: list[tuple[str, str, str, Change]] = []

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.estimate import Quantity
-from identification.printing import SYMBOLS
+from identification.printing import SYMBOLS, unit_mark
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,
@@ -54,7 +54,6 @@ MOST_PANELS = 24
 _COLUMNS = 3
 _POINTS = 2000  # least and greatest readings of as many stretches are drawn
 _GREY = "0.6"
-_INPUTS = {"moment_nm": "moment", "drive": "input", "base_rad": "root", "command_rad": "command"}
 
 
 def run_label(run: Run) -> str:
@@ -92,7 +91,7 @@ def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
             if run.drive is not None:  # on an axis of its own at the right, behind the response
                 beside = axes.twinx()
                 beside.plot(*with_breaks(time, run.drive.values), color=_GREY, linewidth=0.5)
-                beside.set_ylabel(f"{_INPUTS[run.drive.column]} [{run.drive.unit}]", color="0.4")
+                beside.set_ylabel(f"{run.drive.kind.noun} [{unit_mark(run.drive.kind.unit)}]", color="0.4")
                 axes.set_zorder(beside.get_zorder() + 1)
                 axes.patch.set_visible(False)
         pages.append(fig)

@@ -73,7 +73,9 @@ class Effect:
     - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
     - ``delays``: whether it shifts the input of driven runs in time.
-    - ``of_moment``: whether it changes an input that is a moment on the body, not the motion of a spring's root.
+    - ``of_moment``: whether it changes an input that an actuator exerts, not the motion of a root or a base.
+    - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia: both
+      are left out where a base turns with a known acceleration.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
@@ -112,6 +114,7 @@ class Effect:
     driven: ClassVar[bool] = False
     delays: ClassVar[bool] = False
     of_moment: ClassVar[bool] = False
+    by_angle_in_room: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
     keeps_time: ClassVar[str] = ""
@@ -135,7 +138,7 @@ class Effect:
                 remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
             if info.of_input and value != round(value):
-                what = f"{info.name} = {value!r} is none of the cases"
+                what = f"{info.name} = {value!r} is not a valid case"
                 remedy = f"give a whole number from {info.lower:g} to {info.upper:g}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 

@@ -1,6 +1,6 @@
 """Effects of the actuator of a driven run: its lag, its greatest moment and its greatest rate of change.
 
-They change the moment on the body that the run file states, not the motion of a spring's root. Between its samples
+They change the moment on the body that the run file states, not the motion of a root or a base. Between its samples
 the input is held or linear, as the run states it. However many of them act, the moment is first clipped, then
 limited in its rate, then lagged. A recorded run begins with an actuator that follows its first sample.
 """
@@ -37,7 +37,7 @@ class _OfActuator(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the actuator; a free decay has none."""
         del stated, drawn
-        if self.is_null or run.drive is None or not run.drive.on_body:
+        if self.is_null or run.drive is None or not run.drive.through_actuator:
             return run
         own = {info.name: getattr(self, info.name) for info in self.parameters()}
         actuator = dataclasses.replace(run.drive.actuator, **own)

@@ -100,6 +100,7 @@ class GravityStiffness(Effect):
     place = 7
     channel = "stiffness"
     condition = "always"
+    by_angle_in_room = True
     size = "gravity of up to {stiffness}"
     advice = "Model gravity's sine, or level the axis and balance the body on it"
     equation = "−Kg sin(β − βg)"
@@ -151,6 +152,7 @@ class RodFlexibility(Effect):
     place = 8
     channel = "stiffness"
     condition = "always"
+    by_angle_in_room = True
     size = "a rod that twists by {compliance}"
     advice = "Stiffen the rod, or put the sensor at the body's end"
     equation = (

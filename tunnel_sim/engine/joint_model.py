@@ -307,7 +307,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
     if np.ptp(inertias) > _EXACT * inertias[0]:
         raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
     if not stiffness > 0.0 and (middle is None or terms.keys() - {"1"}):
-        raise TunnelError("does not oscillate: nothing restores it", remedy="add the spring, or gravity")
+        raise TunnelError("does not oscillate: no restoring moment acts", remedy="add the spring, or gravity")
     turn = math.sqrt(stiffness / inertias[0]) or _TURN
     rates, scale = _RATES * (turn * reach), inertias[0] * turn**2 * reach
     lost = np.array([engine.moment(rest) - engine.moment(rest, r) for r in rates])

@@ -294,8 +294,8 @@ def _write_spring(
     roots = total.roots()
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
-        remedy = "give it a spring of its own"
-        raise TunnelError("the patched model would have no position of rest", remedy=remedy)
+        remedy = "add a spring to the joint"
+        raise TunnelError("the patched model would have no rest position", remedy=remedy)
     usual = -offset if np.any(own.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef

@@ -114,6 +114,13 @@ class _Drawn:
 def _drawn(plan: CampaignPlan) -> list[_Drawn]:
     """What every run of a plan draws before it is simulated."""
     effects = plan_effects(plan)
+    for condition in plan.conditions:
+        if condition.wind_speed > 0.0 and condition.drive is not None and condition.drive.kind.of_base:
+            raise TunnelError(
+                "the base is shaken and the wind blows, whose moment follows the motion in the room",
+                where=f"{plan.name}, run '{condition.id}'",
+                remedy="give wind_speeds = [0], or drive the body by amplitudes_nm",
+            )
     runs = len(plan.conditions)
     seeds = np.random.SeedSequence(plan.seed).spawn(runs)
     deviations = plan.scatter.deviations(between_runs(np.random.SeedSequence(plan.seed)), along(runs))
@@ -151,8 +158,10 @@ def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | Non
         moment = DriveMoment(
             np.arange(given.values.size) / sample_rate,
             given.values,
+            scale=given.kind.true_scale(condition.gain, condition.spring_stiffness, truth.yaw_inertia),
             held=given.held,
             on_body=given.on_body,
+            by_actuator=given.kind.by_actuator,
         )
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,
@@ -199,11 +208,15 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         if effect.driven and not drives:
             what = "acts on driven runs only, and all runs of the plan are free decays"
             raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
-        if effect.of_moment and not any(drive.on_body for drive in drives):
-            what = "changes the moment of a drive, and here the drive moves the spring's root"
+        if effect.of_moment and not any(drive.kind.by_actuator for drive in drives):
+            what = "changes the moment of a drive, and here the drive moves the spring's root or the base"
             raise TunnelError(what, where=where, remedy="leave it out, or drive the body by amplitudes_nm")
         if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
             what = "is a loss in the spring, which is not simulated where its root moves"
+            remedy = "leave out the effect, or drive the body by amplitudes_nm"
+            raise TunnelError(what, where=where, remedy=remedy)
+        if effect.by_angle_in_room and any(drive.kind.by_inertia for drive in drives):
+            what = "is not simulated where the base turns: its moment depends on more than the base's acceleration"
             remedy = "leave out the effect, or drive the body by amplitudes_nm"
             raise TunnelError(what, where=where, remedy=remedy)
     known = known_effects()

@@ -39,8 +39,9 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS, INPUT_COLUMNS, Drive, Hold, without_spring_needs_drive
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_of
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, INPUTS, InputColumn
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -86,7 +87,7 @@ class RunTable(StrictModel):
     air_density: Positive | None = optional("a positive number in kg/m3")
     release_angle: float | None = optional("a number in rad")
     drive_hold: Hold | None = optional("'zero' or 'linear', between the samples of a driven run's input")
-    drive_gain: float | None = optional("a number other than 0 in N m per unit of the column drive")
+    drive_gain: float | None = optional("a number other than 0 in N m per unit of the input")
     servo_kv: NotNegative | None = optional(
         "a number in N m s/rad, zero or more, of the servo of command_rad"
     )
@@ -227,13 +228,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
             time_s = np.arange(held.reading.size) / sensor.sample_rate
         drive = None
         if held.input is not None and held.input_column is not None:
-            if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
-                what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
-                remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
-                raise TunnelError(what, where=where, remedy=remedy)
-            if run.servo_kv is not None and held.input_column != "command_rad":
-                what = f"servo_kv = {run.servo_kv:g} of the column {held.input_column}"
-                raise TunnelError(what, where=where, remedy="give servo_kv of a column command_rad only")
+            _check_keys(run, held.input_column, where)
             drive = Drive(held.input_column, held.input, run.drive_hold, run.drive_gain, run.servo_kv)
         elif keys := [key for key in DRIVE_KEYS if getattr(run, key) is not None]:
             remedy = f"add a column {one_of(INPUT_COLUMNS)} to the run file, or leave the key out"
@@ -253,6 +248,19 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         runs=tuple(runs),
         repeatability=document.repeatability.value,
     )
+
+
+def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
+    """Refuse what a run states of an input that its column does not have."""
+    for key in ("drive_gain", "servo_kv"):
+        value = getattr(run, key)
+        if value is not None and key not in INPUTS[column].keys:
+            having = " or ".join(name for name, kind in INPUTS.items() if key in kind.keys)
+            what = f"{key} = {value:g} of the column {column}"
+            raise TunnelError(what, where=where, remedy=f"give {key} of a column {having} only")
+    if run.drive_gain == 0.0:
+        what = f"drive_gain = 0 of the column {column}"
+        raise TunnelError(what, where=where, remedy="give drive_gain in N m per unit, not zero")
 
 
 def as_campaign(given: Campaign | Path | str) -> Campaign:
@@ -317,7 +325,7 @@ def write_campaign(
         time_s, yaw = run.record.time_s, run.record.yaw_rad
         if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
             remedy = "shorten the run or leave it out"
-            raise TunnelError("the record holds NaN or an infinity", where=where, remedy=remedy)
+            raise TunnelError("the record contains NaN or an infinity", where=where, remedy=remedy)
         checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
         without_spring_needs_drive(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)

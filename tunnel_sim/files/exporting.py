@@ -14,8 +14,9 @@ from tunnel_sim.files.readers import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS, INPUT_COLUMNS
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")

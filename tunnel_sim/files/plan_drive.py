@@ -12,12 +12,15 @@ from pydantic import Field
 from tunnel_sim.files.readers import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
 from tunnel_sim.vocabulary.drive import Drive, Hold
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
 from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.record import Array
 
 Positive = Annotated[float, Field(gt=0.0)]
 Kind = Literal["sine", "stepped_sine", "chirp", "multisine", "random", "square", "file"]
+
+_COLUMNS = one_of([kind.column for kind in KINDS if kind.amplitudes])
 
 _NEEDS: dict[Kind, tuple[str, ...]] = {
     "sine": ("frequency_hz",),
@@ -29,8 +32,9 @@ _NEEDS: dict[Kind, tuple[str, ...]] = {
     "file": ("file",),
 }
 _BANDS = ("multisine", "random")  # kinds of lines within a band, which may be drawn
-_AMPLITUDES = ("amplitudes_nm", "amplitudes_rad")
-_OPTIONAL = ("frequency_hz", "frequencies_hz", "from_hz", "to_hz", "file", "seed", *_AMPLITUDES)
+_OF_AMPLITUDES = {kind.amplitudes: kind for kind in KINDS if kind.amplitudes}
+_OF_GAIN = tuple(kind for kind in _OF_AMPLITUDES.values() if kind.takes_gain)
+_OPTIONAL = ("frequency_hz", "frequencies_hz", "from_hz", "to_hz", "file", "seed", "gain", *_OF_AMPLITUDES)
 
 
 class DriveTable(StrictModel):
@@ -45,6 +49,16 @@ class DriveTable(StrictModel):
     amplitudes_rad: list[Annotated[float, Field(gt=0.0, le=pi)]] = Field(
         default=[], description="a list of peak angles of the spring's root in rad, such as [0.02, 0.05]"
     )
+    amplitudes_rad_s2: list[Positive] = Field(
+        default=[], description="a list of peak angular accelerations of the base in rad/s2, such as [2, 5]"
+    )
+    amplitudes_m_s2: list[Positive] = Field(
+        default=[], description="a list of peak accelerations of the base in m/s2, such as [0.5, 2]"
+    )
+    gain: Annotated[float, Field(allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="mass times arm of a base that is accelerated, a number other than 0 in kg m",
+    )
     hold: Hold = Field(default="linear", description="'zero' or 'linear', between the samples")
     frequency_hz: Positive | None = Field(default=None, description="a positive number in Hz")
     frequencies_hz: list[Positive] = Field(default=[], description="a list of positive numbers in Hz")
@@ -52,13 +66,20 @@ class DriveTable(StrictModel):
     to_hz: Positive | None = Field(default=None, description="a positive number in Hz")
     seed: int | None = Field(default=None, ge=0, description="a whole number, zero or more")
     file: OneLine | None = Field(
-        default=None, description="a CSV or Parquet file with time_s, and moment_nm or base_rad"
+        default=None, description=f"a CSV or Parquet file with time_s, and {_COLUMNS}"
     )
 
     @property
     def amplitudes(self) -> tuple[float | None, ...]:
-        """Peak of each driven run of a spring and a speed, N m or rad; one None for a file, which has its own."""
-        return (None,) if self.kind == "file" else (*self.amplitudes_nm, *self.amplitudes_rad)
+        """Peak of each driven run of a spring and a speed in the unit of the input; one None for a file."""
+        if self.kind == "file":
+            return (None,)
+        return tuple(value for name in _OF_AMPLITUDES for value in getattr(self, name))
+
+    @property
+    def column(self) -> InputColumn:
+        """The column of the input, where it is not that of a file."""
+        return next(kind.column for name, kind in _OF_AMPLITUDES.items() if getattr(self, name))
 
 
 def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
@@ -77,16 +98,20 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     taken = (
         *needed,
         *(("seed",) if table.kind in _BANDS else ()),
-        *(_AMPLITUDES if table.kind != "file" else ()),
+        *(_OF_AMPLITUDES if table.kind != "file" else ()),
+        "gain",
     )
     for name in given:
         if name not in taken:
             remedy = "leave it out"
             raise TunnelError(f"kind = '{table.kind}' does not take {name}", where=where, remedy=remedy)
-    if table.kind != "file" and bool(table.amplitudes_nm) == bool(table.amplitudes_rad):
-        what = "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes"
-        remedy = "give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)"
-        raise TunnelError(what, where=where, remedy=remedy)
+    amplitudes = [name for name in given if name in _OF_AMPLITUDES]
+    if table.kind != "file" and len(amplitudes) != 1:
+        what = f"both {' and '.join(amplitudes)}" if amplitudes else "no amplitudes"
+        listed = [f"{name} ({kind.meaning})" for name, kind in _OF_AMPLITUDES.items()]
+        raise TunnelError(what, where=where, remedy=f"give {one_of(listed)}")
+    if table.kind != "file":
+        _check_gain(table.gain, table.column, where)
     if len(set(table.amplitudes)) < len(table.amplitudes):
         remedy = "leave one out, and use repeats for more runs"
         raise TunnelError("the amplitudes hold a value twice", where=where, remedy=remedy)
@@ -106,6 +131,15 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
         )
 
 
+def _check_gain(gain: float | None, column: InputColumn, where: str) -> None:
+    """Refuse an input that needs a gain and has none, or has one that it does not take."""
+    needs = INPUTS[column] in _OF_GAIN
+    if needs != bool(gain):
+        what = f"the input {column} needs a gain" if needs else f"the input {column} does not take a gain"
+        remedy = "give gain as mass times arm, a number other than 0 in kg m" if needs else "leave it out"
+        raise TunnelError(what, where=where, remedy=remedy)
+
+
 def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
     if frequency is not None and not frequency < 0.5 * sample_rate:
         what = f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz"
@@ -116,7 +150,7 @@ def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array
     """The input of one driven run that is not that of a file.
 
     Args:
-        amplitude: peak, N m or rad.
+        amplitude: peak, in the unit of the input.
         number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
         time_s: of the samples from 0 on, shape (n,), s.
     """
@@ -133,20 +167,21 @@ def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array
             wave = band_noise(time_s, low, high, rng)
         case _:
             wave = stepped_sine(time_s, table.frequencies_hz or [table.frequency_hz or 0.0])
-    return Drive("moment_nm" if table.amplitudes_nm else "base_rad", amplitude * wave, table.hold)
+    return Drive(table.column, amplitude * wave, table.hold)
 
 
-def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
+def drive_of_file(path: Path, time_s: Array, table: DriveTable, where: str) -> Drive:
     """The input of a file at the times of the samples, its first value at time 0.
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s.
     """
     given, column, values = read_input(path, where)
-    if column not in ("moment_nm", "base_rad"):
+    hold = table.hold
+    if not INPUTS[column].amplitudes:
         what = "no known unit" if column == "drive" else "a servo in place of the spring, which no plan has"
-        remedy = "name it moment_nm (N m on the body) or base_rad (rad of the spring's root)"
-        raise TunnelError(f"the column {column} has {what}", where=where, remedy=remedy)
+        raise TunnelError(f"the column {column} has {what}", where=where, remedy=f"name it {_COLUMNS}")
+    _check_gain(table.gain, column, where)
     given = given - given[0]
     slack = 1e-6 * (time_s[1] - time_s[0])
     if given[-1] < time_s[-1] - slack:

@@ -227,7 +227,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
     table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
     given = None
     if table is not None and table.file is not None:
-        given = drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
+        given = drive_of_file(folder / table.file, time, table, f"{where}, [drive] file '{table.file}'")
     for number in document.springs:
         if number not in rig.springs:
             remedy = f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad"
@@ -265,6 +265,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
                 release_angle=angle,
                 duration=document.duration,
                 drive=drive,
+                gain=1.0 if table is None or table.gain is None else table.gain,
             )
             for label, stiffness in springs
             for speed in document.wind_speeds

@@ -19,8 +19,9 @@ from tunnel_sim.files.reading import check_count, check_lines, check_utf8, is_bl
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.drive import INPUT_COLUMNS, Drive, InputColumn
-from tunnel_sim.vocabulary.errors import TunnelError, added_to, loading, one_line
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, loading, one_line, one_of
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, WITHOUT_UNIT, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 if TYPE_CHECKING:
@@ -246,6 +247,10 @@ def table_bytes(
 
 
 def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
+    for bare, columns in WITHOUT_UNIT.items():
+        if bare in names:
+            remedy = f"name it {one_of(columns)}"
+            raise TunnelError(f"the input column {bare} does not say its unit", where=where, remedy=remedy)
     found = [name for name in INPUT_COLUMNS if name in names]
     if len(found) > 1:
         remedy = "a run has one input: keep its column and rename the others"

@@ -120,6 +120,7 @@ class DriveMoment:
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
         actuator: what stands between the samples and the body.
         offset: a constant moment beside it, which does not pass through the actuator, N m.
+        by_actuator: whether it is what an actuator is asked for, where it acts on the body.
     """
 
     time_s: Array
@@ -130,6 +131,7 @@ class DriveMoment:
     on_body: bool = True
     actuator: Actuator = DIRECT
     offset: float = 0.0
+    by_actuator: bool = True
 
     def __post_init__(self) -> None:
         """Copy and check the samples."""
@@ -150,6 +152,11 @@ class DriveMoment:
         return DriveMoment(
             given.time_s, given.values + beside, self.scale, self.delay, given.held, self.on_body
         )
+
+    @property
+    def through_actuator(self) -> bool:
+        """Whether it is a moment that an actuator exerts, which the effects of an actuator change."""
+        return self.on_body and self.by_actuator
 
     @property
     def as_sampled(self) -> bool:

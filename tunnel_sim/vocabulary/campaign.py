@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
+from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -115,14 +116,12 @@ class Run:
         """The moment on the body per unit of the input, N m; None where it is not known, and of a free decay."""
         if self.drive is None:
             return None
-        if not self.drive.on_body:
-            return self.spring_stiffness
-        return 1.0 if self.drive.column == "moment_nm" else self.drive.gain
+        return self.drive.kind.gain(self.drive.gain, self.spring_stiffness)
 
     @property
-    def driven_by_stiffness(self) -> bool:
-        """Whether the gain of the input per unit inertia is k: the root moves, and the air adds no stiffness."""
-        return self.drive is not None and not self.drive.on_body and not self.wind_on
+    def known_gain(self) -> KnownGain | None:
+        """The gain of the input over the inertia, where the run's own motion gives it; None of a free decay too."""
+        return None if self.drive is None else self.drive.kind.known_gain(windy=self.wind_on)
 
     def to_xarray(self) -> Dataset:
         """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.

@@ -1,13 +1,15 @@
-"""The input of a driven run: a moment, an input of unknown gain, a spring's moving root, or a servo's command."""
+"""The input of a driven run at the samples of its record, and what is refused of it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, INPUTS, Input, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record, read_only
 
 Hold = Literal["zero", "linear"]
@@ -15,16 +17,6 @@ Hold = Literal["zero", "linear"]
 
 HOLDS: tuple[Hold, ...] = ("zero", "linear")
 """The holds by their order, 0 and 1."""
-
-InputColumn = Literal["moment_nm", "drive", "base_rad", "command_rad"]
-"""A known moment on the body, N m; an input of unknown gain, any unit; the angle of the spring's root, rad; the
-angle that a position servo is told to hold, rad. A servo is a spring from there to the body, and a damper."""
-
-INPUT_COLUMNS: tuple[InputColumn, ...] = ("moment_nm", "drive", "base_rad", "command_rad")
-"""The columns of a run file that may hold its input."""
-
-OF_SPRING: frozenset[InputColumn] = frozenset({"base_rad", "command_rad"})
-"""Those that act through the spring."""
 
 DRIVE_KEYS = ("drive_hold", "drive_gain", "servo_kv")
 """The keys of a run that state its input."""
@@ -42,9 +34,11 @@ class Drive:
     """The input of a run at the samples of its record.
 
     Args:
-        values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
+        column: of a run file, which says what kind of input it is (`INPUTS`).
+        values: at the times of the record, shape (n,), in the unit of the column.
         hold: between the samples; None: not stated, and taken as linear.
-        gain: N m per unit of a ``drive``; None where it is not stated.
+        gain: of an input that takes one, N m per unit: of a ``base_acceleration_m_s2`` mass times arm, kg m. None
+            where it is not stated.
         servo_kv: of the servo of a ``command_rad``, which is a damper to the ground, N m s/rad; None where it is
             not stated. The servo's kp is the stiffness of the run's spring.
     """
@@ -70,14 +64,19 @@ class Drive:
         return self.hold == "zero"
 
     @property
-    def on_body(self) -> bool:
-        """Whether it is a moment on the body; else it acts through the spring."""
-        return self.column not in OF_SPRING
+    def kind(self) -> Input:
+        """What kind of input it is."""
+        return INPUTS[self.column]
 
     @property
-    def unit(self) -> str:
-        """Of the values."""
-        return "rad" if self.column in OF_SPRING else {"moment_nm": "N m", "drive": "units"}[self.column]
+    def on_body(self) -> bool:
+        """Whether it is a moment on the body; else it acts through the spring."""
+        return not self.kind.of_spring
+
+    @property
+    def gain_stated(self) -> bool:
+        """Whether its moment on the body follows from what the run states, without an inertia or a fitted gain."""
+        return self.kind.gain(self.gain, 1.0) is not None
 
 
 def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
@@ -89,7 +88,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         raise TunnelError(what, where=where, remedy=remedy)
     if not np.isfinite(values).all():
         remedy = "give all its values"
-        raise TunnelError(f"the input {name} holds NaN or an infinity", where=where, remedy=remedy)
+        raise TunnelError(f"the input {name} contains NaN or an infinity", where=where, remedy=remedy)
     span = float(np.ptp(values))
     if span <= _CONSTANT * float(np.abs(values).max()):
         remedy = f"leave the column out if the run is a free decay, or record what drives it in {name}"
@@ -117,7 +116,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         stands = int(np.count_nonzero(flat)) * _FLAT > count
         if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
             raise TunnelError(
-                f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
+                f"the input {name} saturates: its extreme value fills {_CLIPPED:.0%} of the record or more",
                 where=where,
                 remedy="record the input in a wider range; where the actuator itself saturates, state "
                 "plausible = false under [sensor] to keep it",
@@ -129,20 +128,30 @@ def refuse_untreated(
     spring_stiffness: float | None,
     quantity: Literal["angle", "rate", "acceleration"],
     where: str,
+    *,
+    wind_on: bool = False,
 ) -> None:
     """Refuse an input with which no driven run can be identified or diagnosed.
 
     Args:
         spring_stiffness: as stated, N m/rad; None where it is not.
         quantity: what the sensor reads.
+        wind_on: whether the wind blows.
     """
+    kind = drive.kind
     remedy = "state the spring's stiffness, or name the input moment_nm or drive"
     what = ""
-    if spring_stiffness == 0.0 and drive.column == "command_rad":
+    if spring_stiffness == 0.0 and "servo_kv" in kind.keys:
         what = "the command acts through the servo, whose kp is spring_stiffness, which is 0"
         remedy = "state the kp of the servo as spring_stiffness, or leave spring_stiffness out"
     elif spring_stiffness == 0.0 and not drive.on_body:
         what = "the motion of the root acts through the spring, and spring_stiffness = 0 states none"
+    elif spring_stiffness == 0.0 and kind.by_inertia:
+        what = "the base turns under a body without a spring, so that the run shows no moment in N m"
+        remedy = "leave the run out, or drive the body by a moment"
+    elif kind.of_base and wind_on:
+        what = "the base is shaken and the wind blows, whose moment follows the motion in the room"
+        remedy = "shake the base with the wind off, or leave the run out"
     elif quantity == "acceleration":  # it jumps where a held input does
         what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
     elif quantity == "rate" and spring_stiffness == 0.0:
@@ -150,6 +159,19 @@ def refuse_untreated(
         remedy = "record the angle"
     if what:
         raise TunnelError(what, where=where, remedy=remedy)
+
+
+def refuse_several_gains(drives: Iterable[Drive | None], where: str) -> None:
+    """Refuse inputs of several columns whose gains are unknown: one gain is fitted, common to the runs."""
+    columns = sorted(
+        {one.column for one in drives if one is not None and one.kind.takes_gain and one.gain is None}
+    )
+    if len(columns) > 1:
+        raise TunnelError(
+            f"the gains of {' and '.join(columns)} are unknown, and one gain is common to the runs",
+            where=where,
+            remedy="state drive_gain of one of them, or take the runs of each input separately",
+        )
 
 
 def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:

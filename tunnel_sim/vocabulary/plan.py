@@ -119,6 +119,7 @@ class Condition:
         air_density: ρ, kg/m³.
         release_angle: rad, nose-right positive; of a driven run 0, where it starts at rest.
         duration: of the record, s.
+        gain: true gain of an input that takes one, unknown to the estimators: N m per unit.
     """
 
     id: str
@@ -128,6 +129,7 @@ class Condition:
     release_angle: float
     duration: float
     drive: Drive | None = None
+    gain: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The causes from outside the vocabulary that are weighed beside it, one file each."""
+"""The causes from outside the vocabulary that are weighed with it, one file each."""
 
 from __future__ import annotations
 

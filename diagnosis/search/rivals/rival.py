@@ -1,4 +1,4 @@
-"""A rival: a cause from outside the vocabulary that is weighed beside its sets. One of one's own is one file."""
+"""A rival: a cause from outside the vocabulary that is weighed with its sets. Your own rival is one file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from diagnosis.search.hypothesis import Hypothesis
 
 
 class Rival:
-    """What would explain a gap and is no effect of the vocabulary: its probability is that of ``unknown``."""
+    """A possible cause that is not an effect of the vocabulary: its probability is added to that of ``unknown``."""
 
     def hypotheses(
         self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
@@ -25,18 +25,18 @@ class Rival:
             nominal: the nominal model, fitted to the same runs.
 
         Returns:
-            Each with names of its own, which no set of the vocabulary has; none where the rival does not apply.
+            Each with its own names, which no set of the vocabulary has; none where the rival does not apply.
         """
         raise NotImplementedError
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
-        """What is said where it would explain a gap whose cause is not known; None: nothing.
+        """The fact stated where it would explain a gap of unknown cause; None: nothing.
 
-        A sentence of its own is `diagnosis.facts.found.as_stated` of it.
+        Your own sentence is a `diagnosis.facts.found.as_stated`.
 
         Args:
             best: the likeliest of its hypotheses.
-            similarity: how the campaign was made similar.
+            similarity: the conversion from the measured campaign.
         """
         del best, similarity
         return None
@@ -44,7 +44,7 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class FoundRival:
-    """A rival with what was fitted of it.
+    """A rival with its fits.
 
     Args:
         rival: the rival.
@@ -55,7 +55,7 @@ class FoundRival:
     hypotheses: tuple[Hypothesis, ...]
 
     def fact(self, nominal: Fit, similarity: Similarity) -> Fact | None:
-        """What is said of it; None where its likeliest hypothesis does not close most of the gap."""
+        """Its fact; None where its likeliest hypothesis does not explain most of the gap."""
         best = min(self.hypotheses, key=lambda one: one.fit.total)
         least = nominal.settings.words.rival_explains
         return None if best.fit.excess > (1.0 - least) * nominal.excess else self.rival.fact(best, similarity)

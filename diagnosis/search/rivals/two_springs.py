@@ -1,9 +1,9 @@
 """A cause from outside the vocabulary: two springs that are not as stiff as stated.
 
-Every effect that changes the frequency with the spring has one number for it, and the inertia is another: two such
-effects fit any frequencies of three springs, so that they prove nothing by them. Two springs that are off are as
-simple (paper, Table II: springs 4 and 7), and are no effect of the vocabulary. They are weighed like a set of it;
-what is probable of them is probable of an unknown cause.
+Every effect that changes the frequency with the spring has one parameter for it, and the inertia is another, so
+two such effects fit any frequencies of three springs. Two springs off are as simple (paper, Table II: springs 4
+and 7), and are not an effect of the vocabulary. They are weighed like a set of it; their probability is added to
+that of an unknown cause.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class TwoSprings(Rival):
     def hypotheses(
         self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
     ) -> list[Hypothesis]:
-        """The pairs of springs beside what stays of each answer; none with too few springs.
+        """The pairs of springs with the other effects of each answer; none with too few springs.
 
-        Fits start at the known sets that have the effects that stay.
+        Fits start at the known sets with those effects.
         """
         data = nominal.problem.data
         if len(data.springs) < data.settings.search.two_springs_of:
@@ -79,6 +79,6 @@ def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:
 
 
 def _differs_by_spring(kind: type[Effect]) -> bool:
-    """Whether an effect changes the frequency of the runs of every spring by another share."""
+    """Whether an effect changes the frequency of the runs by a share that depends on the spring."""
     stiffens = kind.channel == "stiffness" and kind.condition == "always" and not kind.on_spring
     return stiffens or kind.chosen_spring() is not None

@@ -7,5 +7,5 @@ from diagnosis.search.views.stretches import InStretches
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 
-#: In the order in which they are asked whether they apply; each is told what was found in the one before.
+#: In order of preference; each gets the results of the one before.
 VIEWS: tuple[type[View], ...] = (InStretches, WholeRuns, ByMoment)

@@ -1,4 +1,4 @@
-"""Sets of causes of a body that nothing holds, weighed by the moment that they leave and not by its angle."""
+"""Sets of causes of a body without a spring, weighed by the residual moment instead of the residual angle."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import UNKNOWN
 
-# Of a random moment's response per interval, in variances of white noise.
+# powers of a random moment's response per interval, in variances of white noise
 _POWERS = np.geomspace(1e-12, 1e12, 49)
 
 
 @dataclass(frozen=True, eq=False)
 class ByMoment(View):
-    """Whole runs in whose noise a random moment is part.
+    """Whole runs whose noise includes a random moment.
 
-    Every small error of the moment moves such a body for good, so that its angle departs further and further. So
-    the random moment that a set leaves counts as noise: that of the likeliest set whose moment is small beside the
-    one that the nominal model misses.
+    Every small error of the moment displaces such a body permanently, so its angle departs ever further. The
+    residual random moment therefore counts as noise: that of the likeliest set whose moment is small beside the
+    moment missing from the nominal model.
 
     Args:
         known: the sets found by the angle.
@@ -43,7 +43,7 @@ class ByMoment(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """Where a set is fitted to the angle of a body that nothing restores, and its share is beyond chance.
+        """The view of a body without a restoring moment, where a set's share of the angle exceeds chance.
 
         None also where no set explains the angle, and none leaves a small moment.
         """
@@ -52,7 +52,7 @@ class ByMoment(View):
         if known is None or best is None or best.fit.chance >= prepared.settings.search.moment_chance:
             return None
         prepared, chosen = known.view.prepared, prepared.settings.search
-        # the nominal model in the noise that the likeliest set leaves, and that other probable ones leave
+        # refit the nominal model with the residual noise of each probable set
         bases: list[Fit] = []
         for answer in known.weighed:
             left = known.fitted(answer.effects)
@@ -66,7 +66,7 @@ class ByMoment(View):
         return cls(prepared, (small or bases)[0], known)
 
     def sets(self, clock: Clock) -> Sets:
-        """The sets that are found, beside what was found by the angle and is not grown again."""
+        """The sets found here, beside those found by the angle, which are not grown again."""
         return replace(super().sets(clock), random=self.known.random, refused=self.known.refused)
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
@@ -77,7 +77,7 @@ class ByMoment(View):
 
 
 def by_moment(fit: Fit) -> Data:
-    """The runs of a fit, whose noise holds a random moment beside the white noise.
+    """The runs of a fit, whose noise includes a random moment beside the white noise.
 
     Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
     shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of

@@ -1,8 +1,8 @@
 """Sets of causes fitted in stretches of the runs, where the nominal model misses the motion itself.
 
-Where the model is far from the motion, its phase is lost within a few cycles, and a fit of the whole run has many
-minima. In a stretch of two cycles the phase cannot be lost: what is wrong with the model shows as a frequency and a
-damping that differ from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
+Where the model is far from the motion, its phase is lost within a few cycles, and χ² of a whole run has many
+minima. In a stretch of two cycles the phase cannot be lost: model errors show as a frequency and a damping that
+differ from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from diagnosis.search.views.view import View
 from tunnel_sim.effects import Effect
 
 _SHORT, _LONG = 2, 18  # cycles
-_LONGER = 3  # times, from one fit to the next: the phase at the end of a stretch is known to that much
-_TOLERANCE = 1e-3  # of the fits on the way
+_LONGER = 3  # ratio of the lengths of successive fits: the phase at the end of a stretch is known well enough
+_TOLERANCE = 1e-3  # of the intermediate fits
 _ITERATIONS = 15
 
 
 def long_stretch(short: Stretches) -> int:
     """Length, in blocks, of the stretches on which sets of causes are compared, from stretches of two cycles.
 
-    Over eighteen cycles a model of the motion shows in the phase as well; over a hundred the phase shows the clock,
-    the temperature and the hand that let go.
+    Over eighteen cycles the phase shows the model of the motion; over a hundred it also shows the clock, the
+    temperature and the release by hand.
     """
     return short.length * _LONG // _SHORT
 
@@ -50,8 +50,8 @@ class Stretches:
 
     Args:
         data: the stretches, as runs.
-        places: of each stretch its run's number and the block it begins with.
-        length: in blocks; the last of a run may be half as short or half as long again.
+        places: run number and first block of each stretch.
+        length: in blocks; the last stretch of a run may be half as short or half as long again.
     """
 
     data: Data
@@ -59,7 +59,7 @@ class Stretches:
     length: int
 
     def only(self, places: Container[tuple[int, int]]) -> Stretches:
-        """Those of the places given."""
+        """The stretches at the given places."""
         if all(place in places for place in self.places):
             return self
         kept = [k for k, place in enumerate(self.places) if place in places]
@@ -87,11 +87,11 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
 
 
 def spread_out(short: Stretches, data: Data) -> Stretches:
-    """Stretches of two cycles to grow sets of causes on, spread over the runs where all would be too many.
+    """Stretches of two cycles to grow sets of causes on, spread over the runs where there are too many.
 
     Returns:
-        Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
-        with which the runs divided by it have no more blocks than sets are grown on.
+        The stretches within every k-th stretch of eighteen cycles, the first of each run among them. k is the
+        least that keeps the number of blocks within the limit for growth.
     """
     each = ceil(sum(run.reading.size for run in data.runs) / data.settings.search.grown_on)
     long = in_stretches(data, long_stretch(short))
@@ -142,11 +142,11 @@ class InStretches(View):
     """Long stretches of the runs, on which sets are compared, and short ones, on which they grow.
 
     Effects are added in short stretches, in which the phase cannot be lost, and in long ones to the sets that keep
-    it there: a slow loss hardly shows in two cycles.
+    the phase there: a slow loss hardly shows in two cycles.
 
     Args:
         first: fit of the nominal model to the short stretches.
-        short: these.
+        short: the short stretches.
         long: the long ones.
     """
 
@@ -156,7 +156,7 @@ class InStretches(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """The first view of a motion whose phase the nominal model loses; an input holds the phase."""
+        """The first view where the nominal model loses the phase of the motion; an input keeps the phase."""
         lost = prepared.ringing is None and misses_motion(prepared.nominal) and not prepared.campaign.driven
         if known is not None or not prepared.able or not lost:
             return None
@@ -171,13 +171,13 @@ class InStretches(View):
         first = fit_nominal(short.data)
         try:
             base, long = fit_longer(first, short, data, long_stretch(short))
-        except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+        except (FitError, np.linalg.LinAlgError):  # a model without the causes may diverge in long stretches
             base, long = first, short
         return cls(prepared, base, first, short, long)
 
     @property
     def able(self) -> Sequence[type[Effect]]:
-        """The effects that do not depend on what was before a stretch."""
+        """The effects that do not depend on the time before a stretch."""
         return [kind for kind in self.prepared.able if kind.autonomous]
 
     @property
@@ -202,13 +202,13 @@ class InStretches(View):
         return list(grown.values())
 
     def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
-        """Sets with their forms freed where the textbook leaves more than sensors and springs may."""
+        """Sets with their forms freed where the textbook form leaves more than sensors and springs may."""
         settings, base = self.base.settings, self.base
         may = settings.weighing.model_error**2 * self.gap.motion / base.count
         return with_forms(children, self.gap, min(settings.search.form_open * level[0].fit.excess, may))
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best child of each parent, then the others: what fits better at first may be a dead end."""
+        """The best child of each parent, then the others: the best fit at first may lead nowhere."""
         first: list[Hypothesis] = []
         for parent in level:
             own = [h for h in going if h not in first and set(parent.effects) < set(h.effects)]

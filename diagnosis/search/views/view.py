@@ -1,4 +1,4 @@
-"""A view of the runs: how they are fitted while sets of causes are found. One of one's own is one file."""
+"""A view of the runs: how they are fitted while sets of causes are found. Your own view is one file."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The runs as sets of causes are fitted to them; what is common to all views.
+    """The form of the runs to which sets of causes are fitted; the base of all views.
 
     Args:
-        prepared: the campaign, whose nominal model is fitted to the whole runs to which answers are.
-        base: fit of the nominal model in this view, whose gap the sets share.
+        prepared: the campaign, with its nominal model fitted to the whole runs of the answers.
+        base: fit of the nominal model in this view; shares refer to its gap.
     """
 
     prepared: Prepared
     base: Fit
 
-    #: Whether the parameters of an answer are those fitted in the view, and not those fitted to whole runs.
+    #: Whether the parameters of an answer are those fitted in the view, not those fitted to whole runs.
     states_parameters: ClassVar[bool] = False
-    #: Whether the gap may be as small as noise that misbehaves, which then explains it.
+    #: Whether the gap may be as small as misbehaving noise, which then explains it.
     may_be_noise: ClassVar[bool] = False
-    #: What is said of answers that were found in the view, by its key among the cautions; empty: nothing.
+    #: Key of the caution about answers that were found in the view; empty: none.
     caution: ClassVar[str] = ""
 
     @classmethod
@@ -42,17 +42,17 @@ class View:
         """The view of a campaign; None where it does not apply.
 
         Args:
-            known: what was found in the view before; None: it is the first that applies.
+            known: the sets of the previous view; None: this is the first that applies.
         """
         raise NotImplementedError
 
     def on(self, base: Fit) -> Self:
-        """The same view of runs with other noise, of which nothing is known but the fit of the nominal model."""
+        """The same view of runs with other noise, given the fit of the nominal model."""
         return replace(self, base=base)
 
     @cached_property
     def gap(self) -> ChannelMisfit:
-        """What the nominal model leaves in the view, by channel."""
+        """Misfit of the nominal model in the view, by channel."""
         return gap_left(self.base)
 
     @cached_property
@@ -62,7 +62,7 @@ class View:
 
     @property
     def repeating(self) -> Fit:
-        """The fit of the nominal model with runs that repeat exactly, of whose gap the sets leave their shares."""
+        """The nominal fit with runs that repeat exactly; shares refer to its gap."""
         return self.base
 
     # ---- how sets are grown ----
@@ -95,11 +95,11 @@ class View:
         return with_forms(children, self.gap, chosen.form_open * parent.fit.excess, count)
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Of the sets that may be grown further those that are; of several that change the readings alike one.
+        """The sets to be grown further; of several that change the readings alike, one.
 
         Args:
             level: the sets from which they are grown.
-            going: the sets, the best first.
+            going: the candidates, the best first.
         """
         del level
         kept: list[Hypothesis] = []
@@ -120,12 +120,12 @@ class View:
         raise NotImplementedError
 
     def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """A set that may be the answer, fitted to whole runs from its fit to convergence; None where that fails.
+        """A possible answer, fitted to whole runs and to convergence; None where that fails.
 
-        Each half of the runs is then asked whether it shows the effects.
+        Its effects are then checked in each half of the runs.
         """
         return self.whole(polish(hypothesis))
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer as it is stated, from its fit to whole runs."""
+        """The answer in its final form, from its fit to whole runs."""
         return settled

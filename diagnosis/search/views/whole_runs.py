@@ -1,4 +1,4 @@
-"""Sets of causes fitted to whole runs, as their angle shows them."""
+"""Sets of causes fitted to the angle in whole runs."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from diagnosis.search.weigh import OF_MOTION, UNKNOWN, log_misfit, misfit_scale
 
 @dataclass(frozen=True, eq=False)
 class WholeRuns(View):
-    """Whole runs, without the long rest in which some end.
+    """Whole runs, without the long rest at the end of some.
 
     Args:
-        first: the set that all others contain; None: that without an effect.
-        unscattered: the fit of the nominal model with runs that repeat exactly, where the base's do not.
+        first: the set that all others contain; None: the empty set.
+        unscattered: the nominal fit with runs that repeat exactly, where those of the base do not.
     """
 
     first: Hypothesis | None = None
@@ -48,7 +48,7 @@ class WholeRuns(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """The first view, but of runs that are seen in stretches."""
+        """The first view, unless the runs are viewed in stretches."""
         del clock
         if known is not None:
             return None
@@ -56,28 +56,28 @@ class WholeRuns(View):
         moving, rested = without_long_rest(prepared.nominal.problem.data)
         if rested:  # where dry friction stops a body, χ² has many minima
             nominal = try_fit(replace(prepared.nominal.problem, data=moving), prepared.nominal.point)
-            if nominal is not None:  # what is left may be too short: whole runs then
+            if nominal is not None:  # the rest may be too short: then whole runs
                 prepared = replace(prepared, nominal=nominal, rested=rested)
         if not prepared.nominal.problem.scatter:
             return cls(prepared, prepared.nominal, first)
-        # the runs differ as much as is stated, or more
+        # the runs differ as much as stated, or more
         base = scattered(prepared.nominal, prepared.kinds) or prepared.nominal
         repeating = try_fit(*without_deviations(prepared.nominal)) or prepared.nominal
         return cls(prepared, base, first, unscattered=repeating)
 
     @property
     def repeating(self) -> Fit:
-        """The fit of the nominal model with runs that repeat exactly."""
+        """The nominal fit with runs that repeat exactly."""
         return self.base if self.unscattered is None else self.unscattered
 
     @cached_property
     def scattering(self) -> Fit | None:
-        """The fit of the nominal model to runs that differ by chance; None where they do not."""
+        """The nominal fit to runs that differ by chance; None where they do not."""
         return scattered(self.base, self.prepared.kinds)
 
     @cached_property
     def _scattering_gap(self) -> ChannelMisfit:
-        """What the nominal model leaves of runs that differ by chance, by channel."""
+        """Misfit of the nominal model to runs that differ by chance, by channel."""
         assert self.scattering is not None
         return gap_left(self.scattering)
 
@@ -91,11 +91,11 @@ class WholeRuns(View):
         return self.first or Hypothesis((), self.base, repeating=self.unscattered)
 
     def sets(self, clock: Clock) -> Sets:
-        """The sets that are found, and the random moments that may act beside them.
+        """The sets found, and the random moments that may act beside them.
 
-        Sets are grown in runs that repeat, until one explains every run by itself where the runs differ by chance.
-        From there on they are grown beside such differences. Where none does, and no set explains runs that repeat,
-        the likeliest of them are compared beside such differences.
+        Where the runs differ by chance, sets are grown in runs that repeat until one explains every run by itself.
+        From there on they are grown beside chance differences. Where none does, and no set explains runs that
+        repeat, the likeliest are compared beside such differences.
         """
         if self.unscattered is not None or self.first is not None:
             return self.with_moments(super().sets(clock), clock)
@@ -103,7 +103,7 @@ class WholeRuns(View):
         beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
-            # this allows deviations of every run, so nothing beside them is tried
+            # the test allows deviations of every run, so nothing is tried beside them
             beyond.extend(self._beyond_reach(level))
             tried = () if beyond else (self.beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
@@ -127,7 +127,7 @@ class WholeRuns(View):
     def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
         """The least share of the gap that all effects together leave, where no larger set could be the cause.
 
-        It is asked for where the sets of a level leave most of the gap; else empty.
+        Computed where the sets of a level leave most of the gap; else empty.
         """
         chosen, gap = self.base.settings.search, self.base.total - self.base.count
         if any(not one.effects or one.fit.total - one.fit.count < chosen.reach_from * gap for one in level):
@@ -148,7 +148,7 @@ class WholeRuns(View):
 
     @cached_property
     def _fitted_beside(self) -> dict[Hypothesis, Hypothesis | None]:
-        """Sets beside chance differences, by the set in runs that repeat: some are asked for twice."""
+        """Cache of sets beside chance differences, by the set in runs that repeat."""
         return {}
 
     def _fitted_with_deviations(self, one: Hypothesis, scatter: Scatter) -> Hypothesis | None:
@@ -156,16 +156,19 @@ class WholeRuns(View):
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
-        gap = self._scattering_gap
-        reach = self.base.settings.search.forms_beside_scatter * np.sum(gap.excess)
-        if not found.explains_runs and np.sum(misfit(found.fit).excess) < reach:
-            (found,) = with_forms([found], gap, 0.0)
+        if not found.explains_runs and self._nearly_explains(found):
+            (found,) = with_forms([found], self._scattering_gap, 0.0)
         return replace(found, fit=settled(found.fit))
 
-    def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
-        """The likeliest of the sets that explain every run by itself and of their parts that do.
+    def _nearly_explains(self, beside: Hypothesis) -> bool:
+        """Whether what a set beside chance differences leaves within runs could be its effects' other forms."""
+        left, gap = np.sum(misfit(beside.fit).excess), np.sum(self._scattering_gap.excess)
+        return bool(left < self.base.settings.search.nearly_explained * gap)
 
-        In runs that repeat, a set often holds an effect that does what differences between the runs do.
+    def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
+        """The likeliest of the sets that explain every run by itself, or of their parts that do.
+
+        In runs that repeat, a set often contains an effect that imitates differences between the runs.
         """
         found, weighing = {one.names: one for one in explained}, self.base.settings.weighing
         while True:
@@ -178,13 +181,13 @@ class WholeRuns(View):
             found |= {part.names: part for part in parts}
 
     def _settled_beside(self, part: Hypothesis) -> Hypothesis:
-        """A part of a set beside chance differences between the runs, with the widths that it needs itself."""
+        """A part of a set beside chance differences between the runs, with its own widths."""
         return replace(part, fit=settled(part.fit), repeating=try_fit(*without_deviations(part.fit)))
 
     def _explains(self, beside: Hypothesis) -> bool:
-        """Whether a set beside chance differences leaves no more within runs than chance and an error of its form.
+        """Whether a set beside chance differences explains the runs up to chance and an error of its form.
 
-        Such an error shows in the channels in which the cause does.
+        That error shows in the same channels as the cause.
         """
         weighing, gap = self.base.settings.weighing, self._scattering_gap
         by_form = weighing.form_error**2 * np.maximum(gap.excess, 0.0)
@@ -197,8 +200,8 @@ class WholeRuns(View):
 
         Args:
             likely: sets in runs that repeat, the likeliest first.
-            explained: the set that explains every run by itself, from which larger ones are grown; None: none, and
-                they are grown from scatter alone, as long as one explains the runs.
+            explained: the set that explains every run by itself, from which larger ones are grown; None: there is
+                none, and they are grown from scatter alone, as long as one explains the runs.
         """
         assert self.scattering is not None
         none = Hypothesis((), self.scattering, repeating=self.base)
@@ -223,17 +226,17 @@ class WholeRuns(View):
         return replace(found, random=tuple(random), hypotheses=tuple(sets))
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The set as it is."""
+        """The set, unchanged."""
         return hypothesis
 
     def settled(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The set as it is."""
+        """The set, unchanged."""
         return hypothesis
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence: only now, as another view may follow.
+        """The answer fitted to convergence; done last because another view may follow.
 
-        Chance differences between the runs are a part of it where they pay the price of an effect.
+        It includes chance differences between the runs where they pay the price of an effect.
         """
         polished = polish(settled)
         found, stated = polished.fit, bool(self.prepared.nominal.problem.scatter)
@@ -248,9 +251,9 @@ class WholeRuns(View):
         return polished if fitted is polished.fit else replace(polished, fit=fitted)
 
     def _pays(self, differing: Fit, repeats: Fit) -> bool:
-        """Whether chance differences close as much of what the answer leaves as an effect must.
+        """Whether chance differences explain as much of the answer's residual as an effect must.
 
-        Forms of effects are never exact, and what they leave between runs is no scatter.
+        Forms of effects are never exact, and their errors between runs are not scatter.
         """
         weighing = self.base.settings.weighing
         scale = misfit_scale(misfit(self.repeating), weighing)

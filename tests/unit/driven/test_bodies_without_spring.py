@@ -11,8 +11,9 @@ from identification.estimate import Status
 from identification.signal.driven import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, InputColumn
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Record
 
 RATE, INERTIA, DAMPING, NOISE, OFFSET = 200.0, 0.1, 0.15, 5e-4, 0.3

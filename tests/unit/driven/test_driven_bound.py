@@ -11,7 +11,8 @@ from identification.uncertainty.cramer_rao import CampaignBound, campaign_bound
 from tests.marks import slow
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, InputColumn
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 TIME = np.arange(1000) / 100.0

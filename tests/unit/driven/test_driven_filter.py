@@ -7,7 +7,8 @@ from scipy.linalg import expm
 from identification import identify
 from identification.signal.driven import driven_rows
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, InputColumn
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, INERTIA, DAMPING, SPRING, NOISE, GAIN = 100.0, 0.1, 0.1, 16.0, 5e-4, 2.5

@@ -9,7 +9,8 @@ from scipy.linalg import expm
 from diagnosis import diagnose
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, InputColumn
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, INERTIA, DAMPING, NOISE = 200.0, 0.1, 0.02, 3e-4

@@ -152,7 +152,7 @@ def test_the_response_over_the_grid_of_a_posterior_is_that_of_its_points() -> No
     def rows(decay: Decay) -> np.ndarray:
         return driven_rows(TIME, run.drive.values, decay.rate, decay.stiffness, held=False)
 
-    found = Forced(rows, by_root=False).over(centre, scale, axis).reshape(15, 15, 3, -1)
+    found = Forced(rows, known=None).over(centre, scale, axis).reshape(15, 15, 3, -1)
     for i, j in ((0, 0), (3, 11), (7, 7), (14, 2)):
         exact = rows(Decay(*(centre + scale @ axis[[i, j]])))
         assert np.max(np.abs(found[i, j] - exact) / np.max(np.abs(exact), axis=1, keepdims=True)) < 1e-3

@@ -30,8 +30,9 @@ from tunnel_sim.files.toml_input import (
     read_document,
     validate,
 )
-from tunnel_sim.vocabulary.drive import Hold, InputColumn
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.drive import Hold
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, one_of, shown
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
 
 
 class Unstated(TunnelError):
@@ -77,7 +78,7 @@ class ImportChoices(StrictModel):
     end: float | None = optional("a time of the file in s: later samples are left out")
     rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
     input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
-    input_as: InputColumn | None = optional("'moment_nm', 'drive', 'base_rad' or 'command_rad'")
+    input_as: InputColumn | None = optional(one_of([f"'{name}'" for name in INPUT_COLUMNS]))
     input_hold: Hold | None = optional("'zero' or 'linear'")
     leave_out: tuple[OneLine, ...] = Field(
         default=(), strict=False, description="a list of names of runs or files"

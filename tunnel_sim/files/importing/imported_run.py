@@ -21,6 +21,7 @@ from tunnel_sim.files.toml_input import shown, validate
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import INPUTS
 from tunnel_sim.vocabulary.record import Array, Record
 
 _JUDGED = 500_000  # samples in which the cycles of a long record are counted
@@ -183,8 +184,8 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
     column, values = raw.input
     order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
     hold: Hold | None = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else None)
-    gain = gain if column == "drive" else None
-    kv = raw.input_facts.get("servo_kv") if column == "command_rad" else None
+    gain = gain if "drive_gain" in INPUTS[column].keys else None
+    kv = raw.input_facts.get("servo_kv") if "servo_kv" in INPUTS[column].keys else None
     if choices.input_hold is None:
         asked = "not stated, linear is assumed; --input-hold zero if a controller holds each command"
         said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")

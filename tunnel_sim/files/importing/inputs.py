@@ -12,10 +12,10 @@ import numpy as np
 from tunnel_sim.files.importing.columns import stated_input
 from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.tables import Channel, heading, is_input
-from tunnel_sim.files.importing.units import UNITS, kind_of
-from tunnel_sim.vocabulary.drive import OF_SPRING, Drive, InputColumn, checked_drive
+from tunnel_sim.files.importing.tables import Channel, is_input
+from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
+from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -25,7 +25,7 @@ class RunInput:
 
     Args:
         channel: that holds it.
-        values: N m, any unit or rad, as ``column`` says; shape (n,).
+        values: in the unit of ``column``, shape (n,).
     """
 
     column: InputColumn
@@ -33,13 +33,11 @@ class RunInput:
     values: Array
 
 
-_MOMENTS = ("nm", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
 _NAMES = re.compile(
     r"(?<![a-z])(torque|moment|drehmoment|drive|input|excitation|anregung|command|cmd|control|motor|shaker|actuator|"
     r"tau|effort|u|base|root)(?![a-z])",
     re.IGNORECASE,
 )
-_BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
 _CORRELATED = 0.3  # greatest correlation at any lag, from which on a column drives the motion
 
 
@@ -80,7 +78,7 @@ def find_input(
     found = exact
     for channel in () if exact else others:
         good = np.isfinite(channel.values) & np.isfinite(reading)
-        plausible = _moment_unit(channel) or _NAMES.search(channel.name)
+        plausible = _claimed(channel) or _NAMES.search(channel.name)
         conditional = condition_of(channel.name, channel.unit) is not None
         if conditional or not plausible or np.count_nonzero(good) < 16:
             continue
@@ -97,34 +95,19 @@ def find_input(
 
 
 def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: list[str]) -> RunInput:
-    name = heading(channel)
-    guessed: InputColumn = (
-        "moment_nm"
-        if name == "moment_nm" or _moment_unit(channel)
-        else "base_rad"
-        if kind_of(channel.unit) == "angle" and (name == "base_rad" or _BASE.search(channel.name))
-        else "command_rad"
-        if name == "command_rad"
-        else "drive"
-    )
-    column = choices.input_as or guessed
-    factor = UNITS["angle"].get(channel.unit, 1.0) if column in OF_SPRING else 1.0
-    meaning = {
-        "moment_nm": "a known moment in N m",
-        "drive": "an input of unknown gain",
-        "base_rad": "the angle of the spring's root",
-        "command_rad": "the command of a position servo",
-    }[column]
+    column = choices.input_as or _claimed(channel) or "drive"
+    kind = INPUTS[column]
     size, lag = correlation(channel.values, reading)
     said.append(
-        f"driven by '{one_line(channel.name, 40)}', {meaning} ({column}): its correlation with the reading is "
+        f"driven by '{one_line(channel.name, 40)}', {kind.meaning} ({column}): its correlation with the reading is "
         f"{size:.2f} at a lag of {counted(lag, 'sample')}; --input none if it is a free decay"
     )
-    return RunInput(column, channel, channel.values * factor)
+    return RunInput(column, channel, channel.values * kind.factor(channel.unit))
 
 
-def _moment_unit(channel: Channel) -> bool:
-    return channel.unit.strip().lower() in _MOMENTS
+def _claimed(channel: Channel) -> InputColumn | None:
+    """The kind of input that name and unit of a column show; None where they show none."""
+    return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
 
 
 def correlation(values: Array, reading: Array) -> tuple[float, int]:

@@ -26,8 +26,8 @@ from tunnel_sim.files.importing.stated import Stated, of_short_table, stated_in
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
+from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 

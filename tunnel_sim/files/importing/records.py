@@ -122,7 +122,7 @@ def read_records(
     kinds = {raw.quantity for raw in raws}
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
-        raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
+        raise TunnelError(f"the runs contain {' and '.join(sorted(kinds))}", remedy=remedy)
     ids, hints = [raw.id for raw in raws], name_hints([source.path for source in sources])
     parts = []
     for at, raw in enumerate(raws):

@@ -224,7 +224,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         reader, place = TEXT, None
     content = read_regular(path, reader.limit)
     if is_blank(content):
-        raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
+        raise TunnelError("the file is empty", where=where, remedy="name a file with a record")
     if not reader.magic or not content.startswith(reader.magic):
         really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
         if really is not None or reader.magic:
@@ -252,7 +252,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         # A column that names the runs, or states the input, may be alone in its table.
         found += [part for part in parts if part.channels]
     if not found:
-        remedy = "name a file that holds times and angles"
+        remedy = "name a file with times and angles"
         raise TunnelError("no column of numbers", where=where, remedy=remedy)
     count = sum(table.channels[0].values.size for table in found)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")

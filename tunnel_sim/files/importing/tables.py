@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.units import UNITS as UNITS
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS, HOLDS, INPUT_COLUMNS
+from tunnel_sim.vocabulary.drive import DRIVE_KEYS, HOLDS
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.text_cells import from_text_cell
 
@@ -98,7 +99,7 @@ def is_input(channel: Channel) -> bool:
 def heading(channel: Channel) -> str:
     """The name of a column with its unit, as the format writes it."""
     name = channel.name.strip().lower()
-    return f"{name}_{channel.unit}" if channel.unit else name
+    return f"{name}_{channel.unit}".replace("/", "_") if channel.unit else name
 
 
 def with_input_facts(table: Table) -> Table:

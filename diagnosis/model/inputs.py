@@ -1,0 +1,31 @@
+"""Effects that the inputs of driven runs leave open, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.campaign import Campaign
+
+_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
+_TURNING_BASE = (
+    "Where the base turns, these effects depend on more than its acceleration, and are not tried: {}."
+)
+
+
+def untried_by_inputs(campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
+    """The effects whose moment does not follow from an input, by the sentence that says why.
+
+    Args:
+        kinds: those that are to be tried.
+
+    Returns:
+        By a sentence with a place for their names, those of ``kinds`` that are not tried; none where all follow.
+    """
+    inputs = {run.drive.kind for run in campaign.runs if run.drive is not None}
+    found: dict[str, list[type[Effect]]] = {}
+    if any(one.of_spring for one in inputs):
+        found[_MOVING_ROOT] = [kind for kind in kinds if kind.on_spring and kind.channel == "damping"]
+    if any(one.by_inertia for one in inputs):
+        found[_TURNING_BASE] = [kind for kind in kinds if kind.by_angle_in_room]
+    return found

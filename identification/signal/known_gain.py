@@ -1,0 +1,64 @@
+"""Inputs whose gain over the inertia is known, and whose sign or unit the motion may contradict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.policy import REFUSAL_DEVIATIONS
+from identification.signal.driven import driven_start
+from identification.signal.driven_fit import constant_gain, fit_with_inputs
+from identification.statistics import determined, inverse
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import evenly_spaced
+
+_DEGREES = 180.0 / np.pi
+_SAME_GAIN = 0.5  # share by which a start may miss a gain: signs and units differ by far more
+
+
+def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = True) -> None:
+    """Refuse the acceleration of a base whose sign or unit the motion contradicts.
+
+    Over the inertia its gain is known. It is refused where the motion shows another one beyond doubt, which is that
+    of the other sign, or of degrees in place of radians.
+
+    Args:
+        derivative: 0 where the readings are angles, 1 where they are rates.
+        judged: whether a likely slip of units is refused too.
+
+    Raises:
+        TunnelError: for such an input.
+    """
+    if run.drive is None or not run.drive.kind.by_inertia:
+        return
+    record, column = evenly_spaced(run.record), run.drive.column
+    values = np.interp(record.time_s, run.record.time_s, run.drive.values)
+    start = driven_start(record.time_s, record.yaw_rad, values, derivative=derivative)
+    if start is None or not start[1] > 0.0:  # other checks refuse what does not oscillate
+        return
+    ratio = start[2] / run.drive.kind.scale
+    turned, degrees, radians = (
+        abs(ratio * factor - 1.0) < _SAME_GAIN for factor in (-1.0, _DEGREES, 1.0 / _DEGREES)
+    )
+    if not (turned or (judged and (degrees or radians))) or not _gain_differs(run, start, derivative):
+        return
+    if turned:
+        what = (
+            f"the motion follows {column} with the other sign: a base that accelerates leaves the body behind"
+        )
+        raise TunnelError(
+            what, where=where, remedy="turn the sign of the acceleration, or that of the reading"
+        )
+    unit = "degrees" if degrees else "radians in place of degrees"
+    what = f"the motion follows {column} with a gain of {-ratio:.3g} in place of −1, as if it were in {unit}"
+    raise TunnelError(what, where=where, remedy="convert it to rad/s2, and the reading to rad")
+
+
+def _gain_differs(run: Run, start: tuple[float, float, float], derivative: int) -> bool:
+    """Whether the gain that fits a run best differs from the known one far beyond its noise."""
+    began = np.array(start) - constant_gain(run)
+    found = fit_with_inputs([run], [np.eye(3)], began, own_zeros=True, derivative=derivative)
+    if not found.converged or not determined(found.normal):
+        return False
+    std = float(np.std(found.residuals[0]) * np.sqrt(inverse(found.normal)[2, 2]))
+    return abs(float(found.parameters[2])) > REFUSAL_DEVIATIONS * std
