@@ -70,7 +70,7 @@ def faded(*colours: str) -> Colormap:
 
 
 def colour_bar(figure: Figure, shown: ScalarMappable, axes: Axes, **given: Any) -> None:
-    """A colour bar in the colours of the theme, as those of the figure; arguments of ``Figure.colorbar``."""
+    """A colour bar of single areas, in colours that follow the page's theme; arguments of ``Figure.colorbar``."""
     bar = figure.colorbar(shown, ax=axes, **given)
     if bar.solids is not None:  # an image otherwise, in the colours of the light page
         bar.solids.set_rasterized(False)
