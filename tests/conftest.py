@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401
 
@@ -15,8 +17,21 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 
 # A loaded machine may take a second over one example.
-settings.register_profile("without deadline", deadline=None)
-settings.load_profile("without deadline")
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A million examples of the fuzzers, which have 24 tests of readers and of `identify`.
+settings.register_profile("long", settings.get_profile("patient"), max_examples=42_000)
+settings.load_profile("patient")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Thousands of tests live until the end: the garbage collector would go over them again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture
@@ -26,6 +41,15 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
     joint_model.prepare()
     monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
+
+
+@pytest.fixture
+def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Identify records as they are: their examination takes most of the time, and has tests of its own."""
+    from identification import _identify
+    from identification.examination.examine import Examined
+
+    monkeypatch.setattr(_identify, "examine", lambda campaign: Examined(campaign, ()))
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
-"""Every public function and class says what it is, numbers in which unit they are, and arrays of which shape.
+"""Numbers of public functions and classes have their unit, arrays their shape, and fields of files a description.
 
-The packages are walked, so nothing is forgotten; the rules themselves are tried on planted examples below.
+That there is a docstring is ruff's rule. The packages are walked, so nothing is forgotten; the rules themselves are
+tried on planted examples below.
 """
 
 from __future__ import annotations
@@ -130,8 +131,6 @@ def describes_itself(field: dataclasses.Field[Any]) -> bool:
 def faults(name: str, member: Any) -> list[str]:
     """What is wrong with one docstring."""
     text = member.__doc__ or ""
-    if not text.strip():
-        return [f"{name}: no docstring"]
     enumerated = inspect.isclass(member) and hasattr(member, "__members__")
     if name in EXEMPT or name.startswith(ORACLES) or enumerated:
         return []
@@ -144,7 +143,6 @@ def faults(name: str, member: Any) -> list[str]:
         described = {field.name for field in dataclasses.fields(member) if describes_itself(field)}
         signature = {name: kind for name, kind in signature.items() if name not in described}
     found = [argument_fault(argument, kind, known.get(argument)) for argument, kind in signature.items()]
-    found += [f"documents {extra}, which it does not take" for extra in known if extra not in signature]
     return [f"{name}: {fault}" for fault in found if fault]
 
 
@@ -163,7 +161,7 @@ def argument_fault(argument: str, annotation: str, text: str | None) -> str:
     )
 
 
-def test_every_public_object_is_documented() -> None:
+def test_every_number_has_its_unit_and_every_array_its_shape() -> None:
     found = list(public_objects())
     assert len(found) > 100  # the walk walks
     wrong = [fault for name, member in found for fault in faults(name, member)]
@@ -207,17 +205,6 @@ def without_a_shared_unit(low: float, high: float) -> float:
     return high - low
 
 
-def promises_more(speed: float, count: int) -> float:
-    """Something.
-
-    Args:
-        speed: V, m/s.
-        count: of runs.
-        colour: of the line.
-    """
-    return speed * count
-
-
 @dataclasses.dataclass
 class HalfDescribed:
     """Something."""
@@ -233,8 +220,6 @@ class HalfDescribed:
         (undocumented_argument, "argument speed is not documented"),
         (without_unit, "argument speed has no unit"),
         (without_a_shared_unit, "argument high has no unit"),
-        (promises_more, "documents colour, which it does not take"),
-        (lambda: None, "no docstring"),
     ],
 )
 def test_planted_faults_are_found(function: Callable[..., object], fault: str) -> None:

@@ -35,9 +35,10 @@ def names_in(source: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_effect_is_named_outside_its_home(path: Path) -> None:
-    assert names_in(path.read_text(encoding="utf-8")) == []
+def test_no_effect_is_named_outside_its_home() -> None:
+    assert len(FILES) > 100  # the walk walks
+    found = {path.relative_to(ROOT): names_in(path.read_text(encoding="utf-8")) for path in FILES}
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 @pytest.mark.parametrize(

@@ -93,12 +93,14 @@ def test_the_joints_files_are_there_before_a_command_takes_them() -> None:
         assert text.index(made) < command
 
 
+@pytest.mark.slow
 def test_a_kind_of_rig_is_added_in_one_class(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-a-kind-of-rig.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
     assert [bool(text) for _, text in shown] == [False, False, True, True]
 
 
+@pytest.mark.slow
 def test_a_rival_is_added_in_one_class(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-a-rival.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)

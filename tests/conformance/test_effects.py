@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -81,9 +81,9 @@ def test_metadata_is_complete(kind: type[Effect]) -> None:
 
 
 @each_effect
-@pytest.mark.parametrize("law", effect_laws.LAWS.values(), ids=effect_laws.LAWS)
-def test_it_obeys_the_law(kind: type[Effect], law: Callable[[type[Effect]], str]) -> None:
-    assert law(kind) == ""
+def test_it_obeys_the_laws(kind: type[Effect]) -> None:
+    said = {name: law(kind) for name, law in effect_laws.LAWS.items()}
+    assert {name: words for name, words in said.items() if words} == {}
 
 
 @each_effect
@@ -97,9 +97,9 @@ def test_unknown_names_get_did_you_mean(kind: type[Effect]) -> None:
 
 
 @each_effect
-@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, True, 10**400, "0.1", None])
-def test_no_number_is_refused_in_one_line(kind: type[Effect], wrong: object) -> None:
-    for info in kind.parameters():
+def test_no_number_is_refused_in_one_line(kind: type[Effect]) -> None:
+    wrong_values = (math.nan, math.inf, -math.inf, True, 10**400, "0.1", None)
+    for info, wrong in itertools.product(kind.parameters(), wrong_values):
         with pytest.raises(TunnelError) as refusal:
             effect_from(kind.name, {info.name: wrong})  # type: ignore[dict-item]
         text = str(refusal.value)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.prepared import fit_nominal
+from tests.reference.linear_rig import response_of_a_loose_body
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
@@ -47,31 +47,22 @@ class Hardening(Rig):
         return f"-({self.further!r})*Kr*b^3"
 
 
-def motion(restoring: Callable[[float], float], given: Array | None, start: float) -> Array:
-    def slope(t: float, state: Array) -> tuple[float, float]:
-        moment = 0.0 if given is None else float(np.interp(t, TIME, given))
-        return state[1], (moment - DAMPING * state[1] - restoring(state[0])) / INERTIA
-
-    step = np.inf if given is None else 1.0 / RATE
-    found = solve_ivp(
-        slope, (0.0, TIME[-1]), (start, 0.0), "DOP853", TIME, rtol=1e-10, atol=1e-12, max_step=step
-    )
-    return np.asarray(found.y[0])
-
-
 def run(number: int, spring: float | None, restoring: Callable[[float], float]) -> Run:
-    angle = motion(restoring, None, 0.3) + np.random.default_rng(number).normal(0.0, NOISE, TIME.size)
+    def slope(_: float, state: Array) -> tuple[float, float]:
+        return state[1], (-DAMPING * state[1] - restoring(state[0])) / INERTIA
+
+    found = solve_ivp(slope, (0.0, TIME[-1]), (0.3, 0.0), "DOP853", TIME, rtol=1e-10, atol=1e-12)
+    angle = found.y[0] + np.random.default_rng(number).normal(0.0, NOISE, TIME.size)
     return Run(f"r{number}", Record(TIME, angle), 0.0, spring_stiffness=spring)
 
 
-@cache
 def driven_run(number: int) -> Run:
-    """A run of a body that nothing holds; its integration, which ends a step at every sample, takes seconds."""
+    """A run of a body that nothing holds."""
     rng = np.random.default_rng(number)
     lines = 2.0 * np.pi * np.outer(TIME, np.arange(0.3, 5.0, 0.1))
     given = np.sin(lines + rng.uniform(0.0, 2.0 * np.pi, lines.shape[1])).sum(axis=1)
     given *= 0.5 / given.std()
-    angle = motion(lambda _: 0.0, given, 0.0) + rng.normal(0.0, NOISE, TIME.size)
+    angle = response_of_a_loose_body(given, 1.0 / RATE, INERTIA, DAMPING) + rng.normal(0.0, NOISE, TIME.size)
     return Run(f"r{number}", Record(TIME, angle), 0.0, drive=Drive("moment_nm", given))
 
 

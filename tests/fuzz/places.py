@@ -1,40 +1,42 @@
-"""Files that are no ordinary files."""
+"""Files, and what may stand in the place of a file."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
-from tests.fuzz.values import Rng
+from hypothesis import strategies as st
+
+from tests.fuzz.values import Draw, one_in
 
 _HUGE = 3 * 2**30
+_LINKS = ("/dev/zero", "/dev/null", "/dev/stdin", "missing")
 
 
-def estranged(path: Path, rng: Rng) -> None:
-    """Put something else in the place of a file.
+def _huge(path: Path, content: bytes) -> None:
+    with path.open("wb") as stream:
+        stream.write(content)
+        stream.truncate(_HUGE)
 
-    Args:
-        path: of an ordinary file, which is removed.
-        rng: decides what stands there: nothing, a folder, a pipe, a link, an empty file or one of 3 GiB of zeros.
-    """
-    content = path.read_bytes()
-    path.unlink()
-    kind = rng.integers(9)
-    if kind == 0:
-        path.mkdir()
-    elif kind == 1:
-        os.mkfifo(path)
-    elif kind == 2:
-        path.symlink_to(path.name)
-    elif kind == 3:
-        path.symlink_to(("/dev/zero", "/dev/null", "/dev/stdin")[rng.integers(3)])
-    elif kind == 4:
-        path.symlink_to("missing")
-    elif kind == 5:
-        path.write_bytes(b"")
-    elif kind == 6:
-        with path.open("wb") as stream:
-            stream.write(content)
-            stream.truncate(_HUGE)
-    elif kind == 7:
-        path.write_bytes(b"\n" * 1000 + content)
+
+PLACES: dict[str, Callable[[Path, bytes], object]] = {
+    "nothing": lambda _path, _content: None,
+    "a folder": lambda path, _content: path.mkdir(),
+    "a pipe": lambda path, _content: os.mkfifo(path),
+    "a link to itself": lambda path, _content: path.symlink_to(path.name),
+    **{f"a link to {to}": lambda path, _content, to=to: path.symlink_to(to) for to in _LINKS},
+    "nothing in it": lambda path, _content: path.write_bytes(b""),
+    "3 GiB of zeros": _huge,
+    "lines before it": lambda path, content: path.write_bytes(b"\n" * 1000 + content),
+}
+
+
+def written(path: Path, content: bytes, draw: Draw) -> Path:
+    """Write a file; in one of fifty examples something else stands there instead."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if draw(one_in(50)):
+        PLACES[draw(st.sampled_from(sorted(PLACES)))](path, content)
+    else:
+        path.write_bytes(content)
+    return path

@@ -6,7 +6,6 @@ import io
 import json
 import os
 import tempfile
-import tomllib
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -15,10 +14,12 @@ from unittest.mock import patch
 
 import numpy as np
 import polars as pl
+from hypothesis import strategies as st
 
 from tests.fuzz.campaigns import free_decays
 from tests.fuzz.tables import parquet
-from tests.unit.sweep.small_sweep import SMALL
+from tests.fuzz.values import odd_words
+from tests.unit.experiments.small_sweep import SMALL
 
 _TESTS = Path(__file__).parents[1]
 PLAN = b"""
@@ -85,19 +86,21 @@ FORMULAS = (
     "-k*sign(r)*abs(b)",
     "--k*w*sin(b/w)",
 )
+tokens = st.sampled_from((*"+-*/^(),bkwVrt#e", "**", "pi", "lambda:", "0/0", "b^0.5", "(b)")) | odd_words
+"""What a token of a formula is exchanged for."""
 EFFECT = "rod_flexibility:compliance=1e-4,inertia_share=0.3"
 KINDS = "single:2.0,pair:1.0,none:0.5,outside:0.5"
 
 
-def effects_document() -> dict[str, Any]:
-    """The tables of an effects file."""
+def effects_document(formula: str = FORMULAS[0]) -> dict[str, Any]:
+    """The tables of an effects file, of which the first effect has this formula."""
     stiffness = {"unit": "N m/rad", "scale": 0.1, "lower": 0.0, "upper": 50.0}
     width = {"unit": "rad", "scale": 0.05, "lower": 0.01, "upper": 0.3, "default": 0.06}
     share = {"unit": "1/rad", "scale": 0.1, "lower": -1.0, "upper": 1.0}
     first = {
         "name": "detent",
         "channel": "stiffness",
-        "moment": FORMULAS[0],
+        "moment": formula,
         "parameters": {"k": stiffness, "w": width},
     }
     return {
@@ -130,11 +133,6 @@ def run_frame() -> pl.DataFrame:
     """Times and angles of a run."""
     record = free_decays(np.random.default_rng(1)).runs[0].record
     return pl.DataFrame({"time_s": record.time_s, "yaw_rad": record.yaw_rad})
-
-
-def tree(content: bytes | str) -> dict[str, Any]:
-    """TOML as a tree."""
-    return tomllib.loads(content if isinstance(content, str) else content.decode())
 
 
 def packaged(name: str) -> bytes:
@@ -262,10 +260,7 @@ CHOICES: tuple[dict[str, Any], ...] = (
 """What a user may state about a log."""
 
 
-@cache
-def logger_head() -> bytes:
-    """The head of a log: numbers, names and a row of units."""
-    return b"""Logger 7; 12.3.2026
+LOGGER_HEAD = """Logger 7; 12.3.2026
 Sample rate: 50 Hz
 fs = 50, Ts = 0.02 s
 Wind speed: 54 km/h
@@ -275,15 +270,18 @@ frontal_area = 0.036
 Gain: 3 V
 time [s];yaw (rad);V [m/s];run;Kr
 """
+"""The head of a log: numbers, names and a row of units."""
+_HEADINGS = (
+    "time", "t", "Zeit", "yaw", "angle", "run", "Lauf", "fs", "dt", "Ts", "wind_speed", "V", "Kr", "rho", "width",
+    "frontal_area", "release_angle", "s", "ms", "h", "rad", "deg", "m/s", "km/h", "counts", "Inkr.", "mV", "rad/s",
+    "N m/rad", "kg/m3", "Hz", "kHz", "#1", "Run #2", "(rad)", "[m/s]", "1e999", "-1e999", "1e-320", "0", "-0.0",
+    "1e18",
+)  # fmt: skip
+headings = st.sampled_from(_HEADINGS) | odd_words
 
 
 def logger_rows(*, named: bool, timed: bool) -> bytes:
-    """The rows of a log under `logger_head`: two runs.
-
-    Args:
-        named: whether the runs have names, not numbers.
-        timed: whether there is a column of times.
-    """
+    """The rows of a log under `LOGGER_HEAD`: two runs with names or numbers, with a column of times or without."""
     rows = list(run_frame().iter_rows())
     half = len(rows) // 2
     names = ("a", "b") if named else (1, 2)
@@ -295,11 +293,7 @@ def logger_rows(*, named: bool, timed: bool) -> bytes:
 
 @cache
 def nested_hdf5(name: str) -> bytes:
-    """The seed run in an HDF5 file with groups, attributes of many kinds, tables, texts and references.
-
-    Args:
-        name: of the file; a ``.mat`` begins as MATLAB's version 7.3 does.
-    """
+    """The seed run in HDF5 or, by its name, MAT 7.3, with attributes of many kinds, tables, texts and links."""
     import h5py
 
     frame = run_frame()

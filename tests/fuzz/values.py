@@ -7,14 +7,14 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
-import numpy as np
+from hypothesis import strategies as st
 
-Rng = np.random.Generator
+Draw = st.DrawFn
 Tree = Any
 """Dictionaries, lists and plain values, as TOML and JSON give them."""
 
 DEEP = "@deeply-nested@"
-"""Stands for a value nested thousands of times; `fuzz.texts` writes it out."""
+"""Stands for a value nested thousands of times; `texts` writes it out."""
 HOSTILE = (
     "", " ", "[/x]", "[bold]", "$\\foo$", "$", "$\\frac{$", "_", "^", "\\", "%s", "{x}", "{{ 1 }}", "<b>&amp;</b>",
     "a\nb", "\x00", "\x1b[31m", "\u202e", "\u2028", "é" * 300, "x" * 100_000, "..", "../../etc/passwd", "/dev/zero",
@@ -28,116 +28,103 @@ NUMBERS = (
     2**31, 2**53 + 1, 2**63 - 1, 2**63, 2**64, 10**30, 10**400, -(10**400), True, False,
 )  # fmt: skip
 """Numbers at the ends of their types, and what passes for a number."""
+_OTHERS: tuple[Tree, ...] = (
+    [], {}, [[]], [{}], {"": {}}, None, [0.0] * 1000, list(range(2000)),
+    datetime.datetime(1, 1, 1), datetime.date(9999, 12, 31), datetime.time(0, 0),
+)  # fmt: skip
+
+hostile_texts = st.sampled_from(HOSTILE) | st.text(max_size=8)
+odd_numbers = st.sampled_from(NUMBERS) | st.floats() | st.integers()
+odd_words = st.sampled_from([str(value) for value in NUMBERS]) | hostile_texts
+odd_values = odd_numbers | hostile_texts | st.sampled_from(_OTHERS).map(deepcopy)
+"""A value of a kind that is seldom right."""
 
 
-def odd_value(rng: Rng) -> Tree:
-    """A value of a kind that is seldom right."""
-    kind = rng.integers(10)
-    if kind < 5:
-        return NUMBERS[rng.integers(len(NUMBERS))]
-    if kind < 8:
-        return HOSTILE[rng.integers(len(HOSTILE))]
-    others: tuple[Tree, ...] = (
-        [], {}, [[]], [{}], {"": {}}, None, [0.0] * 1000, list(range(2000)),
-        datetime.datetime(1, 1, 1), datetime.date(9999, 12, 31), datetime.time(0, 0),
-    )  # fmt: skip
-    return deepcopy(others[rng.integers(len(others))])
+def one_in(count: int) -> st.SearchStrategy[bool]:
+    """True in about one of so many examples; the simplest example is False."""
+    return st.integers(1, count).map(lambda number: number == count)
 
 
-def moved_number(value: float, rng: Rng) -> Tree:
+def place_in(count: int) -> st.SearchStrategy[int]:
+    """An index into so many things (at least one)."""
+    return st.integers(0, count - 1)
+
+
+@st.composite
+def moved_numbers(draw: Draw, value: float) -> Tree:
     """A number near another in some sense: its sign, its size, its type."""
-    kind = rng.integers(8)
-    if kind == 0:
-        return -value
-    if kind == 1:
-        return str(value)
-    if kind == 2:
-        return [value, value]
-    if kind == 3 and abs(value) < 2**53:
-        return int(value)
-    if abs(value) > 1e15:  # a whole number that no float holds is neither moved nor scaled
-        return 0
-    if kind == 4:
-        return value + float(rng.normal()) * 1e-9
-    return float(value) * 10.0 ** float(rng.integers(-12, 13))
+    others: list[Tree] = [-value, str(value), [value, value]]
+    if abs(value) < 2**53:
+        others.append(int(value))
+    if abs(value) <= 1e15:  # beyond, no float may hold it
+        others += [value + 1e-9, value - 1e-9, float(value) * 10.0 ** draw(st.integers(-12, 12))]
+    return draw(st.sampled_from(others))
 
 
-def mutated(tree: Tree, rng: Rng, edits: int | None = None) -> Tree:
-    """A tree with a few places changed.
-
-    Args:
-        tree: left as it is.
-        rng: decides what is changed.
-        edits: how many changes (a count); one to three where not given.
-
-    Returns:
-        Another tree, which shares nothing with the first.
-    """
+@st.composite
+def spoilt(draw: Draw, tree: Tree) -> Tree:
+    """A tree with one to three places changed, which shares nothing with the given one."""
+    if draw(one_in(200)):
+        return draw(odd_values)
     tree = deepcopy(tree)
-    for _ in range(edits or int(rng.integers(1, 4))):
+    for change in draw(st.lists(st.sampled_from(_CHANGES), min_size=1, max_size=3)):
         places = list(_places(tree))
-        if not places or rng.random() < 0.005:
-            return odd_value(rng)
-        owner, key = places[rng.integers(len(places))]
-        CHANGES[rng.choice(len(CHANGES), p=_WEIGHTS)](owner, key, rng)
+        if places:
+            change(draw, *places[draw(place_in(len(places)))])
     return tree
 
 
 def _places(tree: Tree) -> list[tuple[Tree, Any]]:
     """Every place a value stands at: what holds it, and under which key."""
     found: list[tuple[Tree, Any]] = []
-    left = [tree]
-    while left:
-        owner = left.pop()
-        keys = list(owner) if isinstance(owner, dict) else range(min(len(owner), 50))
-        for key in keys:
+    waiting = [tree]
+    while waiting:
+        owner = waiting.pop()
+        for key in list(owner) if isinstance(owner, dict) else range(min(len(owner), 50)):
             found.append((owner, key))
             if isinstance(owner[key], dict | list):
-                left.append(owner[key])
+                waiting.append(owner[key])
     return found
 
 
-def _replace(owner: Tree, key: Any, rng: Rng) -> None:
-    owner[key] = odd_value(rng)
+def _replace(draw: Draw, owner: Tree, key: Any) -> None:
+    owner[key] = draw(odd_values)
 
 
-def _move(owner: Tree, key: Any, rng: Rng) -> None:
+def _move(draw: Draw, owner: Tree, key: Any) -> None:
     value = owner[key]
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    owner[key] = moved_number(value, rng) if is_number else odd_value(rng)
+    owner[key] = draw(moved_numbers(value) if is_number else odd_values)
 
 
-def _remove(owner: Tree, key: Any, _rng: Rng) -> None:
+def _remove(_draw: Draw, owner: Tree, key: Any) -> None:
     del owner[key]
 
 
-def _rename(owner: Tree, key: Any, rng: Rng) -> None:
+def _rename(draw: Draw, owner: Tree, key: Any) -> None:
     if isinstance(owner, dict):
-        name = HOSTILE[rng.integers(len(HOSTILE))] if rng.random() < 0.5 else f"{key}s"
-        owner[name] = owner.pop(key)
+        owner[draw(hostile_texts | st.just(f"{key}s"))] = owner.pop(key)
 
 
-def _repeat(owner: Tree, key: Any, rng: Rng) -> None:
+def _repeat(draw: Draw, owner: Tree, key: Any) -> None:
     """The same once more, or a list grown long with values of its kind."""
     if isinstance(owner, list):
         owner.insert(key, deepcopy(owner[key]))
     elif isinstance(owner[key], list) and all(isinstance(value, float) for value in owner[key]):
-        owner[key] = [float(value) for value in 1.0 + np.arange(rng.integers(2, 400))]
+        owner[key] = [1.0 + number for number in range(draw(st.integers(2, 400)))]
     else:
         owner[f"{key}2"] = deepcopy(owner[key])
 
 
-def _wrap(owner: Tree, key: Any, rng: Rng) -> None:
-    owner[key] = [owner[key]] if rng.random() < 0.5 else {"a": owner[key]}
+def _wrap(draw: Draw, owner: Tree, key: Any) -> None:
+    owner[key] = [owner[key]] if draw(st.booleans()) else {"a": owner[key]}
 
 
-def _exchange(owner: Tree, key: Any, rng: Rng) -> None:
-    keys = list(owner) if isinstance(owner, dict) else list(range(len(owner)))
-    other = keys[rng.integers(len(keys))]
+def _exchange(draw: Draw, owner: Tree, key: Any) -> None:
+    other = draw(st.sampled_from(list(owner) if isinstance(owner, dict) else range(len(owner))))
     owner[key], owner[other] = owner[other], owner[key]
 
 
-CHANGES: tuple[Callable[[Tree, Any, Rng], None], ...] = (
-    _replace, _move, _remove, _rename, _repeat, _wrap, _exchange
+_CHANGES: tuple[Callable[[Draw, Tree, Any], None], ...] = (
+    _move, _move, _move, _replace, _replace, _remove, _repeat, _exchange, _rename, _wrap,
 )  # fmt: skip
-_WEIGHTS = (0.25, 0.35, 0.1, 0.05, 0.1, 0.05, 0.1)

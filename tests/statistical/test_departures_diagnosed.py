@@ -20,7 +20,7 @@ TOGETHER = (
     "both_sides densities_differ speeds_unpaired other_springs noise_differs durations_differ zeros_differ"
 )
 BROKEN = [*((name,) for name in DEPARTURES), tuple(TOGETHER.split()), ("rates_differ", "durations_differ")]
-QUICK = (tuple(TOGETHER.split()), ("rates_differ", "durations_differ"))  # most departures at once
+QUICK = (tuple(TOGETHER.split()),)  # most departures at once
 CASES = [pytest.param(names) if names in QUICK else slow(names) for names in BROKEN]
 
 
@@ -53,7 +53,7 @@ def test_a_single_cause_is_named(names, cause):
     assert answer.causes == (cause,)
 
 
-@pytest.mark.parametrize("form", range(5))
+@pytest.mark.parametrize("form", [0, slow(1), slow(2), slow(3), 4])
 @pytest.mark.parametrize(
     "names",
     [pytest.param(()), slow(("sample_rate",)), slow(("rates_differ", "durations_differ"))],

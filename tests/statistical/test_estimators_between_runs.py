@@ -18,6 +18,7 @@ from tests.marks import slow
 from tests.reference.free_decays import Setting, Truth, campaign
 from tests.reference.scattering import THREE_SPRINGS, USUAL, scattering
 
+pytestmark = pytest.mark.usefixtures("unexamined")
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 FALSE_ALARM = 1e-3  # of one verdict on four quantities
 TRIALS = 100

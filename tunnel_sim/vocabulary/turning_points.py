@@ -48,20 +48,20 @@ def are_turning_points(time_s: Array, angle: Array) -> bool:
     """Whether every reading of a table is on the other side of the one before, as its turning points are.
 
     Args:
-        time_s: increasing, shape (n,), s.
+        time_s: not decreasing, shape (n,), s.
         angle: shape (n,).
     """
     if time_s.size < LEAST:
         return False
     swings, steps = np.diff(angle), np.diff(time_s)
-    halves = steps / np.median(steps)
-    sizes = np.abs(swings)
-    if not (sizes > 0.0).all() or (np.sign(swings[1:]) == np.sign(swings[:-1])).any():
+    sizes, step = np.abs(swings), np.median(steps)
+    if not ((sizes > 0.0).all() and step > 0.0) or (np.sign(swings[1:]) == np.sign(swings[:-1])).any():
         return False
-    ratio = sizes[1:] / sizes[:-1]
-    whole = np.round(halves)  # a turning point may be missing on either side, two at a time
-    even = np.abs(halves - whole) <= _MISSED
-    return bool((ratio < _GROWS).all() and (ratio > _SHRINKS).all() and (even & (whole % 2.0 == 1.0)).all())
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size, which a motion has not
+        ratio, halves = sizes[1:] / sizes[:-1], steps / step
+        whole = np.round(halves)  # a turning point may be missing on either side, two at a time
+        even = (np.abs(halves - whole) <= _MISSED) & (whole % 2.0 == 1.0)
+    return bool((ratio < _GROWS).all() and (ratio > _SHRINKS).all() and even.all())
 
 
 class HoldsTurningPoints(TunnelError):

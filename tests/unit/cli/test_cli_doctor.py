@@ -13,7 +13,7 @@ import pytest
 
 from diagnosis import diagnose
 from identification import identify
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.commands import about
 from tunnel_lab.commands.about import SCHEMAS, schema_of
 from tunnel_sim.effects import effect_class

@@ -129,6 +129,7 @@ def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
     assert mass == pytest.approx(document["coefficients"]["after"]["yaw_inertia"]["value"])
 
 
+@pytest.mark.slow
 def test_the_control_of_a_robots_joint_from_its_folder(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,7 @@ from identification import estimators, identify, make_estimator, register_estima
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments import breakdown, runner, score_trials
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score_grid import load_grid
@@ -105,6 +105,9 @@ noise = [0.005]
 duration = [3.0]
 sample_rate = 200.0
 """
+ONE_CASE = SMALL.partition('[[effects]]\nname = "coulomb_friction"')[0].replace(
+    "replicates = 2", "replicates = 1"
+).replace("[0.0002, 0.002]", "0.002")  # fmt: skip
 RAISED = 'own_method.py", line 24, in one_of\n    return runs["first"]'
 
 
@@ -121,7 +124,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The current folder, with a module, a grid and a sweep."""
     (tmp_path / "own_method.py").write_text(MODULE, encoding="utf-8")
     (tmp_path / "grid.toml").write_text(GRID, encoding="utf-8")
-    (tmp_path / "small.toml").write_text(SMALL.replace("[0.002, 0.02]", "0.002"), encoding="utf-8")
+    (tmp_path / "small.toml").write_text(ONE_CASE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

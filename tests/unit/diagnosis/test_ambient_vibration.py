@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter, lsim
+from scipy.signal import lfilter
 
 from diagnosis.search.process_noise import is_of_reading, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.steady_noise import is_a_line
+from tests.marks import slow
+from tests.reference.linear_rig import response
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -50,7 +52,7 @@ def shaken(
 ) -> Campaign:
     """Every run under a random moment of first order about a centre, in N m or in proportion to the pressure.
 
-    The nominal model is linear, so that the response is added; it is that of SciPy, at eight steps a sample.
+    The nominal model is linear, so that the response is added, at eight steps a sample.
     """
     rng, runs = np.random.default_rng(seed), []
     step = INTERVAL / 8
@@ -64,8 +66,8 @@ def shaken(
         pole = np.exp(2.0 * np.pi * (1j * centre - bandwidth) * step)
         white = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
         given = std * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], white))
-        response = lsim(([1.0 / INERTIA], [1.0, damping / INERTIA, stiffness / INERTIA]), given, time)[1][::8]
-        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response)))
+        angle = response(given, step, INERTIA, damping, stiffness)[::8]
+        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle)))
     return replace(data, runs=tuple(runs))
 
 
@@ -90,6 +92,7 @@ def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> 
     assert len(answer.process.runs) == len(CONDITIONS)
 
 
+@pytest.mark.slow
 def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
     assert answer.effects == ("buffeting",)
@@ -102,6 +105,7 @@ def test_both_at_once_are_one_spectrum_with_a_part_of_each() -> None:
     assert answer.effects == ("ambient_vibration", "buffeting")
 
 
+@pytest.mark.slow
 def test_runs_in_one_wind_cannot_tell_them_apart() -> None:
     found = answers(shaken(of(ONE_WIND), ONE_WIND, moment=0.03))
     assert {answer.effects for answer in found} == {("ambient_vibration",), ("buffeting",)}
@@ -117,6 +121,7 @@ def test_of_two_kinds_that_the_runs_cannot_tell_apart_the_one_that_may_be_named_
         assert answer.kinds == (kind,)
 
 
+@pytest.mark.slow
 def test_without_wind_it_is_the_surroundings() -> None:
     (answer,) = answers(shaken(of(STILL), STILL, moment=0.02))
     assert answer.effects == ("ambient_vibration",)
@@ -127,7 +132,7 @@ def test_without_a_random_moment_none_is_named(conditions: Sequence[tuple[float,
     assert answers(of(conditions)) == []
 
 
-@pytest.mark.parametrize("conditions", [CONDITIONS, STILL, STILL[:1]])
+@pytest.mark.parametrize("conditions", [slow(CONDITIONS), slow(STILL), STILL[:1]])
 def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, float]]) -> None:
     """The law is not offered as a cause; of one run it is predicted from stretch to stretch."""
     for missing in (
@@ -139,7 +144,7 @@ def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, flo
         assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
 
 
-@pytest.mark.parametrize("bandwidth", [0.05, 5.0])
+@pytest.mark.parametrize("bandwidth", [slow(0.05), 5.0])
 def test_noise_of_the_reading_is_no_random_moment(bandwidth: float) -> None:
     """Truth: noise of first order added to the readings, a zero that wanders or a sensor's coloured noise."""
     rng, runs, data = np.random.default_rng(8), [], of(STILL)

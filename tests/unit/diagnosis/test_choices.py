@@ -93,6 +93,7 @@ def test_the_first_step_is_to_tell_the_springs_apart(study):
     )
 
 
+@pytest.mark.slow
 def test_a_third_spring_leaves_no_choice():
     off = effect_from(NAME, {"spring_stiffness": 44.84, "error": 0.02})
     study = investigate(campaign(off, conditions=(*CONDITIONS, (30.0, 0.0), (30.0, 25.0))), KINDS)

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [
-        (None, {}),
+        pytest.param(None, {}, marks=pytest.mark.slow),
         pytest.param("cubic_stiffness", {"coefficient": -1.0}, marks=pytest.mark.slow),
         pytest.param("quadratic_damping", {"coefficient": 0.02}, marks=pytest.mark.slow),
         ("coulomb_friction", {"friction_moment": 0.02}),

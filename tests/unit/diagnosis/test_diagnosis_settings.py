@@ -82,13 +82,13 @@ def reads(tree, names, owner=""):
         yield from reads(node, names, inner)
 
 
-@pytest.mark.parametrize("name", FIELDS)
-def test_a_setting_says_what_it_decides_and_where_it_comes_from(name):
-    about = FIELDS[name].metadata
-    assert about["meaning"].endswith(".")
-    assert about["unit"]
-    assert about["origin"] in get_args(Origin)
-    assert about["origin"] != "estimated" or about["why"]
+def test_a_setting_says_what_it_decides_and_where_it_comes_from():
+    for name, setting in FIELDS.items():
+        about = setting.metadata
+        assert about["meaning"].endswith("."), name
+        assert about["unit"], name
+        assert about["origin"] in get_args(Origin), name
+        assert about["origin"] != "estimated" or about["why"], name
 
 
 def test_every_setting_is_read_by_one_decision():

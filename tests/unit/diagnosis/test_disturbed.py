@@ -23,6 +23,7 @@ from diagnosis.where.jumps import Jumps, jumps
 from diagnosis.words.verdict import headline, next_steps, verdict
 from identification.examination.examine import examine
 from identification.status import Outcome
+from tests.marks import slow
 from tests.unit.diagnosis_document import document
 from tests.unit.gap_campaigns import campaign, nominal, with_blow
 from tunnel_reference.disturbance import FORMS
@@ -92,10 +93,10 @@ def test_a_blow_to_every_run_accuses_none() -> None:
     ("name", "values"),
     [
         ("coulomb_friction", {"friction_moment": 0.01}),
-        ("cubic_stiffness", {"coefficient": 0.5}),
+        slow("cubic_stiffness", {"coefficient": 0.5}),
         ("dropped_samples", {"lost_time": 0.01}),
-        ("second_mode", {"amplitude": 0.005, "frequency": 25.0, "damping_ratio": 0.01}),
-        ("free_play", {"half_width": 0.004}),
+        slow("second_mode", {"amplitude": 0.005, "frequency": 25.0, "damping_ratio": 0.01}),
+        slow("free_play", {"half_width": 0.004}),
         ("sensor_clipping", {"limit": 0.25}),
     ],
 )
@@ -164,6 +165,7 @@ def test_a_blow_soon_after_the_release_leaves_the_run_out() -> None:
     assert found.at_s == pytest.approx(1.6, abs=0.2)
 
 
+@pytest.mark.slow
 def test_the_causes_beside_a_blow_are_those_planted() -> None:
     data = read_campaign(FOREIGN / "disturbed")
     found = diagnose(data, kinds=FEW).to_json_dict()

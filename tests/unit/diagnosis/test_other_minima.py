@@ -14,6 +14,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
+from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference.conditions import Conditions, Input, Rod
 from tunnel_reference.draw import CampaignDraw
@@ -57,7 +58,9 @@ def fitted_from(problem: Problem, compliance: float, share: float) -> Fit:
     return fit(problem, Point(np.append(start.common, [compliance, share]), start.release))
 
 
-@pytest.mark.parametrize(("driven", "start"), [(False, 0.05), (False, 0.3), (True, 0.04), (True, 0.25)])
+@pytest.mark.parametrize(
+    ("driven", "start"), [(False, 0.05), slow(False, 0.3), slow(True, 0.04), slow(True, 0.25)]
+)
 def test_the_share_is_found_from_a_start_that_leads_to_another_minimum(driven: bool, start: float) -> None:
     compliance, share = 1.1e-4, 0.16
     given = problem(compliance, share, driven=driven)

@@ -34,7 +34,7 @@ def two_off():
     drawn = draw_campaign(np.random.default_rng(1), kind="none", mixture=Mixture(variety=0.0))
     stated = drawn.conditions.spring_stiffness
     scale = 1.0 + np.array(ERRORS)[np.unique(stated, return_inverse=True)[1]]
-    moved = replace(drawn, conditions=replace(drawn.conditions, duration=8.0, stiffness_scale=scale))
+    moved = replace(drawn, conditions=replace(drawn.conditions, duration=5.0, stiffness_scale=scale))
     return as_campaign(simulate_set([moved])[0], "two-springs")
 
 

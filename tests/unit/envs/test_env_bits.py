@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from env_episodes import NAME, episode, make, same
 
+from tests.marks import slow
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.mechanics import SpringMiscalibration
 from tunnel_sim.engine.simulate import simulate
@@ -106,7 +107,7 @@ def transitions(envs: Any, preset: str, steps: int) -> dict[str, list[Any]]:
     return kept
 
 
-@pytest.mark.parametrize("preset", ["plain", "operator"])
+@pytest.mark.parametrize("preset", [slow("plain"), "operator"])
 def test_native_sync_and_async_agree_to_the_bit_through_resets(preset: str) -> None:
     # runs of every layout, drawn anew thrice; the operator's random moments end some of them early
     arguments = {"preset": preset, "duration": 0.1, "effect_probability": 0.9, "moment_limit": 600.0}

@@ -15,7 +15,7 @@ from identification.estimators.matrix_pencil import MatrixPencil
 from tests.marks import slow
 from tunnel_sim import Campaign, TunnelError
 
-QUICK = ("output_error", "conventional", "matrix_pencil", "neural_posterior", "frequency_response")
+QUICK = ("conventional", "frequency_response")
 
 
 @pytest.mark.parametrize("name", [name if name in QUICK else slow(name) for name in SUMMARIES])

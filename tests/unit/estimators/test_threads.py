@@ -13,7 +13,7 @@ import sys
 import numpy as np
 from identification import identify
 from tests.reference.free_decays import Setting, campaign
-settings = [Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0)]
+settings = [Setting(spring, speed) for spring in (16.12,) for speed in (0.0, 15.0)]
 data = campaign(settings, duration=11.0, rate=1000.0, noise=5e-4, rng=np.random.default_rng(1))
 for name in sys.argv[1:]:
     print(identify(data, name, throw=False).to_json_dict())

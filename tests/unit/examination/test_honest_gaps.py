@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.examination import NOT_SLIPS, questioned_by
+from tests.marks import slow
 from tests.unit.gap_campaigns import campaign
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, simulate_set
@@ -26,7 +27,7 @@ def test_no_effect_is_taken_for_a_slip(kind: type[Effect]):
     assert set(questioned_by(campaign(kind(*kind.example)))) <= NOT_SLIPS
 
 
-@pytest.mark.parametrize("kind", _SCATTERING, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", [_SCATTERING[0], *map(slow, _SCATTERING[1:])], ids=lambda kind: kind.name)
 def test_no_scatter_is_taken_for_a_slip(kind: type[Effect]):
     """Of five times the typical width, which is 1.5 % of the speed and 5 % of the damping, and so of less."""
     info, paper = kind.parameters()[0], paper_plan()

@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
+from tests.marks import slow
 from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packaged_breakdown
 from tunnel_lab.experiments.score_drawing import cell_labels, score_figure
 from tunnel_lab.experiments.score_grid import Cell, Grid
@@ -115,7 +116,7 @@ def texts_of(fig: Figure) -> list[Bbox]:
     return [box for box in found if box.width > 0.0]
 
 
-@pytest.mark.parametrize("count", [1, 2, 9])
+@pytest.mark.parametrize("count", [slow(1), slow(2), 9])
 def test_nothing_overlaps_or_is_cut_off(count: int) -> None:
     """One decay cell, one campaign cell and one whose effects have long names; warnings are errors."""
     decay = Cell("decay", 0.005, 3.0, 0.35, 200.0, 0.0, zeta=0.01, frequency=3.0)

@@ -320,5 +320,5 @@ def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypat
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
     with pytest.raises(TunnelError, match="Chromium could not print"):
-        write_summary(document, data, tmp_path / "summary.pdf")
+        write_summary(document | {"maps": None}, data, tmp_path / "summary.pdf")
     assert not (tmp_path / "summary.pdf").exists()

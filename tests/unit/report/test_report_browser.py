@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
@@ -367,7 +368,7 @@ def summary(change: Callable[[Any], None]) -> str:
     return render_report(given, campaign(), summary=True)
 
 
-@pytest.mark.parametrize("change", [lambda _: None, crowded, without_causes])
+@pytest.mark.parametrize("change", [slow(lambda _: None), crowded, slow(without_causes)])
 def test_the_summary_is_one_printed_page_well_filled(browser: Any, tmp_path: Path, change: Any) -> None:
     (tmp_path / "summary.html").write_text(summary(change), encoding="utf-8")
     page = browser.new_page()

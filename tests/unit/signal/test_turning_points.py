@@ -93,3 +93,10 @@ def test_records_and_noise_are_not_turning_points() -> None:
     given = points(1)
     assert are_turning_points(given.time_s[:LEAST], given.angle_rad[:LEAST])
     assert not are_turning_points(given.time_s[: LEAST - 1], given.angle_rad[: LEAST - 1])
+
+
+@pytest.mark.parametrize(
+    "time_s", [np.full(20, 2e93), np.arange(20.0) * 5e-324 + 1e300 * (np.arange(20) > 18)]
+)
+def test_times_that_no_clock_gives_are_not_turning_points(time_s: Array) -> None:
+    assert not are_turning_points(time_s, 1e300 * (-1.0) ** np.arange(20))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments.sweep import ONE_THREAD
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 

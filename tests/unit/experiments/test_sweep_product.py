@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 import tomli_w
 
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments.sweep import run_shard
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_summary import lines_of
@@ -194,6 +194,7 @@ parameters.friction_moment = 0.002
 """
 
 
+@pytest.mark.usefixtures("unexamined")
 def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
     """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
     (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")

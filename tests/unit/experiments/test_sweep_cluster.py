@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.sweep.small_sweep import contents
+from tests.unit.experiments.small_sweep import contents
 from tunnel_lab.cli import main
 from tunnel_lab.experiments.runner import on_cluster
 from tunnel_lab.experiments.sweep import run_sweep

@@ -15,8 +15,8 @@ import polars as pl
 import pytest
 
 from tests.marks import slow
+from tests.unit.experiments.small_sweep import SMALL
 from tests.unit.gone_reader import unheard
-from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_summary
 from tunnel_lab.experiments.sweep import RESULT_COLUMNS, SCATTER_COLUMNS, run_sweep

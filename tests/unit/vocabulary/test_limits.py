@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.sweep.small_sweep import SMALL
+from tests.unit.experiments.small_sweep import SMALL
 from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
 from tunnel_lab.experiments.score_trials import score_grid
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
@@ -24,7 +24,7 @@ from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "reference" / "limits.md"
 PLAN = """
 name = "p"

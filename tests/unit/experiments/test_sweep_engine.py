@@ -16,8 +16,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from tests.unit.experiments.small_sweep import SMALL, contents
 from tests.unit.killed import names_of_the_dead
-from tests.unit.sweep.small_sweep import SMALL, contents
 from tunnel_lab.experiments import sweep as engine
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
