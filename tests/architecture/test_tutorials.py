@@ -38,7 +38,7 @@ def printed(codes: list[str], folder: Path) -> list[str]:
         ("measured-records", 3),
         ("a-model-of-your-own", 4),
         ("the-papers-networks", 7),
-        ("a-driven-rig", 5),
+        ("a-driven-rig", 6),
     ],
 )
 def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> None:

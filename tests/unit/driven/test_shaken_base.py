@@ -140,6 +140,19 @@ def test_the_rotation_of_the_base_gives_inertia_and_damping(turning: Campaign, e
     assert not any("gain" in remark.what for remark in found.remarks)
 
 
+def test_readings_of_the_rate_give_the_same(turning: Campaign) -> None:
+    runs = []
+    for seed, run in enumerate(turning.runs):
+        clean = shaken(TURNS, seed, SPRINGS[seed % 2], noise=0.0).record.yaw_rad
+        noise = 10.0 * NOISE * np.random.default_rng(seed).standard_normal(TIME.size)
+        runs.append(replace(run, record=Record(TIME, np.gradient(clean, TIME, edge_order=2) + noise)))
+    rates = replace(turning, runs=tuple(runs), sensor=SensorProperties(sample_rate=RATE, quantity="rate"))
+    found = identify(rates)
+    assert found.yaw_inertia is not None
+    # A central difference makes the rate smaller by (ωh)²/6, at the fastest line by 8 in 10,000.
+    assert abs(found.yaw_inertia.value / INERTIA - 1.0) < 1e-3
+
+
 def test_its_standard_deviations_are_those_of_the_bound(turning: Campaign) -> None:
     found = identify(turning)
     bound = campaign_bound(
