@@ -410,7 +410,9 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         headline(one)[0]
         == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
     )
-    said_once = "and either an error of one of the two springs (58 %) or gravity stiffness (40 %): the"
+    said_once = (
+        "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). They act on the"
+    )
     assert said_once in verdict(one, "")
     one["candidates"][2:] = [
         {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},
