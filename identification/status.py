@@ -148,7 +148,7 @@ def left_out_as_asked(ids: Collection[str]) -> tuple[Remark, ...]:
     if not ids:
         return ()
     remedy = f"repeat the run{'s' if len(ids) > 1 else ''}"
-    return (Remark(Outcome.LEFT_OUT, tuple(ids), "left out, as asked", remedy),)
+    return (Remark(Outcome.LEFT_OUT, tuple(ids), "left out on request", remedy),)
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,9 @@ def campaign_folders(folder: Path) -> list[Path]:
     found = sorted(path.parent for path in folder.glob(f"*/{_CAMPAIGN}"))
     if not found:
         raise TunnelError(
-            "holds no campaign", where=str(folder), remedy="make a set first: tunnel blind make FOLDER"
+            "does not contain a campaign",
+            where=str(folder),
+            remedy="make a set first: tunnel blind make FOLDER",
         )
     return found
 

@@ -1,1 +1,1 @@
-"""The runs as fits see them, and the nominal models: one type for each kind of rig, chosen once."""
+"""Runs as the fits see them, and one nominal model for each kind of rig."""

@@ -64,7 +64,7 @@ class Chance:
         return replace(self, width=float(width))
 
     def change(self, stated: SettingsTable, data: Data) -> Array:
-        """What a relative deviation of 1 changes.
+        """The changes by a relative deviation of 1.
 
         Args:
             stated: the nominal physics of the runs.
@@ -85,7 +85,7 @@ _KEEPING_TIME = tuple(kind.keeps_time for kind in ALL_EFFECTS if kind.keeps_time
 
 
 class RunDeparture(Effect):
-    """What a run's own deviations change of its motion; no effect of the vocabulary, and the last of a chain."""
+    """The change of a run's motion by its own deviations: not an effect of the vocabulary, and last in a chain."""
 
     name = "run_departure"
 
@@ -119,7 +119,7 @@ Scatter = tuple[Chance, ...]
 
 
 def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTable, data: Data) -> Array:
-    """What the deviations of runs change.
+    """The changes by the deviations of runs.
 
     Args:
         deviations: relative, by run one for each chance difference, shape (runs, differences).

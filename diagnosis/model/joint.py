@@ -41,7 +41,7 @@ _SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughou
 
 @dataclass(frozen=True)
 class _OfLaw(NominalModel):
-    """What every joint with a law has.
+    """The common part of all joints with a law.
 
     Args:
         law: of the similar campaign, as all values.
@@ -53,7 +53,7 @@ class _OfLaw(NominalModel):
 
     @property
     def held(self) -> Mapping[str, float]:
-        """What the model holds, and how the user wants it."""
+        """The values fixed by the model, and by the user."""
         return self.law.held
 
     def similar(self, change: Similarity) -> NominalModel:
@@ -209,7 +209,7 @@ class Joint(_OfLaw, Rig):
         return *own, *Rig.coefficient_units
 
     def unseen(self, data: Data) -> Sequence[str]:
-        """What one spring does not show."""
+        """The limits of a single spring."""
         if data.driven:
             return ("structural as opposed to viscous damping: there is one spring only",)
         return super().unseen(data)
@@ -293,7 +293,7 @@ def reach(campaign: Campaign) -> float:
 
 
 def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
-    """What the records say of the motion of a joint: where it moves, and whether a control drives it.
+    """The motion of a joint by its records: its range, and whether a control drives it.
 
     Args:
         actuator: its name; None: the only one of the joint.

@@ -68,7 +68,7 @@ class LooseBody(NominalModel):
         """
         if any(run.input_gain is None for run in campaign.runs):
             raise TunnelError(
-                "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
+                "without a spring, inertia and moments cannot be identified when the gain is unknown",
                 where=campaign.name,
                 remedy="state drive_gain, or record the moment as moment_nm",
             )

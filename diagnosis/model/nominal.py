@@ -1,4 +1,4 @@
-"""What a nominal model is: the parameters, equations, starting points, coefficients and sentences of a kind of rig.
+"""Nominal models: the parameters, equations, starting points, coefficients and sentences of a kind of rig.
 
 One type describes one kind of rig, in one file. It is chosen once for a campaign, and nothing else in the package
 asks which kind it is.
@@ -389,7 +389,7 @@ class NominalModel:
     # ---- what its runs cannot show, and what to do next ----
 
     def blind_spots(self, data: Data) -> tuple[str, ...]:
-        """What these runs cannot show: clauses, those that apply to every campaign last."""
+        """The limits of these runs, as clauses; those of every campaign are last."""
         speeds = {run.wind_speed for run in data.runs if run.wind_on}
         found = [*self.unseen(data)]
         if not data.wind_on:

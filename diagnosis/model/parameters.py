@@ -22,7 +22,7 @@ Owner = Literal["common", "per_run"]
 
 
 class Named(Protocol):
-    """What has a name."""
+    """An object with a name."""
 
     @property
     def name(self) -> str:
@@ -31,7 +31,7 @@ class Named(Protocol):
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a run's own parameter before its record: a normal distribution.
+    """Prior of a run's own parameter: a normal distribution.
 
     Args:
         std: its standard deviation, in the parameter's unit.
@@ -205,7 +205,7 @@ class ParameterSet:
 
 
 def released(zero: Parameter | None = None) -> Iterable[Parameter]:
-    """What every run has of its own: its release, and its sensor's zero where each run has one.
+    """The own parameters of every run: its release, and its sensor's zero where each run has one.
 
     The angle (rad) and the rate (rad/s) are those of the sensor's end at the start of what is fitted.
     """

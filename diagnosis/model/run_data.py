@@ -137,7 +137,7 @@ class RunData:
     shorter: Array | None = field(default=None, repr=False)
 
     def merged(self, count: int) -> RunData:
-        """The run in blocks that are each so many of its own, without what is left at its end.
+        """The run in longer blocks, each made of several of its own; a remainder at the end is dropped.
 
         Its samples are evenly spaced, and its noise is white.
         """
@@ -170,7 +170,7 @@ class RunData:
 
     @property
     def conditions(self) -> tuple[object, ...]:
-        """What the moment law and its integration depend on: spring, wind, sampling and input."""
+        """The dependencies of the moment law and its integration: spring, wind, sampling and input."""
         free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
         return free if self.drive is None else (*free, id(self.drive), self.start)
 

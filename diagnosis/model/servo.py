@@ -45,7 +45,7 @@ def _commanded(run: Run) -> bool:
 
 @dataclass(frozen=True)
 class _OfServo(NominalModel):
-    """What servos of known and of unknown gain share.
+    """The common part of servos of known and unknown gain.
 
     Args:
         kv: of the servo, N m s/rad; the damping that is fitted comes beside it.

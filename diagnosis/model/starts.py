@@ -1,4 +1,4 @@
-"""What records show of a motion before any fit: frequencies, losses and gains of the runs, each by itself."""
+"""Motions as the records show them before any fit: frequencies, losses and gains of the runs, each by itself."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What the runs show, each by itself.
+    """The quantities shown by the runs, each by itself.
 
     Args:
         squares: angular frequency squared, shape (runs,), 1/s².
@@ -47,7 +47,7 @@ class Shown:
 
     @classmethod
     def of(cls, data: Data, squares: list[float] | None = None) -> Shown:
-        """What the runs of a campaign show.
+        """The quantities shown by the runs of a campaign.
 
         Args:
             squares: of the runs, where they are known, 1/s²; else they are those of their spectra, or of a driven

@@ -175,7 +175,7 @@ def advice(document: Document, name: str) -> str:
     """What to do about a cause, with the values that it names, without a full stop."""
     said = {kind.name: kind.advice for kind in known_effects()}.get(name)
     if not said:
-        return f"Repair or model what {plain(name)} stands for"
+        return f"Repair or model the cause of {plain(name)}"
     values = _parameters(document["candidates"][0], name)
     shown = {full: f"{one['value']:.4g} {unit_mark(one['unit'])}" for full, one in values.items()}
     for full, text in shown.items():

@@ -79,7 +79,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "moments are per unit inertia. State it, or leave out the runs with another spring: a different spring looks "
     "like a gap.",
     "floor": "The records contain almost no noise ({records_rad:1}). The accuracy of the fits, "
-    "{fits_rad:1}, stands in for it, and a smaller gap is not detected. Add sensor noise to simulated "
+    "{fits_rad:1}, is used instead, and a smaller gap is not detected. Add sensor noise to simulated "
     "records.",
     "less noise than stated": f"{_NOISE}. The answer is based on the noise found in the records; correct noise_std "
     "or leave it out.",
@@ -117,7 +117,7 @@ CAUTIONS: Mapping[str, Sentence] = {
 NOISE: Mapping[str, Sentence] = {
     "coloured": "it is coloured, {std_rad:3} in all",
     "floor": "the records contain {std_rad:1}, in {fewer} of {runs} runs less than the accuracy of the fits, "
-    "which stands in for it",
+    "which is used instead",
     "not stated": "the campaign states no noise",
     "agrees": "the records agree: {std_rad:3} ± {uncertainty_rad:1}",
     "contradicts": "the records contradict the stated {stated_rad:3}: they contain {std_rad:3} ± "

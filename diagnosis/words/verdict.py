@@ -130,7 +130,7 @@ def _answer(document: Document, rest: str) -> str:
         said = (
             "no effect is named as its cause"
             if nearly
-            else "none of the effects that are tried explains it (tunnel effects lists them)"
+            else "no effect of the vocabulary explains it (tunnel effects lists them)"
         )
         return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
     proper = without_scatter(causes)
@@ -144,10 +144,9 @@ def _answer(document: Document, rest: str) -> str:
         wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
         wind = wind if found["both_winds"] else ""
         sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
-    said = (
-        f"The gap ({size}) comes {'only in part ' if document['rest']['material'] else ''}"
-        f"from {from_causes(document)}: {'; '.join(sources)}."
-    )
+    part = "only in part " if document["rest"]["material"] else ""
+    they_act = "They act on" if len(proper) > 1 else "It acts on"
+    said = f"The gap ({size}) is explained {part}by {from_causes(document)}. {they_act} {'; '.join(sources)}."
     with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
     if len(causes) > len(proper):
         with_all = f"With {'them' if len(proper) > 1 else 'it'} added and these differences allowed for,"
@@ -192,7 +191,7 @@ def _nearly(found: Mapping[str, Any]) -> str:
     """The effects that explain most of a gap without being named, and the reason."""
     said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of it"
     if found["noisy"]:
-        return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
+        return f"{said}, but the noise misbehaves and may explain so small a gap."
     said = f"{said} (probability {probability(found['probability'])})"
     if found["rival"]:
         return f"{said}, and {plain(*found['rival'])} as much ({probability(found['rival_probability'])})."
@@ -221,7 +220,7 @@ def _disturbed(found: Mapping[str, Any]) -> str:
     kept = found["kept_until_s"]
     if found["used"]:
         why = "the other runs do not determine the model"
-        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used all the same: {why}."
+        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used nevertheless: {why}."
     without = "without this run" if kept is None else f"without its readings from {kept:.4g} s on"
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 
@@ -242,7 +241,7 @@ def _second_mode(found: Mapping[str, Any], unit: str) -> str:
         for mode in (found["main"], found["second"])
     )
     return (
-        f"{found['run']} contains a second mode: {second}, beside {main}. With it, what one free decay leaves "
+        f"{found['run']} contains a second mode: {second}, beside {main}. With it, the residual of one free decay "
         f"falls by {100.0 * found['closes']:.0f} %. A rig with one degree of freedom has one "
         f"mode: look for another motion, such as heave or the mount's."
     )
@@ -255,7 +254,7 @@ def _choices(document: Document) -> str:
         return ""
     springs = [f"{_spring_off(one)} ({probability(one['probability'])})" for one in found]
     return (
-        f"{one_of_springs(document).capitalize()}, and these runs cannot tell which: {', or '.join(springs)}. The "
+        f"{one_of_springs(document).capitalize()}, and these runs do not show which: {', or '.join(springs)}. The "
         f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
     )
 
@@ -269,7 +268,7 @@ def choice_steps(document: Document) -> list[str]:
     springs = listed([f"{one:.4g}" for one in found])
     return [
         f"Add runs with a {further} spring, or measure the stiffness of {which} again ({springs} N m/rad): these "
-        "runs cannot tell which of them is off."
+        "runs do not show which of them is off."
     ]
 
 

@@ -142,7 +142,7 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
         tuple(each.id for each in runs if each.id in stated),
         f"with the wind off the springs of {soft:g} and {stiff:g} N m/rad give inertias that differ by "
         f"{with_std(100.0 * apart, 100.0 * std)} %: one of them is not as stiff as stated, or another moment, such "
-        "as gravity's, acts; two springs cannot tell which",
+        "as gravity's, acts; two springs do not show which",
         "add runs with a third spring, or measure the stiffness of both springs again",
     )
 

@@ -1,6 +1,6 @@
 """Which of the springs is off, on campaigns of the reference simulator with dry friction.
 
-Truth: one of two springs is 2 % off; two springs cannot tell which. With a third spring they can.
+Truth: one of two springs is 2 % off; two springs do not show which. With a third spring they can.
 """
 
 from dataclasses import replace
@@ -66,4 +66,4 @@ def test_a_third_spring_tells_which_one_is_off(wrong, seed):
 @pytest.mark.parametrize(("error", "said"), [(0.02, True), (-0.02, True), (0.0, False)])
 def test_identify_says_that_two_springs_disagree(error, said):
     found = identify(with_friction((16.12, 44.84), 1, error, 7))
-    assert any("cannot tell which" in one.what for one in found.remarks) == said
+    assert any("do not show which" in one.what for one in found.remarks) == said

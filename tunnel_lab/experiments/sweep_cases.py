@@ -439,7 +439,7 @@ def _check_cases(sweep: Sweep, where: str) -> None:
             text = json.dumps(physics, sort_keys=True)
             if text in seen:
                 remedy = "remove one, and use replicates for more runs"
-                raise TunnelError(f"{name} holds a value twice", where=where, remedy=remedy)
+                raise TunnelError(f"{name} contains a value twice", where=where, remedy=remedy)
             seen.add(text)
     # each value of the sensor, and each pair of scatter and effects, with every rig and conditions
     for beside in (("sensor",), ("scatter", "effects")):

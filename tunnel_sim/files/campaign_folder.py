@@ -355,7 +355,7 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
     entries = list(folder.iterdir())
     if entries and not (folder / CAMPAIGN_FILE).is_file():
         remedy = "choose another one, or empty it"
-        raise TunnelError("the folder holds no campaign", where=where, remedy=remedy)
+        raise TunnelError("the folder does not contain a campaign", where=where, remedy=remedy)
     # Files that the writer did not create belong to somebody: replacing the folder would delete them.
     own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
     strange = [p for p in entries if p.name not in own]

@@ -97,7 +97,7 @@ def checked_numbers(
         what = f"{name} = {values!r} has {counted(len(found), 'number')}, not {length}"
         raise EnvError(what, where=where, remedy=remedy)
     if length is None and (not found or len(set(found)) != len(found)):
-        raise EnvError(f"{name} = {values!r} is empty or holds a value twice", where=where, remedy=remedy)
+        raise EnvError(f"{name} = {values!r} is empty or contains a value twice", where=where, remedy=remedy)
     return found
 
 

@@ -56,7 +56,7 @@ def test_an_estimate_is_that_of_the_other_runs_and_says_so(spoilt: tuple[Campaig
     assert found.to_json_dict()["cn_beta"] == expected.to_json_dict()["cn_beta"]
     assert identify(whole).cn_beta != expected.cn_beta
     first, *others = found.remarks
-    assert (first.outcome, first.runs, first.what) == (Outcome.LEFT_OUT, (last,), "left out, as asked")
+    assert (first.outcome, first.runs, first.what) == (Outcome.LEFT_OUT, (last,), "left out on request")
     assert tuple(others) == expected.remarks
 
 
@@ -68,9 +68,9 @@ def test_a_diagnosis_is_that_of_the_other_runs_and_says_so(spoilt: tuple[Campaig
     assert found["provenance"].pop("left_out") == [last]
     assert expected["provenance"].pop("left_out") == []
     first, *others = found["remarks"]
-    assert (first["outcome"], first["runs"], first["what"]) == ("left out", [last], "left out, as asked")
+    assert (first["outcome"], first["runs"], first["what"]) == ("left out", [last], "left out on request")
     for document in (found, expected):
         document.pop("seconds")
     assert found | {"remarks": others} == expected
     shown = str(diagnose(whole, leave_out=(last,), kinds=kinds))
-    assert f"run {last}: left out, as asked" in shown
+    assert f"run {last}: left out on request" in shown

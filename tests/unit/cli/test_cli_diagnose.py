@@ -239,7 +239,7 @@ def test_runs_are_left_out(tunnel: Tunnel, gap_free: Path, tmp_path: Path, comma
     words = ("--leave-out", "r02", "--leave-out", "r04", "--json", file)
     status, out, _ = tunnel(command, gap_free, *words, *options)
     assert status == 0
-    assert "r02, r04: left out, as asked" in out
+    assert "r02, r04: left out on request" in out
     (asked,) = [one for one in json.loads(file.read_text())["remarks"] if one["outcome"] == "left out"]
     assert asked["runs"] == ["r02", "r04"]
     file.unlink()

@@ -333,7 +333,7 @@ def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypat
         (["make", "SET", "--seed", "1", "--kinds", "singel"], "did you mean 'single'?"),
         (["make", "SET", "--seed", "1"], "exists already"),
         (["make", "new", "--seed", "1", "--key", "no/key.json"], "its folder does not exist"),
-        (["diagnose", "nowhere"], "holds no campaign"),
+        (["diagnose", "nowhere"], "does not contain a campaign"),
         (["diagnose", "SET", "--exclude", "mains_hmu"], "did you mean 'mains_hum'?"),
         (["score", "SET"], "answer the set first"),
         (["score", "SET", "--markdown", "no/page.md"], "its folder does not exist"),

@@ -83,11 +83,11 @@ def test_the_first_step_is_to_tell_the_springs_apart(study):
     given["found"] |= {"choices": [asdict(one) | {"probability": 0.5} for one in springs]}
     assert next_steps(given)[0] == (
         "Add runs with a third spring, or measure the stiffness of both springs again (16.12 and 44.84 N m/rad): "
-        "these runs cannot tell which of them is off."
+        "these runs do not show which of them is off."
     )
     assert not any("Measure the stiffness of that spring" in step for step in next_steps(given))
     assert verdict(given, "").endswith(
-        "One of the two springs is off, and these runs cannot tell which: 16.12 N m/rad is 1.96 % softer than "
+        "One of the two springs is off, and these runs do not show which: 16.12 N m/rad is 1.96 % softer than "
         "stated (50 %), or 44.84 N m/rad is 2.00 % stiffer than stated (50 %). The coefficients are "
         "averaged over both."
     )

@@ -203,7 +203,7 @@ def test_records_without_noise_are_answered_with_a_status(effect, causes):
     document = checked(answer)
     assert list(document.causes) == causes
     assert answer.noise.source == "floor"
-    assert any("stands in for it" in text for text in answer.cautions)
+    assert any("is used instead" in text for text in answer.cautions)
     assert all(0.0 <= p <= 1.0 for p in answer.gap.tests.values())
     if not causes:
         assert answer.gap.p_value == 1.0

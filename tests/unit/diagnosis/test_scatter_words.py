@@ -38,8 +38,8 @@ def alone(given: Document) -> Document:
 def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document) -> None:
     text = verdict(given, "What remains is small.")
     assert (
-        "comes from quadratic damping (probability 91 %): the damping, with the wind on and off. Beside it"
-        in text
+        "is explained by quadratic damping (probability 91 %). It acts on the damping, with the wind on and off. "
+        "Beside it" in text
     )
     assert (
         "Beside it the runs differ by chance: the wind speed by 0.29 % (0.13 to 0.62 %), beta −0.6 % and gamma "
@@ -60,7 +60,7 @@ def test_scatter_alone_is_said_to_be_all(given: Document) -> None:
     assert (
         "The runs differ from each other by chance, and by nothing else (probability 91 %): the wind" in text
     )
-    assert "comes from" not in text
+    assert "is explained" not in text
     assert headline(given) == ("Scatter between runs", "found")
     given["rest"]["material"] = True
     assert "by nothing else" not in verdict(given, "")

@@ -78,7 +78,7 @@ def test_the_runs_of_the_closure_are_named(held_out, closed_on):
 def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
     # 0.002 rad · √2 = 0.16206°, over 0.1 rad 2.8 %
     words = "(0.162° root mean square, 2.8 % of the swing)"
-    assert f"The gap {words} comes from" in said("coulomb_friction")
+    assert f"The gap {words} is explained by" in said("coulomb_friction")
     assert f"There is a gap {words}" in said("unknown")
     found = gap(True).to_json_dict()["misfit"]
     assert found["before"] == pytest.approx(0.002 * 2.0**0.5)
@@ -136,7 +136,7 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
 
 def test_every_cause_of_several_is_named_with_what_it_acts_on():
     text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
-    assert "from coulomb friction, cubic stiffness and mains hum (probability 90 %)" in text
+    assert "by coulomb friction, cubic stiffness and mains hum (probability 90 %)" in text
     for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
         assert words in text
     assert "With them added" in text
@@ -152,7 +152,7 @@ def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
 
 def test_what_remains_and_is_material_is_said_in_the_first_sentence():
     first = said("coulomb_friction", material=True).partition(". ")[0]
-    assert "only in part from coulomb friction" in first
+    assert "only in part by coulomb friction" in first
     assert "in part" not in said("coulomb_friction")
     given = document()
     given["ambiguous_with"] = []
@@ -173,11 +173,11 @@ def test_below_one_half_no_set_is_named_as_the_cause():
     causes = ("coulomb_friction", "gravity_stiffness")
     text = said(*causes, answers=UNDECIDED)
     assert "its cause is undecided" in text
-    assert "comes from" not in text
+    assert "is explained" not in text
     assert "The likely answers contain coulomb friction (93 %)." in text
     assert "coulomb friction and gravity stiffness (35 %), " in text
     assert "with probability 93 % together" in text
-    assert "comes from" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
+    assert "is explained by" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
 
 
 def test_of_many_likely_answers_five_are_said_and_the_others_counted():
@@ -286,7 +286,7 @@ NEARLY = {
     [
         ({}, " (probability 30 %): too little to name it."),
         ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (20 %)."),
-        ({"noisy": True}, " of it, but the noise misbehaves and may be all of a gap as small as this."),
+        ({"noisy": True}, " of it, but the noise misbehaves and may explain so small a gap."),
         (
             {"misfit": ["zero", "harmonics"]},
             ", but leaves a significant misfit of the zero and the harmonics.",
@@ -297,7 +297,7 @@ def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(chang
     text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
     assert "no effect is named as its cause. Quadratic damping would explain 99.6 % of it" in text
     assert words in text
-    assert "none of the effects that are tried explains it (tunnel effects lists them)" in said("unknown")
+    assert "no effect of the vocabulary explains it (tunnel effects lists them)" in said("unknown")
 
 
 OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
@@ -399,7 +399,7 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         "or gravity stiffness (40 %)"
     )
     assert headline(one) == (words, "open")
-    assert f" of the swing) comes from {words}: the damping" in verdict(one, "")
+    assert f" of the swing) is explained by {words}. They act on the damping" in verdict(one, "")
     assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
     springs = (
@@ -410,7 +410,9 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         headline(one)[0]
         == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
     )
-    said_once = "and either an error of one of the two springs (58 %) or gravity stiffness (40 %): the"
+    said_once = (
+        "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). They act on the"
+    )
     assert said_once in verdict(one, "")
     one["candidates"][2:] = [
         {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},

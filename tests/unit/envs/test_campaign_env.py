@@ -233,7 +233,7 @@ def test_an_option_leaves_the_other_draws_as_they_are():
         ({"springs": (99,)}, "there is no spring 99"),
         ({"wind_speeds": (-1.0,)}, "wind_speeds"),
         ({"release_angles_deg": (0.0,)}, "release_angles_deg"),
-        ({"durations": (5.0, 5.0)}, "holds a value twice"),
+        ({"durations": (5.0, 5.0)}, "contains a value twice"),
         ({"durations": (float("nan"),)}, "durations"),
         ({"noise_std": 0.0}, "noise_std"),
         ({"sample_rate": 300.0}, "divide"),

@@ -62,7 +62,7 @@ def document(data):
     answer = Diagnosis(
         campaign="<script>alert(1)</script>",
         causes=(CAUSE,),
-        verdict="The gap comes from quadratic damping & nothing else.",
+        verdict="The gap is explained by quadratic damping & nothing else.",
         gap=GapSummary(
             True, base.excess, best.excess, 0.987, ON_RUNS,
             tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},

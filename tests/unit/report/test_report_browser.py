@@ -352,7 +352,7 @@ SUMMARY = """() => {
 
 
 def crowded(given: Any) -> None:
-    given["verdict"] = "The gap comes from quadratic damping. " * 12
+    given["verdict"] = "The gap is explained by quadratic damping. " * 12
     given["waterfall"] += [{"effect": name, "excess": 0.1} for name in ("free_play", "mains_hum")]
 
 

@@ -112,7 +112,7 @@ def diagnosis() -> Diagnosis:
     return Diagnosis(
         campaign="by hand",
         causes=("coulomb_friction",),
-        verdict="The gap comes from coulomb friction.",
+        verdict="The gap is explained by coulomb friction.",
         gap=GapSummary(
             True,
             19.0,
@@ -146,7 +146,7 @@ def diagnosis() -> Diagnosis:
 
 def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> None:
     text = str(diagnosis)
-    assert text.startswith("The gap comes from coulomb friction.\n")
+    assert text.startswith("The gap is explained by coulomb friction.\n")
     lines = text.splitlines()
     assert "coulomb_friction         97 %             99.0 %" in lines
     assert "coulomb_friction  friction_moment  0.003990 ± 0.000060 N m" in lines
