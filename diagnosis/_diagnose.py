@@ -35,6 +35,7 @@ from identification.status import left_out_as_asked
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import as_campaign
+from tunnel_sim.processes import one_blas_thread
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
 
 
+@one_blas_thread()
 def diagnose(
     campaign: Campaign | Path | str,
     *,

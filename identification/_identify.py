@@ -24,11 +24,13 @@ from identification.statistics import widened_by_contradictions
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
 from tunnel_sim.files.campaign_folder import as_campaign
+from tunnel_sim.processes import one_blas_thread
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
+@one_blas_thread()
 def identify(
     campaign: Campaign | Path | str,
     estimator: str | Estimator = "output_error",

@@ -48,6 +48,20 @@ _OUT_OF_MEMORY = 77  # exit status
 _START_S = 30.0  # a busy machine may take so long to start a process and to import
 
 
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let linear algebra use one thread in this process; also a decorator.
+
+    Its matrices are small: a second thread mostly waits for a core. With two threads, matrix exponentials of a
+    Kalman filter take fifty times as long.
+    """
+    import scipy.linalg  # noqa: F401  # has a library of its own, which must be loaded to be limited
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
 class LimitReached(Exception):
     """Work in a limited process did not end; the text says why, such as ``takes more than 30 s``."""
 
