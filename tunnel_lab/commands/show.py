@@ -156,52 +156,33 @@ def view(
     effect: EffectOption = None,
     duration: Annotated[float | None, Option("--duration", help="Time until the next release, s.")] = None,
     seed: Annotated[int | None, Option("--seed", min=0, help="Seed of random effects.")] = None,
-    speed: Annotated[
-        float, Option("--speed", min=0.01, max=100.0, help="Factor on real time; window only.")
-    ] = 1.0,
+    speed: Annotated[float, Option("--speed", min=0.01, max=100.0, help="Factor on real time.")] = 1.0,
     camera: Annotated[
         str, Option("--camera", help="overview, above or side: where the view begins.")
     ] = "overview",
-    web: Annotated[bool, Option("--web", help="Show it in a browser instead of a window.")] = False,
-    port: Annotated[
-        int, Option("--port", min=0, max=65535, help="Port of --web; 0 takes the first free one from 8080.")
-    ] = 0,
-    browser: Annotated[bool, Option("--browser", help="With --web: open a browser tab.")] = False,
 ) -> None:
     """Watch the rig in real time; the model is released again when a run is over.
 
     In the window (MuJoCo's viewer) space pauses, R releases the model again and the
     mouse turns the view; a figure shows the angle. The window needs a display.
 
-    --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), which
-    has controls for pause, speed and reset, and shows trace, wind speed and its
-    address. It needs no display. It listens on all network interfaces, asks for no
-    password and does not check the Origin of a page: use it only in a network that
-    you trust.
-
     [bold]Examples[/bold]
       tunnel view
       tunnel view plan.toml --run s5-v10-a20 --speed 0.5
       tunnel view --spring 8 --effect coulomb_friction:friction_moment=0.01
-      tunnel view --web --port 8080
 
     [bold]Exit status[/bold]
-      0 closed, 2 bad input, no display or no free port, 130 interrupted.
+      0 closed, 2 bad input or no display, 130 interrupted.
     """
     from tunnel_lab.show.film import Request, checked_camera, shown_run
 
     file, effects = None if plan is None else str(plan), tuple(effect or ())
     request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
-    if not web and (port or browser):
-        raise TunnelError("needs --web", where="--port" if port else "--browser", remedy="add --web")
     name = checked_camera(camera)
     run = shown_run(request)
-    from tunnel_lab.show.live import view_in_browser, view_in_window  # refusals need no engine
+    from tunnel_lab.show.live import view_in_window  # refusals need no engine
 
-    if web:
-        view_in_browser(run, port=port, camera=name, open_browser=browser)
-    else:
-        view_in_window(run, camera=name, speed=speed)
+    view_in_window(run, camera=name, speed=speed)
 
 
 def render(

@@ -4,13 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import os
-import signal
-import socket
-import subprocess
-import sys
-import time
-import urllib.request
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +14,7 @@ import pytest
 
 from tests.skips import PLATFORM
 from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
-from tunnel_lab.show.live import Controls, History, LiveRun, Overlay, Puppet, missing_display, window_loop
+from tunnel_lab.show.live import Controls, History, LiveRun, missing_display, window_loop
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
@@ -53,7 +46,7 @@ def test_bad_input_is_one_clear_line(
     command: str, arguments: tuple[str, ...], said: str, tunnel: Tunnel, tmp_path: Path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    out = ("--out", "film.mp4") if command == "render" else ("--web",)
+    out = ("--out", "film.mp4") if command == "render" else ()
     status, _, error = tunnel(command, *arguments, *out)
     assert status == 2
     assert said in error
@@ -176,20 +169,6 @@ def test_the_live_run_is_the_simulated_one_and_begins_again() -> None:
     assert live.angle == pytest.approx(run.settings.release_angle)
 
 
-def test_the_puppet_has_no_plugin_and_the_same_pose() -> None:
-    run = shown_run(Request(effects=("rod_flexibility:compliance=0.01",)))
-    live = LiveRun(run)
-    puppet = Puppet(live)
-    assert (puppet.model.nplugin, live.model.mj.nplugin) == (0, 1)
-    live.advance(0.3)
-    puppet.follow(live)
-    import mujoco
-
-    mujoco.mj_forward(live.model.mj, live.data)
-    for name in ("davis", "rod_end"):
-        np.testing.assert_allclose(puppet.data.body(name).xquat, live.data.body(name).xquat, atol=1e-12)
-
-
 def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
     history = History(span=1.0, points=10)
     for time_ in np.arange(0.0, 3.0, 0.01):
@@ -200,15 +179,6 @@ def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
     np.testing.assert_allclose(points[:, 1], 2.0 * points[:, 0])
     history.add(0.0, 1.0)
     assert history.points.tolist() == [[0.0, 1.0]]
-
-
-def test_the_panel_shows_a_long_title_whole_and_the_history_of_the_physics() -> None:
-    effects = ("coulomb_friction:friction_moment=0.01", "rod_flexibility:compliance=0.01")
-    live = LiveRun(shown_run(Request(effects=effects)))
-    panel = Overlay(live, "http://localhost:8080/")
-    assert " ".join(panel._head) == live.run.title
-    assert max(map(len, panel._head)) <= 54  # characters of Studio's font in a panel of 380 pixels
-    assert panel._history is live.history
 
 
 class Window:
@@ -270,60 +240,5 @@ def test_no_display_is_one_clear_line(tunnel: Tunnel, monkeypatch) -> None:
     status, out, error = tunnel("view")
     assert (status, out) == (2, "")
     assert "there is no display" in error
-    assert "--web" in error
+    assert "tunnel render" in error
     assert error.count("\n") == 1
-
-
-def test_options_of_the_browser_need_the_browser(tunnel: Tunnel) -> None:
-    status, _, error = tunnel("view", "--port", "8080")
-    assert status == 2
-    assert "add --web" in error
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
-
-
-def fetched(url: str, seconds: float) -> bytes:
-    until = time.monotonic() + seconds
-    while True:
-        try:
-            with urllib.request.urlopen(url, timeout=5) as answer:
-                return bytes(answer.read())
-        except OSError:
-            if time.monotonic() > until:
-                raise
-            time.sleep(0.2)
-
-
-@pytest.mark.slow
-def test_a_browser_is_served_page_and_puppet_until_interrupted() -> None:
-    port = free_port()
-    child = subprocess.Popen(
-        [sys.executable, "-m", "tunnel_lab.cli", "view", "--web", "--port", str(port)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-    )
-    try:
-        assert b"<canvas" in fetched(f"http://127.0.0.1:{port}/", 60.0)
-        assert fetched(f"http://127.0.0.1:{port}/web_client.wasm", 5.0)[:4] == b"\0asm"
-        model = fetched(f"http://127.0.0.1:{port}/model", 5.0)
-        assert len(model) > 100_000
-        assert b"vwt.yaw_moment" not in model
-        taken = subprocess.run(
-            [sys.executable, "-m", "tunnel_lab.cli", "view", "--web", "--port", str(port)],
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
-        assert taken.returncode == 2
-        assert "already in use" in taken.stderr
-    finally:
-        child.send_signal(signal.SIGINT)
-        _, error = child.communicate(timeout=30)
-    assert child.returncode == 130, error
