@@ -153,7 +153,7 @@ def test_a_random_moment_is_found_as_the_noise_that_it_is() -> None:
     [
         ({"spring_stiffness": 5.0}, "runs with a spring and without one"),
         ({"wind_speed": 3.0, "air_density": 1.2}, "no spring, and the wind blows"),
-        ({"drive": Drive("drive", moment(1))}, "unknown gain shows no inertia"),
+        ({"drive": Drive("drive", moment(1))}, "cannot be identified when the gain is unknown"),
         ({"drive": Drive("moment_nm", -moment(1))}, "does not follow the moment"),
     ],
 )
