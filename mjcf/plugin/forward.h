@@ -113,11 +113,12 @@ enum { VWT_MOST_WINDS = 8 };  // changes of a wind of samples, by which there ar
 VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values);
 
 // As `vwt_forward`, for plain runs: also the derivatives of angle and rate by the terms in `columns`, `width` of them,
-// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of a wind of samples, the k-th row of
-// the run's `winds`, m/s, shape (VWT_MOST_WINDS at most, wind_count). With weights of the ends of an interval between samples, by run, shape (4, weighed)
-// for its first and last angle and its first and last rate, the derivatives are those of the weighted sums instead,
-// shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all intervals. A derivative that does
-// not exist is NaN throughout. Returns -1 where a run is not plain or its friction is a root of the rate.
+// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of a wind of samples: the k-th row of
+// the run's `winds`, m/s, shape (VWT_MOST_WINDS at most, wind_count). With weights of the ends of an interval between
+// samples, by run, shape (4, weighed) for its first and last angle and its first and last rate, the derivatives are
+// those of the weighted sums instead, shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all
+// intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain or its friction is
+// a root of the rate.
 VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
                        const double* const* winds, const double* const* weights, int weighed, double* const* angle,
                        double* const* rate, double* const* angle_slopes, double* const* rate_slopes);

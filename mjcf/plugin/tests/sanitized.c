@@ -193,36 +193,41 @@ static void check_forward(void) {
 }
 
 static void check_slopes(void) {
-  enum { kSamples = 200, kRuns = 5, kColumns = VWT_TERM_COUNT };
+  enum { kSamples = 200, kRuns = 5, kTerms = VWT_TERM_COUNT, kColumns = kTerms + VWT_MOST_WINDS, kWinds = 3 };
   static double angle[kRuns][kSamples], rate[kRuns][kSamples];
   static double by_angle[kRuns][kColumns * kSamples], by_rate[kRuns][kColumns * kSamples];
   double *angles[kRuns], *rates[kRuns], *by_angles[kRuns], *by_rates[kRuns], values[kRuns * VWT_TERM_COUNT];
-  const double wind = 18, sums[] = {0.5, 0.5, 0.01, -0.01}, *weights[kRuns];
+  const double wind[kWinds] = {18, 16, 19}, sums[] = {0.5, 0.5, 0.01, -0.01}, *weights[kRuns], *winds[kRuns];
+  static const double changes[VWT_MOST_WINDS * kWinds];
   vwt_parameters p[kRuns];
   vwt_run runs[kRuns];
   int columns[kColumns];
   for (int i = 0; i < kColumns; i++) {
     columns[i] = i;
-    EXPECT(vwt_term_name(i)[0] && vwt_term_count() == kColumns);
+    EXPECT(i >= kTerms || vwt_term_name(i)[0]);
   }
+  EXPECT(vwt_term_count() == kTerms && vwt_most_winds() == VWT_MOST_WINDS);
   for (int features = 0; features < 8; features++) {
     for (int i = 0; i < kRuns; i++) {
+      const int sampled = i % 2 && !(features & 5);  // a lag and vortices want a constant wind
       p[i] = (vwt_parameters){.air_density = 1.2, .frontal_area = 0.036, .reference_length = 0.625, .width = 0.2,
                               .cn_beta = 0.35, .cn_r = -0.7, .spring_stiffness = 16, .yaw_inertia = 0.1,
                               .mechanical_damping = 0.02, .aero_lag = features & 1 ? 2 : 0,
                               .friction_moment = features & 2 ? 0.02 : 0, .friction_saturation = features & 4 ? 0.1 : 0,
                               .shedding_amplitude = features & 4 ? 0.01 : 0, .strouhal_number = 0.1,
                               .stiffness_cubic_exponent = features & 4 ? 2.5 : 0};
-      runs[i] = (vwt_run){.wind = &wind, .wind_count = 1, .angle = 0.3 + 0.01 * i, .lagged = 0.3, .step = 0.002,
+      runs[i] = (vwt_run){.wind = wind, .wind_count = sampled ? kWinds : 1, .wind_interval = 0.1,
+                          .angle = 0.3 + 0.01 * i, .lagged = 0.3, .step = 0.002,
                           .steps = features & 1 ? 2 : 1, .stride = 3, .samples = kSamples};
       angles[i] = angle[i];
       rates[i] = rate[i];
       by_angles[i] = by_angle[i];
       by_rates[i] = by_rate[i];
       weights[i] = sums;
+      winds[i] = changes;
     }
-    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, NULL, 1, angles, rates, by_angles, by_rates) == 0);
-    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, weights, 1, angles, rates, by_angles, NULL) == 0);
+    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, winds, NULL, 1, angles, rates, by_angles, by_rates) == 0);
+    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, winds, weights, 1, angles, rates, by_angles, NULL) == 0);
     vwt_terms(kRuns, p, runs, values);
     EXPECT(values[VWT_TERM_start_angle] == 0.3);
   }
