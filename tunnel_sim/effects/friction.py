@@ -120,7 +120,7 @@ class CoulombFriction(Effect):
         return said
 
     def stands(self, stiffness: float) -> float:
-        """The angle at which the spring's moment equals the friction at rest, rad; 0 where that friction vanishes."""
+        """The angle at which the spring's moment equals the friction at rest, rad; 0 where the latter vanishes."""
         return self.at_rest / stiffness if stiffness > 0.0 else 0.0
 
     @property
