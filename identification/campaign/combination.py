@@ -73,7 +73,7 @@ def combined_estimate(
     10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
 
     Args:
-        together: a method's own combination of the runs, which starts from that of least squares.
+        together: a method's own combination of the runs, which starts from the least-squares one.
 
     Raises:
         TunnelError: when a wind-on run states no air density.

@@ -103,7 +103,7 @@ def swing_of(run: Run) -> Swing | None:
 
 
 def _poles(reading: Reading, omega: float) -> PencilDecay | None:
-    """The oscillation of a part of a record; None if its poles are not those of an oscillation."""
+    """The oscillation of a part of a record; None if its poles do not describe an oscillation."""
     found = pencil_decay(reading.yaw, float(reading.time[-1]) / (reading.time.size - 1), omega)
     return found if found is not None and found.decay.omega_d > 0.0 else None
 
@@ -111,7 +111,7 @@ def _poles(reading: Reading, omega: float) -> PencilDecay | None:
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """Refuse wind-off runs that grow: their decay rate is negative beyond chance, and their swings become larger.
 
-    A blow in mid-record does not have both signs.
+    A blow in mid-record does not show both.
     """
     ids = []
     for swing in swings:

@@ -70,7 +70,7 @@ class FittedRun:
 
 
 def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
-    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, with or without its spring.
+    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, for any spring.
 
     Args:
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.

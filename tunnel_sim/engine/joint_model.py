@@ -78,8 +78,8 @@ def read_joint_model(
 ) -> JointModel:
     """Read a model, and the law of one joint from the engine's moments, in a process with limits.
 
-    The law is exact: the restoring moment of gravity and springs is fitted over the whole turn (for a slide,
-    over twice the reach).
+    The law is exact: gravity and springs give the restoring moment over the whole turn (for a slide, over twice
+    the reach).
 
     Args:
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness

@@ -106,7 +106,7 @@ class BaselinesVecEnv(VecEnv):
 
 
 def _of_run(infos: dict[str, Any], row: int) -> dict[str, Any]:
-    """The infos of one run from those of a vector environment."""
+    """The infos of one run from the infos of a vector environment."""
     return {
         name: _of_run(value, row) if isinstance(value, dict) else value[row]
         for name, value in infos.items()

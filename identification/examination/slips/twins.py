@@ -1,8 +1,8 @@
 """Two records of one measurement: equal, or with small changes.
 
 Two honest runs have nearly the same motion but never the same noise. The sixth difference of a record contains
-only its noise. Two records of one measurement share it, unless as much noise was added, or they were rounded, cut
-or scaled as strongly.
+only its noise. Two records of one measurement share it, even after rounding, cutting or scaling, or with less noise
+added.
 """
 
 from __future__ import annotations
