@@ -108,7 +108,7 @@ def identify(
             statuses=by_severity({*estimate.statuses, *why.values()}),
             remarks=(*examined.remarks, *estimate.remarks),
         )
-    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # their remark names the springs
+    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # it names the springs
     if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     estimate = replace(
