@@ -48,10 +48,10 @@ def identify(
         campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one file
             of a data logger.
         estimator: a name of `identification.estimators.known_estimators`, or an estimator with its own
-            settings, such as ``OutputError(cycles_per_window=5)``, or of one's own.
+            settings, such as ``OutputError(cycles_per_window=5)``, or your own estimator.
         leave_out: ids of runs to leave out, which a remark names.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
-        progress: called with the number of runs that are identified, and of all; None: nothing is reported.
+        progress: called with the numbers of identified runs and of all runs; None: nothing is reported.
 
     Returns:
         The estimate. Values that could not be identified are None; the statuses say why and what to do.
@@ -59,14 +59,14 @@ def identify(
     Raises:
         TunnelError: for an unknown estimator, a campaign without runs, an id in ``leave_out`` that no run has, a
             wind-on run without air density, records that the examination refuses, and, with ``throw``, when no run
-            could be identified. A `WrongReturn` where an estimator of one's own returns something else than an
-            estimate of these runs with finite values.
+            could be identified. A `WrongReturn` where your own estimator does not return an estimate of these runs
+            with finite values.
     """
     campaign = as_campaign(campaign).without(leave_out)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
-    # driven runs that the estimator would take for free decays are refused
+    # driven runs are refused if the estimator would mistake them for free decays
     for run in campaign.runs:
         if run.drive is None:
             continue
@@ -93,7 +93,7 @@ def identify(
         )
     found = widened_by_contradictions(found, left, examined.remarks)
     estimate = as_angles(found, campaign.sensor)
-    if examined.remarks:  # they belong to the estimate, and so does every run of the campaign, in its order
+    if examined.remarks:  # the estimate includes them, and every run of the campaign, in its order
         of_runs = {run.id: run for run in estimate.runs}
         cycling = {name for one in examined.remarks if in_limit_cycle(one.figures) for name in one.runs}
         why = {
@@ -108,7 +108,7 @@ def identify(
             statuses=by_severity({*estimate.statuses, *why.values()}),
             remarks=(*examined.remarks, *estimate.remarks),
         )
-    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # which names the springs
+    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # it names the springs
     if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     estimate = replace(
@@ -123,7 +123,7 @@ def identify(
 
 
 def _assumed(campaign: Campaign) -> tuple[Remark, ...]:
-    """The remark on driven runs whose input is taken as linear between samples, since nobody states how it is."""
+    """The remark on driven runs whose input is assumed linear between samples, as it is not stated."""
     runs = [run for run in campaign.runs if run.drive is not None and run.drive.hold is None]
     if not runs:
         return ()

@@ -1,7 +1,7 @@
-"""`check_estimator`: whether an estimator of one's own keeps the rules that identify, scores and sweeps rely on.
+"""`check_estimator`: whether your own estimator keeps the rules on which identify, scores and sweeps rely.
 
-The campaigns are of the nominal model in closed form, with white noise. How good the values are is not judged here:
-``tunnel score`` measures that. Wrong units and deviations that are far too small are found.
+The campaigns are of the nominal model in closed form, with white noise. The accuracy of the values is not judged
+here: ``tunnel score`` measures it. Wrong units and far too small deviations are found.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ _CONDITIONS = tuple(
     (spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)
 )  # N m/rad, m/s
 _FAR = (
-    0.2  # of the truth: a wrong unit is further off (a factor of 2π, 57, 60 or 100), a crude method is nearer
+    0.2  # of the truth: a wrong unit (a factor of 2π, 57, 60 or 100) is further off, a crude method is nearer
 )
-_DEVIATIONS = 6.0  # standard deviations that a value may be off beside that
-_FALSE_ALARMS = 1e-4  # of a right estimator, for all tests of its deviations together
-_REPEATS = 10  # campaigns of other noise
+_DEVIATIONS = 6.0  # standard deviations that a value may be off in addition
+_FALSE_ALARMS = 1e-4  # for a right estimator, over all tests of its deviations together
+_REPEATS = 10  # campaigns with different noise
 _SAME = 1.0  # standard deviations between answers to the same runs in another order, or with the other sign
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """The estimator under test: it is asked, and its answer is compared with the rules."""
+    """The estimator under test, with comparisons of its answer with the rules."""
 
     estimator: Estimator
 
@@ -51,7 +51,7 @@ class _Subject:
         return TunnelError(what, where=f"estimator {self.estimator.name}", remedy=remedy)
 
     def estimate(self, campaign: Campaign, of: str) -> Estimate:
-        """Its estimate, which keeps the rules of every answer.
+        """Its estimate, after checking the rules of every answer.
 
         Args:
             of: the kind of campaign, for messages.
@@ -110,21 +110,20 @@ class _Subject:
 
 
 def check_estimator(estimator: str | Estimator | type[Any], *, free_decays: bool = True) -> None:
-    """Check an estimator of one's own, as Gymnasium's ``check_env`` checks an environment.
+    """Check your own estimator, as Gymnasium's ``check_env`` checks an environment.
 
-    It is asked some thirty times for campaigns of two to six runs: complete ones, without wind, without stiffness,
-    with a run that does not move, of noise alone, with missing samples, and with inputs where it states
-    ``takes_driven``. Its answers must be complete and finite, in the stated units and with standard deviations; the
-    same for the same runs, in another order and with the other sign; its failures must be statuses; and it must not
-    change its input.
+    It must answer some thirty campaigns of two to six runs: complete ones, without wind, without stiffness, with a
+    run that does not move, with noise alone, with missing samples, and with inputs if it states ``takes_driven``.
+    Its answers must be complete and finite, in the stated units and with standard deviations; equal for the same
+    runs, in another order and with the other sign; its failures must be statuses; and it must not change its input.
 
     Args:
         estimator: its name, an object, or a class that needs no arguments.
         free_decays: False where it takes driven runs only.
 
     Raises:
-        TunnelError: for the first rule that it breaks; the text says what to do. The traceback of an exception of
-            its own is a note of the error.
+        TunnelError: for the first broken rule; the text says what to do. The traceback of an exception of the
+            estimator is a note of the error.
     """
     subject = _Subject(_made(estimator))
     driven = takes_driven(subject.estimator)
@@ -139,7 +138,7 @@ def check_estimator(estimator: str | Estimator | type[Any], *, free_decays: bool
 
 
 def _made(estimator: object) -> Estimator:
-    """The object to ask."""
+    """The estimator as an object."""
     if isinstance(estimator, str):
         return make_estimator(estimator)
     where = f"estimator {getattr(estimator, 'name', estimator)!s}"
@@ -161,7 +160,7 @@ def _made(estimator: object) -> Estimator:
 
 
 def _check_values(subject: _Subject) -> None:
-    """Units and deviations: values near the truth, and the same again for the same runs."""
+    """Units and deviations: values near the truth, and equal ones for the same runs."""
     campaign = _campaign()
     found = subject.estimate(campaign, "noisy runs")
     truths = _truths()
@@ -210,7 +209,7 @@ _RATES = ("omega_n", "zeta")
 
 
 def _check_deviations(subject: _Subject) -> None:
-    """Values do not scatter by more than the stated deviations; the excess is that of chance."""
+    """Values do not scatter by more than the stated deviations, beyond chance."""
     from scipy.stats import chi2
 
     found = [subject.estimate(_campaign(seed=seed), "noisy runs") for seed in range(1, _REPEATS + 1)]
@@ -235,7 +234,7 @@ def _check_deviations(subject: _Subject) -> None:
 
 
 def _check_partial(subject: _Subject) -> None:
-    """Campaigns that determine less than all, and samples that are missing."""
+    """Campaigns that do not determine all coefficients, and missing samples."""
     whole = _campaign()
     still = replace(whole, runs=tuple(run for run in whole.runs if not run.wind_on))
     unstated = replace(whole, runs=tuple(replace(run, spring_stiffness=None) for run in whole.runs))
@@ -261,7 +260,7 @@ def _check_partial(subject: _Subject) -> None:
 
 
 def _check_failures(subject: _Subject) -> None:
-    """A run that does not move fails alone; where all fail, so does the campaign."""
+    """A run that does not move fails alone; if all fail, so does the campaign."""
     whole, rng = _campaign(), np.random.default_rng(4)
     for of, level in (("runs that do not move", 0.0), ("runs of noise alone", _NOISE)):
         dead = _changed(whole, lambda time, _: _ZERO + level * rng.standard_normal(time.size))  # noqa: B023

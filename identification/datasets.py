@@ -1,6 +1,6 @@
 """Packaged measurements: the paper's tables and measured campaigns, each with its source and licence.
 
-The files lie in ``identification/data``; a ``SOURCE.md`` beside each says where they come from.
+The files are in ``identification/data``; a ``SOURCE.md`` beside each states their source.
 The paper: "Identification of Aerodynamic Coefficients of Ground Vehicles Using Neural Network".
 """
 
@@ -24,7 +24,7 @@ MEASURED_CAMPAIGNS: tuple[str, ...] = (
 )
 """Names of the packaged measured campaigns."""
 
-# Windows of Table III whose omega_n can be read in two ways in the scan, and the reading that is not in the file.
+# Windows of Table III with two possible readings of omega_n in the scan, and the reading that is not in the file.
 _SECOND_READING = {3: 12.5054, 4: 12.5638}
 
 

@@ -1,6 +1,6 @@
-"""The result of an estimator: values with standard deviations, and statuses that say what to do.
+"""The result of an estimator: values with standard deviations, and statuses with their remedies.
 
-A value that could not be identified is None, never NaN, and a `Status` says why and what to do.
+A value that could not be identified is None, never NaN, and a `Status` gives the reason and the remedy.
 """
 
 from __future__ import annotations
@@ -136,11 +136,11 @@ class RunEstimate:
     Args:
         id: the run's.
         statuses: from the gravest; only OK where there are no others.
-        omega_n: natural angular frequency, rad/s; None of a body without a spring.
-        zeta: damping ratio; None of a body without a spring.
+        omega_n: natural angular frequency, rad/s; None for a body without a spring.
+        zeta: damping ratio; None for a body without a spring.
         initial_angle: at the first sample, from the sensor's zero, rad; without a spring as the sensor reads it.
         initial_rate: at the first sample, rad/s.
-        sensor_zero: from this run alone, rad; None of a body without a spring.
+        sensor_zero: from this run alone, rad; None for a body without a spring.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
         aerodynamic_damping: Ca, N m s/rad, from the whole campaign; wind-on runs only.
         process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
@@ -181,16 +181,16 @@ class RunEstimate:
 
 @dataclass(frozen=True)
 class RunScatter:
-    """How runs of equal conditions differ by chance, beyond their noise. It is in the coefficients' intervals.
+    """Chance differences of runs of equal conditions, beyond noise; the coefficients' intervals include them.
 
     Args:
         frequency: standard deviation of the natural frequency, a fraction of it; root mean square over the runs.
         damping: standard deviation of the decay rate, a fraction of it; root mean square over the runs.
-        wind_speed: standard deviation of the runs' own speeds, a fraction; None where it is not counted.
-        spring_stiffness: standard deviation of the runs' own springs, a fraction; None where it is not counted.
-        mechanical_damping: standard deviation of their own damping, a fraction; None where it is not counted.
-        stated: those of these three that the campaign states; the others are estimated.
-        covariances: what each of the three that is not None adds to the covariance of the parameters, in the
+        wind_speed: standard deviation of the runs' own speeds, a fraction; None where it does not count.
+        spring_stiffness: standard deviation of the runs' own springs, a fraction; None where it does not count.
+        mechanical_damping: standard deviation of their own damping, a fraction; None where it does not count.
+        stated: names of those of these three that the campaign states; the others are estimated.
+        covariances: contribution of each of the three that is not None to the covariance of the parameters, in the
             products of their units; shape (k, p, p).
     """
 
@@ -206,14 +206,14 @@ class RunScatter:
 
     @property
     def widths(self) -> dict[str, Quantity]:
-        """The deviations that are counted, by name."""
+        """The deviations that count, by name."""
         every = {
             name: getattr(self, name) for name in ("wind_speed", "spring_stiffness", "mechanical_damping")
         }
         return {name: width for name, width in every.items() if width is not None}
 
     def among(self, kept: Sequence[int]) -> RunScatter:
-        """The same for some of the parameters, by their places."""
+        """The scatter for some of the parameters, by their indices."""
         chosen = [tuple(tuple(rows[i][j] for j in kept) for i in kept) for rows in self.covariances]
         return replace(self, covariances=tuple(chosen))
 
@@ -240,9 +240,9 @@ class Estimate:
         parameters: names of the covariance's rows and columns.
         covariance: of the parameters, in the products of their units; shape (p, p).
         noise: the noise level behind the covariance; None where the method does not use it.
-        remarks: of the examination before the estimation, on runs left out, cut or to look at.
-        repeatability: the scatter between runs, which the covariance includes; None where the runs show none beyond
-            their noise, and none is stated.
+        remarks: of the examination before the estimation, on runs left out, cut or worth a look.
+        repeatability: the scatter between runs, which the covariance includes; None where none is stated and the
+            runs show none beyond their noise.
         trade_off: the two coefficients that the runs separate least; None where they separate all of them.
     """
 
@@ -286,7 +286,7 @@ class Estimate:
         return estimate_brief(self.to_json_dict())
 
     def _repr_html_(self) -> str:
-        """The same as `__str__` for notebooks."""
+        """The text of `__str__` for notebooks."""
         return as_html(estimate_parts(self.to_json_dict()))
 
     def coefficients_frame(self) -> pl.DataFrame:
@@ -395,7 +395,7 @@ class Estimate:
 def estimate_schema() -> dict[str, Any]:
     """The JSON schema of `Estimate.to_json_dict`."""
     found = _adapter().json_schema()
-    for part in (found, found["$defs"]["RunEstimate"]):  # statuses are written by name, beside their text
+    for part in (found, found["$defs"]["RunEstimate"]):  # statuses are written by name, with their text
         names = {"type": "string", "enum": [status.name.lower() for status in Status]}
         part["properties"] |= {
             "status": names,
@@ -406,7 +406,7 @@ def estimate_schema() -> dict[str, Any]:
 
 
 def as_pandas(frame: pl.DataFrame) -> DataFrame:
-    """A frame for pandas, by its columns: Polars' own way needs pyarrow."""
+    """A pandas frame, built by columns: Polars' own conversion needs pyarrow."""
     try:
         from pandas import DataFrame  # only here: an extra
     except ModuleNotFoundError as error:
@@ -420,7 +420,7 @@ def wide_frame(
     """A row for each document: the plain columns, then the value of each quantity, and its ``_std``.
 
     Args:
-        plain: keys whose values are taken as they are, with their types.
+        plain: keys whose values are copied unchanged, with their types.
         quantities: keys of quantities, which have a value and a std, or are None.
     """
     columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in plain}

@@ -1,7 +1,7 @@
 """The judgements of this package: false-alarm rates, and limits that another engineer might set differently.
 
-Each says where it comes from. Numerical constants, such as the tolerance of an iteration or the size of a grid,
-stand where they are used.
+Each states its source. Numerical constants, such as the tolerance of an iteration or the size of a grid, are
+defined where they are used.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SPRING_FLAG_RATE = 0.10
 """Of flagging a correct set of springs. A flag costs one weighing, hence not 5 %. The choice was made with Table II
 of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this rate and would not be at 5 %."""
 
-# --- How well the rig's inputs are known. ---
+# --- Uncertainty of the rig's inputs. ---
 
 SPRING_TOLERANCE = 0.01
 """Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
@@ -124,7 +124,7 @@ LEAST_NOISE = 1e-7
 LEAST_STIFFNESS_STD = 1e-5
 """Relative standard deviation of k: no clock and no fit is trusted further."""
 
-# --- What a record must show before something is said about it. ---
+# --- Evidence that a record must give. ---
 
 LEAST_SAMPLES = 8
 """Samples of a run: five unknowns describe it, and three more samples are the least that show how well they do."""
@@ -215,7 +215,7 @@ TRADE_OFF_CORRELATION = 0.95
 times what it would be with the other known, the customary sign of collinearity in regression (a variance inflation
 factor 1/(1 − r²) of 10)."""
 
-# --- When the scatter of the runs is believed, and when two scores differ. ---
+# --- When the scatter of the runs is significant, and when two scores differ. ---
 
 LEAST_WIDTH_FREEDOM = 1.0
 """Degrees of freedom of a variance with estimated widths, at least: two runs show one difference."""

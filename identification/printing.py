@@ -1,4 +1,4 @@
-"""How results are printed: numbers with their standard deviations, tables, and the parts of an estimate.
+"""The printing of results: numbers with their standard deviations, tables, and the parts of an estimate.
 
 Two significant digits of the standard deviation determine those of the value.
 """
@@ -52,7 +52,7 @@ NEGLIGIBLE = 1e-9
 
 
 def unit_mark(unit: str) -> str:
-    """A unit of a document with raised powers: ``m³/rad`` of ``m3/rad``; a 1 stays."""
+    """A unit of a document with superscripts: ``m³/rad`` for ``m3/rad``; a 1 is unchanged."""
     return re.sub(r"(?<=[A-Za-z])[234]\b", lambda found: "²³⁴"[int(found[0]) - 2], unit)
 
 
@@ -62,7 +62,7 @@ def coefficient_label(name: str, unit: str) -> str:
 
 
 def in_degrees(angle: float, digits: int = 2) -> str:
-    """An angle as people read it, such as ``5.2°``.
+    """An angle in degrees, such as ``5.2°``.
 
     Args:
         angle: rad.
@@ -135,7 +135,7 @@ def in_stds(error: float, std: float | None) -> str:
 
 
 def unit(text: str) -> str:
-    """A unit of an estimate's JSON as printed: ``[kg m²]`` of ``kg m2``."""
+    """A unit of an estimate's JSON as printed: ``[kg m²]`` for ``kg m2``."""
     return f"[{unit_mark(text)}]"
 
 
@@ -156,7 +156,7 @@ def _fixed(value: float, std: float, decimals: int) -> bool:
 
 
 def _exponent(value: float, digits: int) -> int:
-    """Decimal exponent of ``value`` once rounded to ``digits`` significant digits."""
+    """Decimal exponent of ``value`` after rounding to ``digits`` significant digits."""
     return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value != 0.0 else -300
 
 
@@ -170,7 +170,7 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
 
     Args:
         given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
-            false, and ``interval`` where that is not value ± 1.96 std. A std of zero means that the value was
+            false, and ``interval`` where it differs from value ± 1.96 std. A std of zero means that the value was
             given, not fitted.
     """
     if not given.get("determined", True):
@@ -196,7 +196,7 @@ def p_text(value: float) -> str:
     return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
 
 
-_LEAST_P = 1e-300  # close to the smallest number that a computer represents
+_LEAST_P = 1e-300  # close to the smallest positive float
 
 
 WIDTH = 88
@@ -210,7 +210,7 @@ class TextTable:
     Args:
         columns: headings, with their units.
         rows: one text for each column; lines of a cell are separated by line ends.
-        right: those headings whose columns are aligned to the right.
+        right: headings of the right-aligned columns.
     """
 
     title: str
@@ -239,7 +239,7 @@ class TextTable:
         )
 
     def _lines(self, row: tuple[str, ...], widths: list[int]) -> str:
-        """One row, on as many lines as its tallest cell has."""
+        """One row, on as many lines as its tallest cell."""
         lines = zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
         return "\n".join(
             "  ".join(
@@ -287,7 +287,7 @@ SHOWN_RUNS = 16
 
 
 def estimate_parts(document: Document) -> list[str | TextTable]:
-    """What is printed of an estimate: the coefficients, the runs, and a paragraph for each note."""
+    """The printed parts of an estimate: the coefficients, the runs, and a paragraph for each note."""
     notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     notes += status_lines(document)
     left = len(document["runs"]) - SHOWN_RUNS
@@ -298,11 +298,11 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
 
 
 def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
-    """The two parameters that the runs separate least, and the run that would; empty where there are none.
+    """The two parameters that the runs separate least, and the run that would; empty if there are none.
 
     Args:
         document: of an estimate or a diagnosis.
-        symbols: of the parameters that have one, by name.
+        symbols: of the parameters, by name, where they have one.
     """
     found = document.get("trade_off")
     if found is None:
@@ -315,7 +315,7 @@ def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
 
 
 def _correlation(value: float) -> str:
-    """A correlation with as many decimals as tell it from 1, six at most."""
+    """A correlation with as many decimals as show that it is not 1, six at most."""
     apart = max(1.0 - abs(value), 10.0**-_MOST_DECIMALS)
     decimals = min(max(2, math.ceil(-math.log10(apart))), _MOST_DECIMALS)
     return f"{'−' if value < 0.0 else ''}{abs(value):.{decimals}f}"
@@ -340,11 +340,11 @@ DEVIATIONS: Mapping[str, str] = {
 
 
 def repeatability_lines(document: Document) -> list[str]:
-    """How the runs of an estimate repeat: nothing where they show no scatter beyond their noise.
+    """The repeatability of the runs of an estimate: nothing where they show no scatter beyond their noise.
 
-    Runs that are no more than the coefficients need cannot show any, which is said.
+    If there are only as many runs as the coefficients need, the lines state that the scatter is unknown.
     """
-    if "repeatability" not in document:  # of an earlier version
+    if "repeatability" not in document:  # from an earlier version
         return []
     found, coefficients = document["repeatability"], document["parameters"]
     shown = [run for run in document["runs"] if run["omega_n"] is not None]
@@ -401,7 +401,7 @@ def estimate_brief(document: Document) -> str:
 
 
 def coefficients_table(document: Document) -> TextTable:
-    """The campaign's coefficients that could be identified; no rows where there are none."""
+    """The coefficients of the campaign that could be identified; no rows where there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
         (f"{symbol} {unit(document[name]['unit'])}", _with_std(document[name]))
@@ -413,7 +413,7 @@ def coefficients_table(document: Document) -> TextTable:
 
 
 def runs_table(document: Document) -> TextTable:
-    """Natural frequency and damping ratio of the first runs, `SHOWN_RUNS` of them at most."""
+    """Natural frequency and damping ratio of the first runs, at most `SHOWN_RUNS`."""
     rows = tuple(
         (run["id"], _with_std(run["omega_n"]), _with_std(run["zeta"]), run["status"].replace("_", " "))
         for run in document["runs"][:SHOWN_RUNS]
@@ -423,7 +423,7 @@ def runs_table(document: Document) -> TextTable:
 
 
 def status_lines(document: Document) -> list[str]:
-    """What the estimate and its runs have to say, the gravest first, each once with its runs and the remedy."""
+    """The statuses of the estimate and its runs, the gravest first, each once with its runs and the remedy."""
     runs: dict[str, list[str]] = {name: [] for name in document["statuses"] if name != "ok"}
     for run in document["runs"]:
         for name in run["statuses"]:

@@ -1,4 +1,4 @@
-"""How many runs an identification has finished, for whoever shows it."""
+"""The number of runs that an identification has finished, for a display."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def shown_by(progress: Progress | None) -> Iterator[None]:
 
 
 def counted(runs: Sequence[ItemT]) -> Iterator[ItemT]:
-    """The runs one after another, each reported when the next one is asked for."""
+    """The runs in turn, each reported when the next one is requested."""
     progress = _shown.get()
     for number, run in enumerate(runs):
         if progress is not None:

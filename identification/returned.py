@@ -1,6 +1,6 @@
-"""What an estimator returned: an estimate of the runs that it was given, with finite values in the stated units.
+"""A check of what an estimator returned: an estimate of the given runs, with finite values in the stated units.
 
-Every command asks an estimator through `identify`, which looks at the answer here; so does `check_estimator`.
+`identify`, and through it every command, and `check_estimator` check the answer of an estimator here.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CAMPAIGN_UNITS: Mapping[str, str] = {
 
 
 class WrongReturn(TunnelError):
-    """An estimator returned something else than an estimate of the campaign that it was given."""
+    """An estimator did not return an estimate of the given campaign."""
 
 
 Fault = tuple[str, str]
@@ -47,16 +47,16 @@ _ROUNDING = 1e-6  # of a correlation: a covariance is a product of matrices
 
 
 def checked_return(found: object, name: str, campaign: Campaign, of: str = "") -> Estimate:
-    """What an estimator returned for a campaign.
+    """The returned value of an estimator for a campaign, checked.
 
     Args:
         name: of the estimator.
         of: words for the campaign in messages; empty: its name.
 
     Raises:
-        WrongReturn: when it is not an estimate, its runs are not those of the campaign in their order, a value
-            is not a finite number, has another unit, or lacks its standard deviation, the covariance is not that of
-            the coefficients, or it cannot be written as JSON.
+        WrongReturn: when it is not an estimate; its runs are not those of the campaign in their order; a value
+            is not a finite number, has another unit, or lacks its standard deviation; the covariance does not fit
+            the coefficients; or it cannot be written as JSON.
     """
     more = "" if of else "; identification.check_estimator checks a class"
     of = of or f"campaign '{campaign.name}'"
@@ -123,12 +123,12 @@ def _fault_of_quantity(name: str, quantity: object, unit: str, of: str) -> Fault
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value is one number that JSON can hold; NumPy's float64 is a float."""
+    """Whether a value is one number that JSON can express; NumPy's float64 is a float."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _described(value: object) -> str:
-    """A value that is not what it should be, with its type where that is not told by the text."""
+    """A wrong value, with its type unless the text shows it."""
     return "None" if value is None else f"{type(value).__name__} {one_line(repr(value), 60)}"
 
 
@@ -162,7 +162,7 @@ def _fault_of_variances(matrix: Array, stds: Array, names: tuple[str, ...], of: 
 
     Args:
         matrix: the covariance, shape (p, p).
-        stds: of the values of the names, shape (p,).
+        stds: of the named values, shape (p,).
     """
     for name, variance, std in zip(names, matrix.diagonal().tolist(), stds.tolist(), strict=True):
         if variance < 0.0:
@@ -178,7 +178,7 @@ def _fault_of_variances(matrix: Array, stds: Array, names: tuple[str, ...], of: 
 
 
 def _fault_of_correlations(matrix: Array, stds: Array, of: str) -> Fault | None:
-    """Whether a covariance of right variances is not one: not symmetric, or not positive semidefinite.
+    """Whether a covariance with right variances is invalid: not symmetric, or not positive semidefinite.
 
     Args:
         matrix: shape (p, p).

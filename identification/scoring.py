@@ -1,9 +1,9 @@
-"""Estimates against the truth: accuracy, and whether a method got worse than a baseline.
+"""Estimates against the truth: accuracy, and whether a method has become worse than a baseline.
 
-Standard errors of bias and RMSE are those of means (delta method for the root); see `root_mean_square` for few
-trials. The tests against a baseline use
-only ranks and counts, so they are exact, or nearly so, for any distribution of the errors. If nothing changed,
-old and new trials are exchangeable, and so is any choice made from both together (a direction, a threshold).
+Standard errors of bias and RMSE are the standard errors of means (delta method for the root); see
+`root_mean_square` for few trials. The tests against a baseline use only ranks and counts, so they are exact, or
+nearly so, for any distribution of the errors. If nothing changed, old and new trials are exchangeable, and so is
+any choice made from both together (a direction, a threshold).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class ScoredEstimate:
 
     Args:
         truth: true value, in the quantity's unit.
-        bound: smallest standard deviation any unbiased estimator can have, in the same unit; None where not
+        bound: smallest standard deviation of any unbiased estimator, in the same unit; None where it is not
             known.
     """
 
@@ -47,8 +47,8 @@ class Trials:
     """The outcomes of one method on many records, one quantity of one unit.
 
     Args:
-        error: estimate − truth of those identified, shape (k,).
-        std: as the method reports it, shape (k,).
+        error: estimate − truth of the identified trials, shape (k,).
+        std: as reported by the method, shape (k,).
         truth: shape (k,).
         bound: see `ScoredEstimate`, shape (k,); None where it is not known for all.
         failures: number of further trials that gave no estimate.
@@ -113,7 +113,7 @@ class Score:
         relative_bias: mean of error over the size of the truth, %; None where a truth is zero.
         bias_in_stds: mean of error over the reported standard deviation; None where one of these is zero.
         rmse: root of the mean squared error, in the quantity's unit.
-        rmse_over_bound: root of the mean squared (error over bound); None where the bound is not known.
+        rmse_over_bound: root of the mean squared ratio of error to bound; None where the bound is not known.
         coverage: of the 95 % intervals, among the trials with an estimate; None where there is none.
     """
 
@@ -165,9 +165,9 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 def root_mean_square(values: Array, unit: str) -> Quantity:
     """√mean(x²) with its standard error, that of mean(x²) through the root.
 
-    Few squares may be alike by chance, so that their own scatter says too little. The standard error is therefore
-    at least that of normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m² s².
-    Without a mean that is 1/√(2n) of the root.
+    Few squares may be alike by chance, and their scatter is then too small. The standard error is therefore
+    at least the one for normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m² s².
+    For zero mean this is 1/√(2n) of the root.
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
@@ -182,7 +182,7 @@ def root_mean_square(values: Array, unit: str) -> Quantity:
 
 
 def reach_of_rmse(trials: int) -> tuple[float, float]:
-    """The ends of the 95 % interval of an RMSE over the RMSE found, of normal errors without bias (χ²).
+    """The ends of the 95 % interval of an RMSE over its estimate, for normal errors without bias (χ²).
 
     Args:
         trials: number of errors in it, from 1.
@@ -196,7 +196,7 @@ def reach_of_rmse(trials: int) -> tuple[float, float]:
 def overall(scores: Iterable[Score]) -> Quantity | None:
     """The root mean square over cells of their RMSE over the bound, with its standard error.
 
-    None where no cell has one.
+    None where no cell has a bound.
     """
     figures = [one.rmse_over_bound for one in scores if one.rmse_over_bound is not None]
     if not figures:
@@ -218,8 +218,8 @@ class Change:
             bound; ``outliers``, ``coverage`` and ``failures`` as shares.
         before: the baseline's figure, in these units.
         now: the figure now, in these units.
-        p_value: probability of a change for the worse at least this large if nothing changed; 1 where the
-            figure is no worse.
+        p_value: probability of at least this change for the worse if nothing changed; 1 where the figure is
+            no worse.
     """
 
     aspect: Aspect
@@ -232,8 +232,8 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     """Every aspect of a method over one cell, or over several together; the baseline's trials come first.
 
     ``bias`` is the mean error, worse when it moves away from zero; ``spread`` the root mean square error;
-    ``outliers`` the share of errors beyond six medians of their size; ``coverage`` that of 95 % intervals, worse
-    further from 95 %.
+    ``outliers`` the share of errors beyond six medians of their size; ``coverage`` the coverage of 95 % intervals,
+    worse further from 95 %.
 
     Raises:
         ValueError: when the cells differ in number, or a bound is known on one side only.
@@ -256,7 +256,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     turned, sizes, means = [], [], []
     for old_errors, new_errors in scaled:
         both = np.concatenate((old_errors, new_errors))
-        # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
+        # The direction of a cell is that of all its errors, old and new: a change in this direction is worse.
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old_errors, direction * new_errors))
         sizes.append((np.abs(old_errors), np.abs(new_errors)))
@@ -292,7 +292,7 @@ def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool
 
 
 def _share(aspect: Aspect, counts: NDArray[np.int64], *, larger_is_worse: bool) -> Change:
-    """The change of a share by Fisher's exact test; of the coverage, further from 95 % is worse."""
+    """The change of a share by Fisher's exact test; a coverage further from 95 % is worse."""
     from scipy.stats import fisher_exact
 
     if 0 in counts[:, 1]:
@@ -308,7 +308,7 @@ def _share(aspect: Aspect, counts: NDArray[np.int64], *, larger_is_worse: bool) 
 
 
 def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
-    """One-sided p-value for larger new values: of pairs of the same records, or of independent values."""
+    """One-sided p-value for larger new values, from pairs of the same records or from independent values."""
     from scipy.special import ndtr
     from scipy.stats import rankdata
 

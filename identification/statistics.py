@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _WORST_CONDITION = 1e13
-# Of a variance or an information: its square root and its inverse still have full precision.
+# Greatest variance or information whose square root and inverse still have full precision.
 _SMALLEST = 1e-290
 
 
@@ -94,7 +94,7 @@ def determined(matrix: Array) -> bool:
     """Whether a symmetric matrix is positive definite to working precision, whatever its units.
 
     An information matrix is checked before it is inverted, and a covariance before it is used. With a condition
-    number above 1e13, after scaling to a unit diagonal, the inverse holds less than three correct digits.
+    number above 1e13, after scaling to a unit diagonal, the inverse has fewer than three correct digits.
 
     Args:
         matrix: shape (m, m).
@@ -123,7 +123,7 @@ def embed(link: Array, *, with_zero: bool) -> Array:
 
 
 def weighted_fit(columns: Array, target: Array, variance: Array) -> tuple[Array, Array]:
-    """Linear least squares with known variances, which are raised where the scatter is beyond chance.
+    """Linear least squares with known variances, which are raised where the scatter exceeds them beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.
@@ -170,10 +170,10 @@ def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, f
 
 @dataclass(frozen=True)
 class Proportion:
-    """How many of how many, such as the trials that failed.
+    """A count out of a total, such as the trials that failed.
 
     Args:
-        total: number of all; the share is defined above 0 only.
+        total: the total count; the share is defined above 0 only.
     """
 
     count: int
@@ -181,7 +181,7 @@ class Proportion:
 
     @classmethod
     def of(cls, flags: Sequence[bool]) -> Proportion:
-        """How many are true."""
+        """The proportion of true flags."""
         return cls(sum(map(bool, flags)), len(flags))
 
     @property
@@ -191,7 +191,7 @@ class Proportion:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval of 95 % (J. Am. Stat. Assoc. 22 (1927) 209–212), as shares; 0 to 1 of none."""
+        """Wilson's interval of 95 % (J. Am. Stat. Assoc. 22 (1927) 209–212), as shares; 0 to 1 for a total of 0."""
         from scipy.stats import binomtest
 
         if not self.total:
@@ -200,7 +200,7 @@ class Proportion:
         return float(found.low), float(found.high)
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Count, total, share (None of none) and interval."""
+        """Count, total, share (None for a total of 0) and interval."""
         share = self.value if self.total else None
         return {"count": self.count, "total": self.total, "share": share, "wilson_95": list(self.interval)}
 
@@ -229,8 +229,8 @@ def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> A
     """Standard deviations of parameters, shape (q,), from the scatter of the runs, whatever the spectrum.
 
     The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13, doi
-    10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter: 1.96
-    of them on either side are a 95 % interval.
+    10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter: ±1.96
+    standard deviations are a 95 % interval.
 
     Args:
         influences: contribution of every run's residual to the parameters, shape (runs, q).
@@ -242,24 +242,23 @@ def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> A
 
 
 def student_factor(relative: Array) -> Array:
-    """Factor on standard deviations whose variances are estimated, so that 1.96 of them are a 95 % interval.
+    """Factor on standard deviations whose variances are estimated, so that ±1.96 of them are a 95 % interval.
 
     Args:
-        relative: variance of each variance over its square, shape (q,); its degrees of freedom are 2 over it.
+        relative: variance of each variance over its square, shape (q,); the degrees of freedom are 2 over it.
     """
     freedom = np.maximum(2.0 / np.maximum(relative, 1e-9), LEAST_WIDTH_FREEDOM)
     return np.asarray(stdtrit(freedom, 0.975) / ndtri(0.975))
 
 
 def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:
-    """Widen the coefficients to what corrections of contradictory statements would make of them.
+    """Widen the coefficients to their values after correcting contradictory statements.
 
-    The largest change that a correction makes is the half-width of a rectangular distribution (GUM 4.3.7).
-    Damping is not compared by the examination, so Cr and Cnr are as doubtful, relatively, as the more doubtful of
-    Izz and Cnβ.
+    The largest change by a correction is the half-width of a rectangular distribution (GUM 4.3.7). The examination
+    does not compare damping, so Cr and Cnr are as doubtful, relatively, as the more doubtful of Izz and Cnβ.
 
     Args:
-        remarks: of the examination; those on a contradiction hold what Izz and Ka over ½ρV² may be.
+        remarks: of the examination; remarks on a contradiction contain the possible values of Izz and Ka over ½ρV².
     """
     inertias = [value for remark in remarks for value in remark.figures.get("inertias_kg_m2", ())]
     moments = [value for remark in remarks for value in remark.figures.get("air_stiffnesses_m3", ()) if value]
@@ -296,7 +295,7 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
 def _reaching(
     found: Quantity | None, factors: Sequence[float], others: Sequence[float] = ()
 ) -> Quantity | None:
-    """A quantity whose distribution reaches other values, and its own times factors."""
+    """A quantity widened to include other values, and its own value times factors."""
     if found is None:
         return None
     away = [abs(factor - 1.0) * abs(found.value) for factor in factors]

@@ -1,4 +1,4 @@
-"""What is said of a campaign: the outcome of an estimate with its remedy, and the remarks of the examination."""
+"""Messages on a campaign: the outcome of an estimate with its remedy, and the remarks of the examination."""
 
 from __future__ import annotations
 
@@ -107,11 +107,11 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing found in the records before the estimation.
+    """A finding in the records before the estimation.
 
     Args:
         outcome: whether the campaign is refused, the runs are left out or cut, or nothing is done.
-        runs: ids of the runs it concerns.
+        runs: ids of the runs concerned.
         figures: numbers behind it, by name, in JSON's types; units in their names.
     """
 
@@ -144,7 +144,7 @@ class Remark:
 
 
 def left_out_as_asked(ids: Collection[str]) -> tuple[Remark, ...]:
-    """The remark on runs that the user asked to leave out; none where there are none."""
+    """The remark on runs that the user left out; none where there are none."""
     if not ids:
         return ()
     remedy = f"repeat the run{'s' if len(ids) > 1 else ''}"
@@ -156,8 +156,8 @@ class Examined:
     """A campaign after its examination.
 
     Args:
-        campaign: the runs to identify; the given campaign itself where nothing was left out or cut.
-        remarks: what was found, in the order of the checks.
+        campaign: the runs to identify; the given campaign itself if nothing was left out or cut.
+        remarks: the findings, in the order of the checks.
     """
 
     campaign: Campaign

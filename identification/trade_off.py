@@ -1,7 +1,7 @@
 """The two parameters that the runs of a campaign separate least, and the run that would separate them.
 
-Every parameter has a role: the powers with which its moment changes with what can be changed between runs. Two
-parameters are separated by a run in which something is changed that they follow with different powers.
+Every parameter has a role: the powers with which its moment depends on the conditions of a run. Two parameters are
+separated by a run that changes a condition on which they depend with different powers.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class TradeOff:
-    """Two parameters of which the runs know a combination better than either.
+    """Two parameters of which the runs determine a combination better than either.
 
     Args:
-        parameters: names of both, in the order of the fit; those of effects are ``effect.parameter``.
+        parameters: names of both, in the order of the fit; for effects ``effect.parameter``.
         correlation: of their errors, −1 to 1, dimensionless.
         remedy: the run that would separate them, as a clause in the imperative.
     """
@@ -33,16 +33,16 @@ class TradeOff:
 
 @dataclass(frozen=True)
 class Role:
-    """How the moment of a parameter follows what can be changed between runs.
+    """The dependence of a parameter's moment on the conditions of a run.
 
     Args:
-        amplitude: power of the amplitude of the motion, dimensionless; None: no power, as of a parameter that
+        amplitude: power of the amplitude of the motion, dimensionless; None: not a power, as for a parameter that
             shapes a law.
         frequency: power of the frequency of the motion, dimensionless.
         wind: power of the wind speed, dimensionless.
-        weight: whether the angle at which a known weight is held shows it, and little else.
+        weight: whether mainly the angle under a known weight shows it.
         input: whether it acts through the input of driven runs only.
-        reading: whether it is an error of the reading, which is no moment.
+        reading: whether it is an error of the reading, not a moment.
         stated: whether it is an error of a stated stiffness.
         length: whether it shapes a change along the run.
     """
@@ -74,10 +74,10 @@ ROLES: Mapping[str, Role] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """What can be changed between the runs of a rig.
+    """The conditions that can be changed between the runs of a rig.
 
     Args:
-        springs: whether its spring can be exchanged, as that of a joint of a model cannot.
+        springs: whether its spring can be exchanged, unlike the spring of a joint of a model.
         driven: whether it is driven.
     """
 
@@ -86,7 +86,7 @@ class Setting:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Setting:
-        """That of a campaign."""
+        """The setting of a campaign."""
         return cls(campaign.law is None and not campaign.unrestrained, campaign.driven)
 
 
@@ -142,8 +142,8 @@ def trade_off(
 
     Args:
         names: of the parameters.
-        covariance: of them, in the products of their units, shape (p, p); a parameter that is not known by the fit
-            has a variance of zero, and is left out.
+        covariance: of them, in the products of their units, shape (p, p); a parameter that the fit does not
+            determine has a variance of zero, and is left out.
         roles: by name.
         least: absolute correlation from which two parameters trade off, a ratio.
     """

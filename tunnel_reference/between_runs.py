@@ -1,7 +1,7 @@
-"""Differences between the runs of a campaign: how they are drawn, and what a campaign states of them.
+"""Differences between the runs of a campaign: their draws, and a campaign's statement on them.
 
-The widths are shares of those of a usual rig, whose tunnel holds its speed to 0.3 %, whose springs come back to
-0.05 % when they are clamped again, and whose bearing and cable damp alike to 1 %.
+The widths are shares of a usual rig's: its tunnel keeps its speed to 0.3 %, its springs repeat to 0.05 % when they
+are clamped again, and its bearing and cable repeat their damping to 1 %.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ LEVELS: Mapping[str, tuple[float, float]] = {
 MIXED = "mixed"
 """Small or large, equally likely."""
 
-_ABSENT = 0.25  # probability that a number repeats in a campaign whose others scatter
-_TAILS = 4.0  # degrees of freedom of Student's t: one run in ninety lies beyond three standard deviations
+_ABSENT = 0.25  # probability that a property repeats in a campaign whose others scatter
+_TAILS = 4.0  # degrees of freedom of Student's t: one run in ninety is beyond three standard deviations
 _ZERO = (1e-3, 5e-3)  # rad, standard deviation of the zeros
 _DRIFT = (1.0, 4.0)  # from the first to the last run, in widths
 
 
 @dataclass(frozen=True, eq=False)
 class ScatterDraw:
-    """How the runs of a campaign differ.
+    """The differences between the runs of a campaign.
 
     Args:
         level: of the widths, of ``LEVELS``.
         form: of the distribution, of ``FORMS``.
-        widths: standard deviation by number, relative.
-        deviations: of every run by number, relative, and rad of ``zero``, shape (runs,).
-        stated: what the campaign states, relative, by number; empty for nothing.
+        widths: relative standard deviation by property.
+        deviations: of every run by property, relative, and rad for ``zero``, shape (runs,).
+        stated: the campaign's statement, relative, by property; empty for none.
     """
 
     level: str
@@ -53,7 +53,7 @@ class ScatterDraw:
     stated: Mapping[str, float]
 
     def truth(self, runs: int) -> dict[str, Any]:
-        """Widths and deviations as ``truth.json`` has them.
+        """Widths and deviations in the form of ``truth.json``.
 
         Args:
             runs: number of runs.
@@ -93,7 +93,7 @@ def _zeros(rng: np.random.Generator, widths: Widths, runs: int) -> dict[str, Arr
 
 
 def _walk(rng: np.random.Generator, widths: Widths, runs: int) -> dict[str, Array]:
-    """A random walk over the order of the runs, whose variance about its mean is that of the width on average."""
+    """A random walk over the order of the runs; its mean variance about its mean is the square of the width."""
     step = np.sqrt(6.0 / (runs + 1.0))
     return {name: width * step * np.cumsum(rng.standard_normal(runs)) for name, width in widths.items()}
 
@@ -121,7 +121,7 @@ FORMS: Mapping[str, tuple[Group, Draw]] = {
 def draw_scatter(
     rng: np.random.Generator, runs: int, *, level: str, normal: float, rare: float, stated: float
 ) -> ScatterDraw:
-    """Draw how the runs of a campaign differ.
+    """Draw the differences between the runs of a campaign.
 
     Args:
         rng: source of all random numbers.
@@ -144,7 +144,7 @@ def draw_scatter(
 
 
 def scattered(conditions: Conditions, drawn: ScatterDraw | None) -> Conditions:
-    """The conditions of a campaign whose runs differ; as given without scatter."""
+    """The conditions of a campaign whose runs differ; unchanged without scatter."""
     if drawn is None:
         return conditions
     none = np.zeros(1)

@@ -19,7 +19,7 @@ Bind = Callable[[float, Extra, Conditions], tuple[Conditions, Bound | None]]
 
 
 class Group(StrEnum):
-    """How far a form is from the textbook."""
+    """The distance of a form from the textbook."""
 
     TEXTBOOK = "textbook"
     COMMON = "common"

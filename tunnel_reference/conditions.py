@@ -18,7 +18,7 @@ RESOLUTION = 2.0 * np.pi / 3.0 / 4096.0
 
 @dataclass(frozen=True)
 class Rod:
-    """A rod that twists between its upper end, which carries spring and sensor, and the body below.
+    """A rod that twists between its upper end, with spring and sensor, and the body below.
 
     Args:
         compliance: 1/Krod, rad/(N m).
@@ -37,7 +37,7 @@ class Rod:
 
 @dataclass(frozen=True)
 class Actuator:
-    """What stands between the input as written and the moment on the body.
+    """Limits and lags between the input as written and the moment on the body.
 
     Args:
         limit: greatest moment, N m.
@@ -54,18 +54,18 @@ class Actuator:
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """What drives the runs of a campaign; zero in its free decays.
+    """The input of a campaign's runs; zero in its free decays.
 
     Args:
         column: ``moment_nm``, ``drive``, ``base_rad``, the angle of the spring's root, or
             ``base_acceleration_rad_s2``, the angular acceleration of the base from which all angles are counted.
         values: at the samples, N m, units, rad or rad/s², shape (samples, runs).
-        held: whether they are kept between samples, shape (runs,); else they are linear.
-        peak: greatest angle of the linear rig's response, rad, shape (runs,); 0 of free decays.
-        gain: N m per unit of a ``drive``, and of the acceleration of a base minus the inertia; 1 of other columns.
+        held: whether they are held between samples, shape (runs,); else they are linear.
+        peak: greatest angle of the linear rig's response, rad, shape (runs,); 0 for free decays.
+        gain: N m per unit of a ``drive``; minus the inertia for the acceleration of a base; 1 for other columns.
         stated: whether the campaign states the gain.
-        delay: time by which the input acts later than its samples say, s, shape (runs,) or (1,).
-        actuator: that exerts the moment; None where the moment is that written.
+        delay: time by which the input acts later than its samples, s, shape (runs,) or (1,).
+        actuator: exerts the moment; None where the moment equals the written one.
     """
 
     column: str
@@ -89,7 +89,7 @@ class Input:
 
     @property
     def greatest(self) -> float:
-        """Greatest moment that is asked for in any run, N m."""
+        """Greatest demanded moment in any run, N m."""
         return float(self.gain * np.max(np.abs(self.values)))
 
 
@@ -125,18 +125,18 @@ class Conditions:
         moment_scale: moments as written over moments as simulated. All other moments here are as simulated.
         drive: the input of driven runs; None where all runs are free decays.
         start_rate: of the motion, rad/s.
-        noise_scale: a run's own noise over that of the campaign.
-        noise_tails: degrees of freedom of Student's t, which the white noise follows; 0: it is normal.
-        zero_shift: a run's own zero less that of the campaign, rad.
+        noise_scale: ratio of a run's own noise to the campaign's.
+        noise_tails: degrees of freedom of Student's t for the white noise; 0: it is normal.
+        zero_shift: a run's own zero less the campaign's, rad.
         kept: share of the duration that is written.
-        every: of how many samples one is written.
+        every: number of samples of which one is written.
         time_start: time stamp of the first sample, s.
         gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
-        offset: angle that is subtracted from all readings as written, rad.
+        offset: angle subtracted from all readings as written, rad.
         speed_deviation: a run's own deviation of the speed, as a share of the stated one.
         stiffness_deviation: a run's own deviation of the spring, as a share of its stiffness.
         damping_deviation: a run's own deviation of Cr, as a share of it.
-        zero_deviation: a run's own zero less that of the campaign, which does not state it, rad.
+        zero_deviation: a run's own zero less the campaign's, which does not state it, rad.
     """
 
     spring_stiffness: Array
@@ -200,7 +200,7 @@ class Conditions:
 
     @property
     def reach(self) -> float:
-        """Greatest angle of the runs, about, rad: that of the release or of the response to the input."""
+        """Approximate greatest angle of the runs, rad: of the release or of the response to the input."""
         peak = 0.0 if self.drive is None else float(np.max(self.drive.peak))
         return max(float(np.max(np.abs(self.start_angle))), peak)
 
@@ -251,7 +251,7 @@ class Conditions:
         return float(self.noise_std**2 * np.mean(self.noise_scale**2) + self.resolution**2 / 12.0)
 
     def written(self, run: int) -> NDArray[np.int64]:
-        """The samples of a run that are written, shape (n,)."""
+        """The written samples of a run, shape (n,)."""
         kept, every = (np.broadcast_to(value, (self.runs,))[run] for value in (self.kept, self.every))
         samples = np.arange(0, round(float(kept) * self.samples), int(every))
         share = samples / self.samples

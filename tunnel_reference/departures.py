@@ -1,8 +1,8 @@
-"""Departures from what the simulators, the fits and their tests have in common (decision 0005).
+"""Departures from assumptions common to the simulators, the fits and their tests (decision 0005).
 
 Each breaks one assumption that campaigns of the standard rig share, and is an everyday property of a rig and of its
-data logger. None of them is a cause: what the campaign states of it is true, and what it does not state, a campaign
-need not state.
+data logger. None of them is a cause: the campaign's statements about it are true, and anything unstated is
+optional.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from tunnel_reference.conditions import Array, Conditions
 
-_BEYOND = 16.0  # Hz as simulated: a hum is drawn where it appears beyond the motion's third harmonic
+_BEYOND = 16.0  # Hz as simulated: a hum is drawn only where it appears beyond the motion's third harmonic
 _INSIDE = 2.0  # Hz below half the sample rate
 _MAINS = (50.0, 60.0)
 
@@ -32,9 +32,9 @@ def draw_departures(
     """Break each assumption with the same probability, independently of the others.
 
     Args:
-        rng: source of all random numbers; not used where nothing can be broken.
-        certain: the assumptions that are broken whatever the probability, of `DEPARTURES`.
-        mains: whether mains hum acts, so that the sample rate must not fold it onto the motion.
+        rng: source of all random numbers; not used where no assumption can be broken.
+        certain: the assumptions that are broken at any probability, of `DEPARTURES`.
+        mains: whether mains hum acts, so that the sample rate must not alias it onto the motion.
     """
     if probability == 0.0 and not set(certain) & set(DEPARTURES):
         return conditions
@@ -43,7 +43,7 @@ def draw_departures(
         if rng.random() >= (1.0 if name in certain else probability):
             continue
         changed = change(rng, found)
-        shown = mains and _shows_mains(found)  # else no change may help, and none is drawn again
+        shown = mains and _shows_mains(found)  # otherwise no change may help, and none is drawn again
         while shown and not _shows_mains(changed):
             changed = change(rng, found)
         found = changed
@@ -63,20 +63,20 @@ def _shows_mains(c: Conditions) -> bool:
 def _log_uniform(
     rng: np.random.Generator, low: float, high: float, size: int | tuple[int, ...] = ()
 ) -> Array:
-    """Drawn equally in the logarithm."""
+    """A number drawn uniformly in the logarithm."""
     return np.asarray(np.exp(rng.uniform(np.log(low), np.log(high), size)))
 
 
 def _sample_rate(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Another rate than 1000 Hz, which folds the mains where it is below 120 Hz."""
-    if c.drive is not None:  # whose input is sampled already
+    """A rate other than 1000 Hz, which aliases the mains where it is below 120 Hz."""
+    if c.drive is not None:  # its input is already sampled
         return c
     return replace(c, sample_rate=float(np.round(_log_uniform(rng, 80.0, 800.0))))
 
 
 def _rates_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
     """The logger keeps every sample of one run and one of up to four of another."""
-    if c.drive is not None:  # a thinned input is another one
+    if c.drive is not None:  # thinning would change the input
         return c
     most = max(1, min(4, int(c.sample_rate / 80.0)))
     return replace(c, every=rng.integers(1, most + 1, c.runs))
@@ -89,14 +89,14 @@ def _durations_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 def _records_are_short(rng: np.random.Generator, c: Conditions) -> Conditions:
     """Few cycles: about five to fifteen."""
-    if c.drive is not None:  # whose input is drawn for the duration already
+    if c.drive is not None:  # its input is already drawn for the duration
         return c
     return replace(c, duration=float(np.round(rng.uniform(2.5, 4.0), 2)))
 
 
 def _samples_missing(rng: np.random.Generator, c: Conditions) -> Conditions:
     """One to three gaps of up to a fiftieth of the record, which the time stamps show."""
-    if c.drive is not None:  # a gap in the input would be another input
+    if c.drive is not None:  # a gap would change the input
         return c
     start = rng.uniform(0.05, 0.9, int(rng.integers(1, 4)))
     return replace(c, gaps=np.stack([start, start + rng.uniform(0.002, 0.02, start.size)], axis=1))
@@ -120,7 +120,7 @@ def _releases_are_other(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 
 def _starts_with_a_rate(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Recorded from after the release on: up to a fifth of the rate of a passage through the middle."""
+    """The record starts after the release, with up to a fifth of the rate of a passage through the middle."""
     rate = c.wind_off_omega * np.abs(c.start_angle) * rng.uniform(-0.2, 0.2, c.runs)
     return replace(c, start_rate=rate)
 
@@ -136,7 +136,7 @@ def _speeds_unpaired(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 
 def _other_springs(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Springs that are not those of the table, at least a tenth apart."""
+    """Springs outside the table, at least a tenth apart."""
     springs = np.unique(c.spring_stiffness)
     drawn = np.zeros(springs.size)
     while np.min(np.diff(drawn), initial=np.inf) < 0.1 * drawn[0] or drawn[0] == 0.0:
@@ -145,7 +145,7 @@ def _other_springs(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 
 def _noise_differs(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """A run's noise is up to twice or half that of the campaign, which is then not stated."""
+    """A run's noise is up to twice or half the campaign's, which is then not stated."""
     return replace(c, noise_scale=_log_uniform(rng, 0.5, 2.0, c.runs), stated_noise=None)
 
 
@@ -160,12 +160,12 @@ def _zeros_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 
 def _rests_anywhere(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """The reading at rest is any angle of a turn, as of an encoder without an index."""
+    """The reading at rest is any angle of a turn, as from an encoder without an index."""
     return replace(c, offset=float(np.round(rng.uniform(-np.pi, np.pi), 4)))
 
 
 def _sensor_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Less noise or more, and steps from a twentieth of it to three times as wide."""
+    """Noise above or below the standard, and steps from a twentieth of it to three times as wide."""
     noise = float(_log_uniform(rng, 3e-5, 2e-3))
     resolution = noise * float(_log_uniform(rng, 0.05, 3.0))
     return replace(c, noise_std=noise, resolution=resolution, stated_noise=None)

@@ -1,4 +1,4 @@
-"""Disturbances of one run: a blow, a push, and a bump of the reading. They are no family of effects."""
+"""Disturbances of one run: a blow, a push, and a bump of the reading. They are not a family of effects."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from tunnel_reference.severity import size_effects
 DISTURBANCE = "disturbance"
 """Family of the forms below."""
 _BLOW, _PUSH = 0.02, 0.2  # s
-_BETWEEN = (0.15, 0.85)  # shares of the run between which it is disturbed
-_EXCESS = (0.3, 10.0)  # of the campaign, in noise powers
+_BETWEEN = (0.15, 0.85)  # range of the disturbance, in shares of the run
+_EXCESS = (0.3, 10.0)  # of the campaign, in noise variances
 
 
 def _half_sine(time: float | Array, at: Array, length: Array) -> Array:
@@ -72,13 +72,13 @@ def with_disturbances(
     forms: Sequence[str] = tuple(FORMS),
     excess: tuple[float, float] = _EXCESS,
 ) -> list[CampaignDraw]:
-    """Campaigns in which one run each is disturbed.
+    """Campaigns with a disturbance in one run each.
 
     Args:
         draws: campaigns whose effects have been scaled.
         rng: source of run, instant, form, sign and size.
-        forms: names of forms, of which each is equally likely.
-        excess: of the campaign with the disturbance alone, in noise powers: least and greatest.
+        forms: names of forms, all equally likely.
+        excess: of the campaign with the disturbance alone, in noise variances: least and greatest.
     """
     added = [_draw(rng, draw.conditions, forms, excess) for draw in draws]
     alone = [replace(draw, effects=(one,)) for draw, one in zip(draws, added, strict=True)]

@@ -19,7 +19,7 @@ from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0
 _FASTER_AIR = 4.0  # at most 100 m/s, where the standard rig has 25 m/s
-_MAINS_SCALES = (0.3, 8.0)  # between these the mains lie above the motion and below half of 1000 Hz
+_MAINS_SCALES = (0.3, 8.0)  # in this range the mains are above the motion and below half of 1000 Hz
 
 CIRCUMSTANCES = ("few_runs", "coloured", "uneven_stamps", "scaled")
 
@@ -39,7 +39,7 @@ def draw_circumstances(
         conditions: of the standard rig.
         probability: of each change.
         mains: whether mains hum acts, so that the sample rate must resolve it.
-        certain: the changes that are made whatever the probability, of ``CIRCUMSTANCES``.
+        certain: the changes that are made at any probability, of ``CIRCUMSTANCES``.
 
     Returns:
         Conditions of a rig of another scale, with few springs and speeds, coloured noise, or uneven time stamps.
@@ -51,13 +51,13 @@ def draw_circumstances(
     found = conditions
     if occurs("few_runs"):
         found = _few_runs(rng, conditions)
-        while found is conditions and "few_runs" in certain:  # a wind speed that the springs kept do not have
+        while found is conditions and "few_runs" in certain:  # a wind speed that the kept springs do not have
             found = _few_runs(rng, conditions)
-    if occurs("coloured"):  # half or more of the noise's power falls off above a corner frequency
+    if occurs("coloured"):  # half or more of the noise variance falls off above a corner frequency
         corner = float(np.exp(rng.uniform(np.log(3.0), np.log(100.0))))
         found = replace(found, noise_corner=corner, coloured_share=float(rng.uniform(0.5, 0.95)))
     if occurs("uneven_stamps"):
-        if rng.random() < 0.5:  # samples taken late by part of an interval and stamped when taken
+        if rng.random() < 0.5:  # samples delayed by part of an interval, with their true times as stamps
             jitter = float(rng.uniform(0.05, 0.5))
             found = replace(found, clock_jitter=jitter, clock_seed=int(rng.integers(2**31)))
         else:  # even samples with rounded stamps
@@ -106,8 +106,8 @@ class EffectDraw:
         sign: sign of its severity parameter.
         target: required excess of this effect alone, after refitting the nominal model.
         value: magnitude of the severity parameter; a first guess until it is scaled.
-        small: whether it is a small effect beside those that matter.
-        own: its excess less what the other effects that matter can imitate; None until it is known.
+        small: whether it is a small effect besides the relevant ones.
+        own: its excess without the part that the other relevant effects can imitate; None until it is known.
     """
 
     form: Form
@@ -125,7 +125,7 @@ class CampaignDraw:
 
     Args:
         kind: one of ``KINDS``.
-        effects: those that matter, then small ones.
+        effects: the relevant ones, then small ones.
         seed: of the sensor's noise.
         scatter: differences between the runs; None where they repeat.
     """
@@ -140,21 +140,21 @@ class CampaignDraw:
 
 @dataclass(frozen=True)
 class Mixture:
-    """How forms and circumstances are mixed.
+    """Probabilities of forms and circumstances.
 
     Args:
         textbook: probability of the textbook form.
         rare: probability that any other form is a rare one (0 for tuning sets).
         variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
-        small: probability of a small effect beside those that matter, and of a second one beside the first.
-        certain: circumstances that every campaign has, of `tunnel_reference.draw.CIRCUMSTANCES`, and assumptions
-            that all of them break, of `tunnel_reference.departures.DEPARTURES`.
+        small: probability of a small effect besides the relevant ones, and of a second one besides the first.
+        certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`, and assumptions that all
+            of them break, of `tunnel_reference.departures.DEPARTURES`.
         departures: probability that an assumption is broken, each.
         driven: whether all runs are driven, or some.
         scatter: probability that the runs differ from each other.
         level: of these differences, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
-        normal: probability that they are normally distributed; ``rare`` is that of a rare form of the others.
+        normal: probability that they are normally distributed; ``rare`` is the probability of a rare other form.
     """
 
     textbook: float = 0.5
@@ -171,7 +171,7 @@ class Mixture:
 
     @property
     def families(self) -> tuple[str, ...]:
-        """The families that are drawn."""
+        """The families from which effects are drawn."""
         return DRIVEN_FAMILIES if self.driven else FAMILIES
 
 
@@ -183,12 +183,12 @@ def draw_campaign(
     Args:
         rng: source of all random numbers.
         kind: one of ``KINDS``.
-        families: of the first effects that matter; the others are drawn.
+        families: of the first relevant effects; the others are drawn.
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     mixture = mixture or Mixture()
-    (between,) = rng.spawn(1)  # of its own, so that all else is drawn alike with and without scatter
+    (between,) = rng.spawn(1)  # separate, so that the other draws are equal with and without scatter
     number = NUMBERS.get(kind, 0)
     known = mixture.families
     names = draw_families(rng, number, families, known)
@@ -204,7 +204,7 @@ def draw_campaign(
         rng, conditions, probability=mixture.departures, mains=mains, certain=mixture.certain
     )
     if mixture.driven:
-        # The law of structural damping is that of a spring with a fixed root, and an actuator exerts a moment.
+        # The law of structural damping assumes a spring with a fixed root, and an actuator exerts a moment.
         by_root = not {"structural_damping", *ACTUATORS} & {*names, *small}
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
     effects = []
@@ -230,7 +230,7 @@ def draw_campaign(
 
 
 def redraw(draw: CampaignDraw) -> CampaignDraw:
-    """Another campaign of the same kind with the same first family, given by the seed of the one replaced."""
+    """Another campaign of the same kind with the same first family, from the seed of the replaced one."""
     mattering = [e.form.family for e in draw.effects if not e.small]
     rng = np.random.default_rng(draw.seed)
     return draw_campaign(rng, kind=draw.kind, mixture=draw.mixture, families=mattering[:1])

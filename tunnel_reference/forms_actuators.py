@@ -1,4 +1,4 @@
-"""Forms of what an actuator makes of the moment it is asked for: a lag, a greatest moment, a greatest rate."""
+"""Forms of an actuator's changes to the demanded moment: a lag, a greatest moment, a greatest rate."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunnel_reference.conditions import Actuator, Conditions
 
 
 def _with(c: Conditions, **changed: Any) -> Conditions:
-    """The conditions with an actuator, beside what others have made of it."""
+    """The conditions with an actuator, added to earlier changes of it."""
     assert c.drive is not None
     return replace(c, drive=replace(c.drive, actuator=replace(c.drive.actuator or Actuator(), **changed)))
 
@@ -22,24 +22,24 @@ def _lag(p: float, _e: Extra, c: Conditions) -> Conditions:
 
 
 def _two_lags(p: float, _e: Extra, c: Conditions) -> Conditions:
-    """Two equal lags in a row: as late at low frequencies as one of p."""
+    """Two equal lags in a row: at low frequencies the same delay as one of p."""
     return _with(c, lags=(0.5 * p, 0.5 * p))
 
 
 def _limit(p: float, _e: Extra, c: Conditions) -> Conditions:
-    """M = (1 − p) times the greatest moment that is asked for."""
+    """M = (1 − p) times the greatest demanded moment."""
     assert c.drive is not None
     return _with(c, limit=(1.0 - p) * c.drive.greatest)
 
 
 def _soft_limit(p: float, _e: Extra, c: Conditions) -> Conditions:
-    """The moment m that is asked for becomes M tanh(m/M), where M is the greatest one asked for over p."""
+    """The demanded moment m becomes M tanh(m/M), where M is the greatest demand over p."""
     assert c.drive is not None
     return _with(c, limit=c.drive.greatest / p, soft=True)
 
 
 def _rate(p: float, _e: Extra, c: Conditions) -> Conditions:
-    """R is the root mean square of the moment that is asked for over p."""
+    """R is the root mean square of the demanded moment over p."""
     assert c.drive is not None
     moment = c.drive.gain * c.drive.values[:, c.drive.driven]
     return _with(c, rate=float(np.sqrt(np.mean(moment**2))) / p)

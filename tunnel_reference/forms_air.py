@@ -46,7 +46,7 @@ _MOMENT = (
 
 
 def _wagner(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """Two time constants, p l/V and ``ratio`` times that, with their weights."""
+    """Two time constants, p l/V and ``ratio`` times p l/V, with their weights."""
     return {"w1": e["w1"], "w2": 1.0 - e["w1"], "tau1": lag_time(p, c), "tau2": lag_time(p * e["ratio"], c)}
 
 

@@ -1,4 +1,4 @@
-"""Forms of errors in time: a delay of the input, and samples that are missing without a gap in the time stamps."""
+"""Forms of errors in time: a delay of the input, and missing samples without a gap in the time stamps."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.readings import Order, Params, Reading, ReadingTerm
 
 _BOTH = (-1, 1)
-_LONGEST = 0.25  # s: longest time lost, for which the motion goes on beyond the record
+_LONGEST = 0.25  # s: longest lost time, for which the motion continues beyond the record
 
 
 def missing(r: Reading, p: Params) -> Array:
-    """Takes a whole number of samples out at every instant and closes up; the end is padded, and cut off later."""
+    """Removes a whole number of samples at every instant and closes the gap; padding at the end is cut later."""
     out = r.value.copy()
     count = np.round(p["lost"] * r.conditions.sample_rate).astype(int)
     for run in range(out.shape[1]):
@@ -28,7 +28,7 @@ def missing(r: Reading, p: Params) -> Array:
 
 
 def _lost(instants: int) -> Bind:
-    """Time lost, shared out over instants drawn for every run; the input is lost with the reading, or complete."""
+    """Lost time, distributed over instants drawn for every run; the input is lost with the reading, or complete."""
 
     def bind(p: float, e: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
         shares = np.full((c.runs, instants), e.get("own", 0.0))
@@ -46,14 +46,14 @@ def _lost(instants: int) -> Bind:
 
 
 def _drawn(g: np.random.Generator, c: Conditions) -> dict[str, float]:
-    """A seed, the stated duration, and of driven runs whether the input is lost too."""
+    """A seed, the stated duration, and for driven runs whether the input is lost too."""
     seed = int(g.integers(0, 2**31))
     drawn = {"seed": float(seed), "duration": c.duration}
     return drawn if c.drive is None else {**drawn, "input_lost": float(seed % 2)}
 
 
 def _later(p: float, e: Extra, c: Conditions) -> Conditions:
-    """The input acts later by p, in every run by the share ``spread`` of it more or less."""
+    """The input acts later by p, varied from run to run by up to the share ``spread``."""
     assert c.drive is not None
     own = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs)
     return replace(c, drive=replace(c.drive, delay=p * (1.0 + e["spread"] * own)))

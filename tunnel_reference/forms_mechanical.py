@@ -109,7 +109,7 @@ _SPRING = (
 
 
 def _rod_draw(low: float, high: float, hardening: float, held: float, damping: float) -> Draw:
-    """Inertia share of the upper end, damping of the twist, hardening, and which end is held until the release."""
+    """Inertia share of the upper end, damping of the twist, hardening, and the end held until the release."""
 
     def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
         return {"share": float(g.uniform(low, high)), "damping_ratio": float(g.uniform(0.2, 1.0)) * damping,

@@ -15,14 +15,14 @@ _BOTH = (-1, 1)
 
 
 def ringing(r: Reading, p: Params) -> Array:
-    """Adds the real part of a e^((i − ζ) ω t + i φ), and what the input excites."""
+    """Adds the real part of a e^((i − ζ) ω t + i φ), and the oscillation excited by the input."""
     pole, time = p["frequency"] * (1j - p["damping_ratio"]), r.conditions.time
     wave = p["amplitude"] * np.exp(pole * time[:, None] + 1j * p["phase"])
     out = np.asarray(r.value + wave.real)
     drive = r.conditions.drive
     if drive is None or not p["excited"].any():
         return out
-    # of a moment in shares of the spring's stiffness; a delay of the input delays the response
+    # from a moment in shares of the spring's stiffness; a delay of the input delays the response
     per = p["frequency"] ** 2 * (1.0 + p["damping_ratio"] ** 2)
     per = per * (1.0 if drive.column == "base_rad" else drive.gain / r.conditions.spring_stiffness)
     response = oscillator_response(r.conditions, pole) * (p["excited"] * per)[:, None]
@@ -34,9 +34,10 @@ def ringing(r: Reading, p: Params) -> Array:
 
 
 def _made(released: float, in_phase: bool) -> ParamMaker:
-    """Amplitude as the release angle to a power; phases drawn, or that of a rod released at rest.
+    """Amplitude as the release angle to a power; phases drawn, or the phase of a rod released at rest.
 
-    Where the power is not 0, the input excites the mode of a driven run, as it holds the body at a release.
+    Where the power is not 0, the input excites the mode of a driven run, as holding the body excites it at a
+    release.
     """
 
     def make(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
@@ -62,7 +63,7 @@ def _made(released: float, in_phase: bool) -> ParamMaker:
 
 
 def _drawn(low: float, high: float) -> Draw:
-    """A seed, a frequency between two in Hz, and a light damping."""
+    """A seed, a frequency between two bounds in Hz, and a light damping."""
     return lambda g, _c: {
         "seed": float(g.integers(0, 2**31)),
         "frequency": 2.0 * np.pi * g.uniform(low, high),
@@ -150,7 +151,7 @@ _APART, _STEP_OF_MAINS = 0.02, 0.002  # Hz: of a large grid within minutes, and 
 
 
 def _hum_draw(third: float) -> Draw:
-    """Seed, frequency within a grid's wander of 50 or 60 Hz as written, and up to ``third`` of third harmonic."""
+    """Seed, frequency within a grid's range about 50 or 60 Hz as written, and up to ``third`` of third harmonic."""
 
     def draw(g: np.random.Generator, c: Conditions) -> dict[str, float]:
         seed = int(g.integers(0, 2**31))

@@ -1,4 +1,4 @@
-"""Forms of what the surroundings do to the rig, with the wind on and off."""
+"""Forms of disturbances by the surroundings of the rig, with the wind on and off."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inputs of driven runs: how they are drawn, their value at any time, and the linear rig's response to them."""
+"""The inputs of driven runs: their draws, their value at any time, and the linear rig's response to them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Actuator, Array, Conditions, Input
 
-_MIXED = 0.3  # probability that free decays stand beside driven runs
-_FREE = 0.4  # share of such runs then
+_MIXED = 0.3  # probability of free decays among driven runs
+_FREE = 0.4  # share of free decays in that case
 _BAND = (0.3, 3.0)  # of the run's own frequency
 _UNKNOWN_GAIN = 0.25
 _BASE = 0.15
@@ -24,12 +24,12 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
 
     Args:
         rng: source of all random numbers.
-        c: of free decays; the rig's frequencies follow from it.
+        c: of free decays; it gives the rig's frequencies.
         by_root: whether the input may be the motion of the spring's root.
 
     Returns:
         The conditions with an input whose linear response reaches half of the stated release angle or more, and
-        with initial angles and rates that are small beside it.
+        with small initial angles and rates in comparison.
     """
     kind = rng.random()
     column = (
@@ -46,7 +46,7 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
         driven[rng.permutation(c.runs)[:2]] = True, False
     own = np.sqrt((c.true_stiffness - c.air_stiffness) / c.yaw_inertia) / (2.0 * np.pi)
     time, waves = np.arange(c.samples) / c.sample_rate, []
-    for frequency in own.tolist():  # about it, and of about unit size
+    for frequency in own.tolist():  # around it, and of about unit size
         form = WAVEFORMS[int(rng.integers(len(WAVEFORMS)))]
         low, high = _BAND[0] * frequency, _BAND[1] * frequency
         if form == "square":
@@ -82,7 +82,7 @@ def linear_response(c: Conditions, parameters: Array) -> Array:
     """The nominal rig's response to its input from rest at zero, exact for both holds.
 
     Args:
-        c: with an input; stiffness and speed are those stated.
+        c: with an input; stiffness and speed are the stated ones.
         parameters: Izz, Cr, Cnβ, Cnr, shape (4,).
 
     Returns:
@@ -100,7 +100,7 @@ def linear_response(c: Conditions, parameters: Array) -> Array:
 
 
 def oscillator_response(c: Conditions, pole: np.ndarray) -> Array:
-    """How q̈ − 2 Re λ q̇ + |λ|² q = u follows the input as written from rest, exact for both holds.
+    """The response of q̈ − 2 Re λ q̇ + |λ|² q = u from rest to the input as written, exact for both holds.
 
     Args:
         c: with an input.
@@ -129,7 +129,7 @@ def oscillator_response(c: Conditions, pole: np.ndarray) -> Array:
 
 
 def finer(values: Array, held: NDArray[np.bool_]) -> Array:
-    """The inputs at more samples, shape (samples, runs): between those given they are kept, or linear."""
+    """The inputs at more samples, shape (samples, runs): between the given samples held, or linear."""
     place = np.arange(len(values) * _FINER) / _FINER
     before = place.astype(np.intp)
     after = np.minimum(before + 1, len(values) - 1)
@@ -140,21 +140,21 @@ def finer(values: Array, held: NDArray[np.bool_]) -> Array:
 def exerted(
     asked: Array, actuator: Actuator, step: float, held: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """The moment of an actuator that stands at what is asked for first.
+    """The moment of an actuator that starts at the first demand.
 
     Args:
-        asked: at the samples, N m, shape (samples, runs).
+        asked: demand at the samples, N m, shape (samples, runs).
         step: between samples, s.
-        held: whether the moment asked for is kept between samples, shape (runs,).
+        held: whether the demand is held between samples, shape (runs,).
 
     Returns:
-        The moment, N m, of that shape, and whether it is kept between samples.
+        The moment, N m, of that shape, and whether it is held between samples.
     """
     limit, most = actuator.limit, actuator.rate * step
     out = limit * np.tanh(asked / limit) if actuator.soft else np.clip(asked, -limit, limit)
     if not (np.isfinite(most) or actuator.lags):
         return out, held
-    out[1:] = np.where(held, out[:-1], out[1:])  # what is asked for just before the sample
+    out[1:] = np.where(held, out[:-1], out[1:])  # the demand just before the sample
     jumps = held
     if np.isfinite(most):
         jumps = np.zeros_like(held)
@@ -188,7 +188,7 @@ class Inputs:
 
     @classmethod
     def of(cls, conditions: Sequence[Conditions]) -> Inputs | None:
-        """The inputs of these campaigns, zero in free decays; None where no run is driven."""
+        """The inputs of these campaigns, zero in free decays; None if no run is driven."""
         if all(c.drive is None for c in conditions):
             return None
         runs = [c.runs for c in conditions]
@@ -221,11 +221,11 @@ class Inputs:
         return np.where(self.on_body, self._at(time, middle), 0.0)
 
     def root(self, time: float, middle: float) -> Array | float:
-        """The angle of the springs' roots, rad, shape (rows,); 0 where none moves."""
+        """The angle of the springs' roots, rad, shape (rows,); 0 for fixed roots."""
         return 0.0 if self.on_body.all() else np.where(self.on_body, 0.0, self._at(time, middle))
 
     def _at(self, time: float, middle: float) -> Array:
-        """The value; the sample from which it follows is that of the step's middle."""
+        """The value; the preceding sample is taken at the step's middle."""
         last = len(self.values) - 1
         if not self.delay.any():
             k = min(int(middle * self.rate + 1e-9), last)

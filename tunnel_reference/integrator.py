@@ -1,6 +1,6 @@
 """Integrates all runs of many campaigns at once: RK4 with a small step, dry friction by events within the step.
 
-The effects of a campaign are *terms*: laws with parameters for the rows (runs) they apply to. A law reads and
+The effects of a campaign are *terms*: laws with parameters for the rows (runs) to which they apply. A law reads and
 changes the moments of one RK4 stage. A friction law only gives the friction level; the sign of friction is
 constant in a step. Where the rate crosses zero within the step, the state after the crossing is corrected: the
 body slips the other way, or sticks until the other moments exceed the level. The local error of the correction
@@ -26,7 +26,7 @@ Rows = Places | slice
 
 
 class Phase(IntEnum):
-    """When a law acts within a stage."""
+    """The phase of a stage in which a law acts."""
 
     WIND = 0  # changes the speed ratio
     ANGLE = 1  # changes the angle on which air or spring acts
@@ -42,7 +42,7 @@ class Stage:
         time: s.
         beta: body angle, rad.
         rate: body rate, rad/s.
-        theta: angle of the rod's upper end, rad (that of the body where the rod is rigid).
+        theta: angle of the rod's upper end, rad (the body's where the rod is rigid).
         omega: rate of the upper end, rad/s.
         stiffness: true Kr, N m/rad.
         air_stiffness: Ka at the run's true speed, N m/rad.
@@ -83,7 +83,7 @@ class Term:
 
     Args:
         params: arrays whose first axis is the campaign's runs.
-        memory: initial states of the law, shape (states, runs); None where it has none.
+        memory: initial states of the law, shape (states, runs); None for a law without states.
     """
 
     law: Law
@@ -107,7 +107,7 @@ class Motion:
 
 @dataclass(eq=False)
 class _Group:
-    """One law for all rows of the batch that it applies to, with its block of the state vector."""
+    """One law for all rows of the batch to which it applies, with its block of the state vector."""
 
     law: Law
     phase: Phase
@@ -122,7 +122,7 @@ def _group_terms(
 ) -> list[_Group]:
     """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance.
 
-    A law that a campaign has twice is in two groups: a law adds to each row of its group once.
+    A law that occurs twice in a campaign is in two groups: a law adds to each row of its group once.
     """
     found: dict[tuple[int, Law, int, int], list[tuple[Term, Places]]] = {}
     for number, campaign_terms in enumerate(terms):
@@ -316,7 +316,7 @@ def integrate(
         substeps: RK4 steps per sample.
 
     Returns:
-        One motion per campaign; not finite where it grows without bound.
+        One motion per campaign; not finite where it diverges.
 
     Raises:
         ValueError: when rigid and flexible rods, or sample rates, are mixed.
@@ -333,7 +333,7 @@ def integrate(
     h, n = interval / substeps, batch.size
     first = 2 * n if batch.flexible else 0
     angle, rate = np.empty((samples, n)), np.empty((samples, n))
-    with np.errstate(over="ignore", invalid="ignore"):  # without bound is infinite, or not a number
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion is infinite, or not a number
         for k in range(samples):
             angle[k], rate[k] = batch.state[first : first + n], batch.state[first + n : first + 2 * n]
             if k < samples - 1:

@@ -73,7 +73,7 @@ def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
     """Scale the effects of drawn campaigns and simulate them."""
     sized = [
         replace(one, conditions=scattered(one.conditions, one.scatter))
-        for one in size_separably(draws, progress=progress)  # whose excess is that of the effects alone
+        for one in size_separably(draws, progress=progress)  # with the excess due to the effects alone
     ]
     if progress:
         print(f"simulating {len(sized)} campaigns", file=sys.stderr)
@@ -139,11 +139,11 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     """The truth of a campaign, for ``truth.json``.
 
     ``effects`` is the sorted list of families (``["unknown"]`` for an effect outside the known ones, ``[]`` for
-    none). ``small`` lists the effects beside them that need not be found. ``severity`` is the excess after
+    none). ``small`` lists small effects, which need not be found. ``severity`` is the excess after
     refitting the nominal model. ``parameters`` gives each effect's form, severity parameter with its symbol,
-    secondary parameters, and the excess for which it was scaled alone; its times and moments are those before
+    secondary parameters, and the excess to which it was scaled alone; its times and moments are values before
     ``scale`` was applied. Where the runs differ, ``scatter`` has the standard deviations between them, ``runs``
-    every run's own deviations, and ``repeatability`` what the campaign states; ``severity`` counts them too.
+    every run's own deviations, and ``repeatability`` the campaign's statement; ``severity`` includes them.
     """
     draw, c = simulated.draw, simulated.draw.conditions
     mattering = [e for e in draw.effects if not e.small]
@@ -192,7 +192,7 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
 def parse_shares(text: str) -> dict[str, float]:
     """Parse kinds with optional weights, such as ``single:3,none``.
 
-    The default weights are `DEFAULT_SHARES`, and 1 for a kind that is not among them.
+    The default weights are `DEFAULT_SHARES`, and 1 for any other kind.
     """
     shares: dict[str, float] = {}
     for item in text.split(","):

@@ -1,7 +1,7 @@
 """The laws of mechanics (friction, damping, springs, gravity), of the air and of forcing.
 
 Moments are in N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs that a law applies to, ``p`` its
-parameters by run. Those of the rig act on the rod's upper end (θ); gravity and the air act on the body (β). The θ
+parameters by run. Moments of the rig act on the rod's upper end (θ); gravity and the air act on the body (β). The θ
 of springs and of their loss is the deflection, which differs from it where the root of the spring moves.
 """
 

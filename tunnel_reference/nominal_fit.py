@@ -1,6 +1,6 @@
 """Small joint fits of the nominal model by Gauss–Newton: damped sinusoids in closed form, and driven runs.
 
-They scale effects by what remains of them after the fit. They are not estimators of the project.
+They scale effects by the residual after the fit. They are not estimators of the project.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from tunnel_reference.inputs import linear_response
 
 _ITERATIONS = 12
 _TOLERANCE = 1e-6
-_STEP = np.array([1e-5, 1e-5, 1e-4, 1e-4])  # of a difference
-_CLOSE = 1e-3  # of a noise variance, below which the power may still fall
+_STEP = np.array([1e-5, 1e-5, 1e-4, 1e-4])  # of a finite difference
+_CLOSE = 1e-3  # of a noise variance: negligible fall of the residual power
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class NominalFit:
     residual: Array
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a step to a motion that grows without bound is taken back
+@np.errstate(over="ignore", invalid="ignore")  # a step to a diverging motion is rejected
 def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 
@@ -184,7 +184,7 @@ def fit_driven(c: Conditions, readings: Array) -> NominalFit:
             moved = p + _STEP * (np.arange(4) == k)
             changed = gain * linear_response(c, moved)
             free = _free_motion(c, moved, time)
-            # the free motion fitted so far, carried on at the changed rates
+            # the free motion fitted so far, continued at the changed rates
             changed += np.einsum("rnk,rk->rn", free, np.einsum("rnk,rn->rk", free, fitted - gain * response))
             columns.append((changed - fitted) / _STEP[k])
         columns += [response if free_gain else np.zeros_like(response), np.ones_like(response)]

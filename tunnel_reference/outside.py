@@ -1,7 +1,7 @@
-"""Effects outside the known families, which leave a gap that no family explains: their laws, and their forms.
+"""Effects outside the known families, which leave an unexplained residual: their laws, and their forms.
 
 Moments are in N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs that a law applies to, ``p`` its
-parameters by run. Most of `LAW_FORMS` are moments of the state, for checks of what a law can explain.
+parameters by run. Most of `LAW_FORMS` are moments of the state, to check what a law can explain.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def reading_ripple(r: Reading, p: ReadingParams) -> Array:
 
 
 def reading_kink(r: Reading, p: ReadingParams) -> Array:
-    """Adds g |y|: another gain on one side."""
+    """Adds g |y|: a different gain on one side."""
     return np.asarray(r.value + p["gain"] * np.abs(r.value))
 
 
@@ -253,7 +253,7 @@ OUTSIDE_FORMS: tuple[Form, ...] = (*_BLOWS, *_SLOW, *_PLACE, *_SENSOR)
 
 
 def _pressure(c: Conditions) -> np.ndarray:
-    """Dynamic pressure over that at 20 m/s, by run."""
+    """Ratio of dynamic pressure to its value at 20 m/s, by run."""
     return np.asarray((c.true_speed / 20.0) ** 2)
 
 

@@ -90,7 +90,7 @@ def read_motion(
         slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
         share = conditions.coloured_share
         noise = np.sqrt(1.0 - share) * noise + np.sqrt(share) * slow
-    if conditions.clock_jitter != 0.0:  # the motion when the samples were taken
+    if conditions.clock_jitter != 0.0:  # the motion at the true sample times
         n, interval = motion.angle.shape[0], 1.0 / conditions.sample_rate
         u = (conditions.time[:n] / interval - np.arange(n))[:, None]
         after = np.minimum(np.arange(n) + 1, n - 1)
@@ -229,7 +229,7 @@ def hum(r: Reading, p: Params) -> Array:
 
 
 def hum_harmonic(r: Reading, p: Params) -> Array:
-    """Adds a sin(4πft + φ): what a rectifier or a lamp lets through."""
+    """Adds a sin(4πft + φ): hum from a rectifier or a lamp."""
     return r.value + p["amplitude"] * np.sin(
         4.0 * np.pi * p["frequency"] * r.conditions.time[:, None] + p["phase"]
     )
@@ -241,7 +241,7 @@ _WANDERS_EACH = 0.5  # s, between two steps of the mains' frequency
 def hum_wandering(r: Reading, p: Params) -> Array:
     """Hum whose frequency differs by run and wanders within it, and whose amplitude differs by run.
 
-    The frequency is that of a run plus a random walk with steps of ``step`` (Hz) twice a second.
+    The frequency is the run's own plus a random walk with steps of ``step`` (Hz) twice a second.
     """
     t = r.conditions.time
     out = np.array(r.value)
@@ -297,6 +297,6 @@ def coarse_truncation(r: Reading, p: Params) -> Array:
 
 
 def uneven_rounding(r: Reading, p: Params) -> Array:
-    """Rounds to steps of alternating width: even and odd levels are a quarter step apart from their place."""
+    """Rounds to steps of alternating width: even and odd levels are a quarter step off their place."""
     level = np.round(r.value / p["step"])
     return p["step"] * (level + 0.25 * (np.mod(level, 2.0) - 0.5))

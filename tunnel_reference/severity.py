@@ -1,10 +1,10 @@
-"""Simulates drawn campaigns and scales their effects to a target excess; draws again until each matters.
+"""Simulates drawn campaigns and scales their effects to a target excess; draws again until each is relevant.
 
 The excess of an effect is mean(residual²)/noise² − 1 over all runs after refitting the nominal model, where noise²
 is the variance of the sensor's noise and stated quantisation.
 
-An effect's signature is what it adds to the residuals of the nominal model. No change of the other effects' sizes
-imitates the part of it that is orthogonal to their signatures.
+An effect's signature is its contribution to the residuals of the nominal model. No change of the other effects'
+sizes imitates its part orthogonal to their signatures.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SUBSTEPS = 10
 _ROD_SUBSTEPS = 20
 _COARSE, _ROD_COARSE = 1, 10
 _SHORT = 10.0
-_RATE = 1000.0  # Hz, at which the numbers of steps are those above
+_RATE = 1000.0  # Hz, for the numbers of steps above
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
         drive = draw.conditions.drive
         if not term.of_input or drive is None:
             continue
-        # the input as the logger writes it
+        # the input as written by the logger
         values = np.pad(
             drive.values, ((0, conditions.samples - draw.conditions.samples), (0, 0)), mode="edge"
         )
@@ -117,7 +117,7 @@ class _Search:
         self.campaign, self.slot, self.alone = campaign, slot, alone
         effect = alone.effects[0]
         term = effect.form.bind(effect.value, effect.extra, with_defaults(alone.conditions))[1]
-        self.sensor = isinstance(term, ReadingTerm)  # the motion is that without the effect
+        self.sensor = isinstance(term, ReadingTerm)  # the motion is the same without the effect
         self.motion: Motion | None = None
         self.tried: list[tuple[float, float]] = []
         self.done = False
@@ -125,7 +125,7 @@ class _Search:
     def try_out(self) -> None:
         """Compute the excess at the present value and choose the next; only sensor effects can reuse the motion."""
         assert self.motion is not None
-        excess = np.inf  # where its motion grows without bound or is nothing like a free decay
+        excess = np.inf  # where its motion diverges or does not resemble a free decay
         if np.all(np.isfinite(self.motion.angle)):
             with suppress(np.linalg.LinAlgError, ValueError):
                 excess = read_and_fit(self.alone, self.motion).excess
@@ -199,17 +199,18 @@ OWN_EXCESS = 0.5
 OWN_SHARE = 0.1
 """That excess as a share of the whole: signatures of large effects are not exactly proportional to their size."""
 ATTEMPTS = 4
-_STRIDE = 7  # samples of the signatures that are kept
+_STRIDE = 7  # of the stored samples of the signatures
 
 
 def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[CampaignDraw]:
-    """Scale the effects of campaigns; draw again where an effect does not matter or cannot be distinguished.
+    """Scale the effects of campaigns; draw again where an effect is irrelevant or cannot be distinguished.
 
     Args:
         progress: whether to report progress on standard error.
 
     Returns:
-        The campaigns with severity parameters and own excesses set. After four attempts a campaign stays as it is.
+        The campaigns with severity parameters and own excesses set. After four attempts a campaign is kept
+        unchanged.
     """
     found = list(draws)
     left = list(range(len(found)))
@@ -217,7 +218,7 @@ def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> 
         sized = own_excesses(size_effects([found[i] for i in left], progress=progress))
         for number, draw in zip(left, sized, strict=True):
             found[number] = draw
-        # those of which an effect that matters has no excess of its own
+        # those with a relevant effect without an excess of its own
         left = [
             i
             for i in left
@@ -233,7 +234,7 @@ def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> 
 
 
 def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:
-    """Set the own excess of every effect that matters.
+    """Set the own excess of every relevant effect.
 
     Returns:
         The campaigns; those without effects are unchanged.

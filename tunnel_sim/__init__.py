@@ -1,4 +1,4 @@
-"""The virtual rig: its description, its MuJoCo model and plugin, and the records it gives.
+"""The virtual rig: its description, its MuJoCo model and plugin, and its records.
 
 The names below load on first use: importing this package imports neither MuJoCo nor Gymnasium nor SciPy.
 """

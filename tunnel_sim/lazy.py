@@ -1,4 +1,4 @@
-"""Names of a package that load on first use (PEP 562), so that importing the package costs nothing."""
+"""Names of a package that load on first use (PEP 562), so that importing the package is cheap."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ ONE_THREAD = (
     "POLARS_MAX_THREADS",
 )
 """Variables of the environment that say to the libraries how many threads they may start."""
-_FEW_ARENAS = {"MALLOC_ARENA_MAX": "2"}  # each reserves 64 MiB of the address space, which is what is limited
+_FEW_ARENAS = {"MALLOC_ARENA_MAX": "2"}  # each reserves 64 MiB of the address space, which is limited
 _LIMITED = """
 import json, sys
 header = json.loads(sys.stdin.buffer.readline())
@@ -45,7 +45,7 @@ from tunnel_sim.processes import _serve
 _serve(header)
 """
 _OUT_OF_MEMORY = 77  # exit status
-_START_S = 30.0  # a busy machine may take so long to start a process and to import
+_START_S = 30.0  # a busy machine may need this long to start a process and to import
 
 
 @contextmanager
@@ -63,15 +63,15 @@ def one_blas_thread() -> Iterator[None]:
 
 
 class LimitReached(Exception):
-    """Work in a limited process did not end; the text says why, such as ``takes more than 30 s``."""
+    """Work in a limited process did not finish; the text gives the reason, such as ``takes more than 30 s``."""
 
 
 def in_processes(
     work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
 ) -> Iterator[tuple[ItemT, ResultT]]:
-    """Do work in processes of one thread each (0: in this one), few items in flight at a time for the memory.
+    """Do work in processes of one thread each (0: in this one), with few items in flight to limit the memory.
 
-    Items come with results as they finish; BrokenProcessPool where a process dies.
+    Items are returned with results as they finish; BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)
@@ -98,7 +98,7 @@ def in_processes(
 
 
 class Worker:
-    """One process of one thread, which keeps what its modules hold from one piece of work to the next."""
+    """One process of one thread, whose modules keep their state from one piece of work to the next."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -108,7 +108,7 @@ class Worker:
     def submit(
         self, work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs
     ) -> Future[ResultT]:
-        """Do work after what was submitted before; it, its arguments and its result must be picklable."""
+        """Do work after all earlier submissions; it, its arguments and its result must be picklable."""
         with _one_thread_each():  # the process is started by the first work
             return self._pool.submit(work, *given, **named)
 
@@ -124,9 +124,9 @@ def in_limited_process(
     """Do work on untrusted input in a process of its own, which can open no file. Bytes go in and out, no pickles.
 
     Args:
-        prepare: a function of a module as the work is, called before the limits hold: it loads all that is needed.
-        seconds: of the processor that the work may take, s; the clock allows four times as long.
-        memory: that the work may take, bytes.
+        prepare: a function of a module, like the work, called before the limits apply: it loads all that is needed.
+        seconds: processor time of the work, s; the clock allows four times as long.
+        memory: memory of the work, bytes.
 
     Raises:
         LimitReached: when the work takes too long or too much memory, or its process dies.
@@ -159,9 +159,9 @@ def in_limited_process(
 
 
 def _serve(header: dict[str, Any]) -> None:
-    """What a limited process does: work on what it is given, and answer on standard output."""
+    """The limited process: do the given work, and answer on standard output."""
     answer = os.dup(1)
-    os.dup2(2, 1)  # what a library prints is not the answer
+    os.dup2(2, 1)  # the output of a library is not the answer
     prepare, work = (getattr(import_module(module), name) for module, name in header["calls"])
     prepare()
     given = sys.stdin.buffer.read()
@@ -176,12 +176,12 @@ def _serve(header: dict[str, Any]) -> None:
 
 
 def _limit(seconds: float, memory: int) -> None:
-    """Limit what this process may take from now on; where the system has no such limits, the clock alone holds."""
+    """Limit this process from now on; where the system has no such limits, only the clock applies."""
     try:
         import resource
     except ImportError:
         return
-    with suppress(OSError, ValueError):  # a lower limit holds already
+    with suppress(OSError, ValueError):  # a lower limit already applies
         used = int(Path("/proc/self/statm").read_bytes().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
     with suppress(OSError, ValueError):

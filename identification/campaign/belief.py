@@ -1,4 +1,4 @@
-"""What is known of Cnβ, Cnr, Izz and Cr after each run of a campaign, and what a further run would add.
+"""The belief in Cnβ, Cnr, Izz and Cr after each run of a campaign, and the information of a further run.
 
 In φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) every run's decay rate and stiffness are linear (see `derivatives`), so a
 normal prior of φ and the likelihood of the runs give a posterior for any number of runs. The initial state of
@@ -24,7 +24,7 @@ from identification.statistics import determined, eliminate, embed, inverse, sca
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
-# All four columns of φ, whatever the runs separate: the prior supplies what they do not.
+# All four columns of φ, even those that the runs do not separate: the prior determines these.
 _DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
 _NO_SCORE = np.zeros(5)
 _COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]
@@ -37,7 +37,7 @@ class Belief:
     Args:
         shared: most probable φ, shape (4,), SI.
         information: inverse covariance of φ and the sensor's zero, shape (5, 5); the zero's row is zero where
-            nothing is known of it.
+            the zero is unknown.
     """
 
     shared: Array
@@ -50,13 +50,13 @@ class Belief:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of ``values``, in the products of their units, shape (4, 4)."""
+        """Covariance of ``values``, in the products of their units, shape (4, 4)."""
         jacobian = derivatives(_DESIGN, self.shared).jacobian
         return np.asarray(jacobian @ self.shared_covariance @ jacobian.T)
 
     @cached_property
     def shared_covariance(self) -> Array:
-        """Of φ with the zero eliminated, shape (4, 4)."""
+        """Covariance of φ with the zero eliminated, shape (4, 4)."""
         known = self.information[4, 4] > 0.0
         return inverse(eliminate(self.information, _NO_SCORE, 4)[0] if known else self.information[:4, :4])
 
@@ -72,7 +72,7 @@ class Belief:
 
 
 def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
-    """Independent normal distributions of the four coefficients, carried to φ to first order, before any run.
+    """Independent normal distributions of the four coefficients, transformed to φ to first order, before any run.
 
     Args:
         mean: by name, in the units of `identification.estimate.UNITS`.
@@ -175,7 +175,7 @@ def _log_volume(belief: Belief) -> float:
 
 @dataclass(frozen=True, eq=False)
 class LinearRun:
-    """What a run adds to the estimate, to first order.
+    """The contribution of a run to the estimate, to first order.
 
     Args:
         link: from φ to (a, k), shape (2, 4); see `run_link`.
@@ -197,9 +197,9 @@ def linear_run(
 ) -> LinearRun | None:
     """The estimate of a run to first order in its noise; None where the run does not determine its unknowns.
 
-    With the initial state eliminated, it is θ̂ = θ + S⁻¹ s of θ = (a, k, zero): S is the Schur complement of JᵀJ
-    and s that of the score Jᵀ noise, both at the true decay (S. M. Kay, Fundamentals of Statistical Signal
-    Processing: Estimation Theory (1993), ch. 7).
+    With the initial state eliminated, it is θ̂ = θ + S⁻¹ s of θ = (a, k, zero), with S the Schur complement of JᵀJ
+    and s the Schur complement of the score Jᵀ noise, both at the true decay (S. M. Kay, Fundamentals of Statistical
+    Signal Processing: Estimation Theory (1993), ch. 7).
 
     Args:
         link: from φ to (a, k), shape (2, 4).
@@ -217,7 +217,7 @@ def linear_run(
 
 
 def shows_a_decay(motion: Array, noise_std: float) -> bool:
-    """Whether a motion stands out from the noise, as `identify_run` demands.
+    """Whether a motion exceeds the noise, as `identify_run` demands.
 
     Args:
         motion: angle from the sensor's zero, shape (n,), rad.

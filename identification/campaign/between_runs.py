@@ -1,8 +1,8 @@
-"""Chance differences between runs as random effects: how likely widths are, and what they leave uncertain.
+"""Chance differences between runs as random effects: the likelihood of widths, and the resulting uncertainty.
 
 Run i is measured as z_i = J_i δ + D_i e_i + noise of unit variance, with common parameters δ and the run's own
-deviations e_i ~ N(0, S²), S = diag(widths). What else the run has of its own, such as its release, is projected out
-of every column first. The deviations are integrated out exactly, since all of this is linear (Pinheiro and Bates,
+deviations e_i ~ N(0, S²), S = diag(widths). The run's other unknowns, such as its release, are first projected out
+of every column. The deviations are integrated out exactly, since the model is linear (Pinheiro and Bates,
 Mixed-Effects Models in S and S-PLUS, Springer 2000, chapter 2; Harville, J. Am. Stat. Assoc. 72 (1977) 320, doi
 10.1080/01621459.1977.10480998).
 """
@@ -18,13 +18,13 @@ from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
 _ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
-_RIDGE = 1e-11  # of the scaled normal matrix: what the runs do not determine says nothing of widths
+_RIDGE = 1e-11  # of the scaled normal matrix: undetermined parameters do not influence the widths
 _NULL = 1e-11  # eigenvalue of the scaled normal matrix, relative to the largest, that counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class RunProducts:
-    """Products of the columns of every run, what else it has of its own projected out of them.
+    """Products of the columns of every run, its other unknowns projected out.
 
     Args:
         own: Dᵀ D, shape (runs, k, k).
@@ -64,11 +64,11 @@ class RunProducts:
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """What widths make of the runs, their deviations integrated out.
+    """The runs with given widths, their deviations integrated out.
 
     Args:
-        log_determinant: Σ ln|I + S Dᵀ D S|, dimensionless: what the freedom of the deviations costs.
-        quadratic: χ² with the deviations at their likeliest, and their squares over their variances; dimensionless.
+        log_determinant: Σ ln|I + S Dᵀ D S|, dimensionless: the cost of free deviations.
+        quadratic: χ² with the likeliest deviations, plus their squares over their variances; dimensionless.
         common: the likeliest δ, shape (common,).
         covariance: its covariance, shape (common, common).
         deviations: the likeliest of every run, shape (runs, k).
@@ -133,7 +133,7 @@ def marginal(runs: RunProducts, widths: Array) -> Marginal:
 
 @dataclass(frozen=True, eq=False)
 class WidthPrior:
-    """What is known of widths before the runs: ln(width) is normal, within bounds.
+    """Prior of the widths: ln(width) is normal, within bounds.
 
     Args:
         usual: medians, shape (k,).
@@ -152,7 +152,7 @@ class WidthPrior:
         return float(np.sum(self._away(widths) ** 2))
 
     def slope(self, widths: Array) -> Array:
-        """Its derivative with respect to ln(widths), shape (k,)."""
+        """Derivative of `cost` with respect to ln(widths), shape (k,)."""
         return np.asarray(2.0 * self._away(widths) / np.maximum(self._spread, 1e-9), np.float64)
 
     @property
@@ -170,7 +170,7 @@ class WidthPrior:
 
 
 def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None = None) -> Array:
-    """The widths of greatest restricted likelihood times prior, shape (k,); those that are stated as they are.
+    """The widths of greatest restricted likelihood times prior, shape (k,); stated widths are unchanged.
 
     Args:
         start: where the search starts, shape (k,); None: at the usual widths.
@@ -197,15 +197,15 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
 
 @dataclass(frozen=True)
 class UsualWidths:
-    """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
+    """Prior of widths that are not stated: judgements on rigs in general.
 
     Args:
         wind_speed: one standard deviation, a fraction.
         spring_stiffness: one standard deviation, a fraction.
         mechanical_damping: one standard deviation, a fraction.
         decades: standard deviation of log10(width), dimensionless: one rig in twenty is ten times as good or bad.
-        least: least width that is considered, over the usual one; a ratio.
-        most: greatest width that is considered, over the usual one; a ratio.
+        least: least width considered, over the usual one; a ratio.
+        most: greatest width considered, over the usual one; a ratio.
     """
 
     wind_speed: float = USUAL_SCATTER["wind_speed"]
@@ -216,24 +216,24 @@ class UsualWidths:
     most: float = 20.0
 
     def prior(self, names: Sequence[str], stated: Mapping[str, float]) -> WidthPrior:
-        """What is known of the widths of some deviations.
+        """Prior of the widths of some deviations.
 
         Args:
             names: of `SCATTERED`.
-            stated: relative standard deviations that the campaign states, by name; they are used as they are.
+            stated: relative standard deviations that the campaign states, by name; used unchanged.
         """
         usual = np.array([getattr(self, name) for name in names], np.float64)
         least = self.least * usual
         known = np.array([stated.get(name, 0.0) for name in names])
         free = np.array([name not in stated for name in names], bool)
-        middle = np.where(free, usual, np.maximum(known, 1e-6 * usual))  # of a width of zero nothing is seen
+        middle = np.where(free, usual, np.maximum(known, 1e-6 * usual))  # a width of zero has no derivative
         return WidthPrior(middle, np.where(free, self.decades, 0.0), least, self.most * usual)
 
 
 _GRID = 15  # widths in each direction
 _REACH = (40.0, 8.0)  # how far below and above the likeliest width the grid reaches, as ratios
 _AT_ONCE = 1500  # points of the grid
-_NEGLIGIBLE = 1e-4  # density, of the greatest, below which a second grid does not reach
+_NEGLIGIBLE = 1e-4  # density relative to the greatest; the second grid covers only greater ones
 
 
 def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float]) -> Array:
@@ -243,7 +243,7 @@ def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float
         levels: of the quantiles, fractions.
 
     Returns:
-        Widths, shape (levels, k); a width that is stated is as stated at every level.
+        Widths, shape (levels, k); a stated width is the same at every level.
     """
     best = likeliest_widths(runs, prior)
     limits = [
@@ -252,7 +252,7 @@ def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float
     ]
     axes = _axes(limits)
     density = _density(runs, prior, axes)
-    for k, axis in enumerate(axes):  # once more where it is
+    for k, axis in enumerate(axes):  # a second grid over the density of the first
         inside = np.flatnonzero(_along(density, k) > _NEGLIGIBLE * _along(density, k).max())
         limits[k] = float(axis[max(inside[0] - 1, 0)]), float(axis[min(inside[-1] + 1, axis.size - 1)])
     axes = _axes(limits)
@@ -267,7 +267,7 @@ def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float
 
 
 def _axes(limits: Sequence[tuple[float, float]]) -> list[Array]:
-    """Widths of each number between its limits, even in the logarithm; one where the limits are one."""
+    """Widths of each number between its limits, evenly spaced in the logarithm; one where the limits are equal."""
     return [np.geomspace(low, high, _GRID) if high > low else np.array([low]) for low, high in limits]
 
 

@@ -73,7 +73,7 @@ def combined_estimate(
     10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
 
     Args:
-        together: a method's own combination of the runs, which starts from that of least squares.
+        together: a method's own combination of the runs, which starts from the least-squares one.
 
     Raises:
         TunnelError: when a wind-on run states no air density.
@@ -144,7 +144,7 @@ def combined_estimate(
 
 
 def fitted_decay(item: FittedRun) -> RunDecay:
-    """The least-squares fit of a run, as the combination of the runs takes it."""
+    """The least-squares fit of a run, in the form of the combination."""
     if item.fit is None or item.noise is None:
         return RunDecay(item.estimate)
     covariance = decay_covariance_of(item.fit) * (item.noise.std**2 * item.noise.slow_ratio)
@@ -154,10 +154,10 @@ def fitted_decay(item: FittedRun) -> RunDecay:
 
 
 def scattering_estimate(campaign: Campaign, name: str, fitted: Sequence[FittedRun]) -> Estimate | None:
-    """The estimate from the runs' own least-squares fits where scatter between them counts, otherwise None.
+    """The estimate from single-run least-squares fits where scatter between runs counts, otherwise None.
 
-    A joint fit, for which all runs repeat exactly, would take the scatter for a misfit of the model. The sensor's
-    zero is the mean of the runs' own, weighted by their variances.
+    A joint fit assumes that all runs repeat exactly, and would mistake the scatter for a misfit of the model.
+    The sensor's zero is the mean of the runs' zeros, weighted by their variances.
     """
     found = combined_estimate(campaign, name, [fitted_decay(item) for item in fitted])
     if found.repeatability is None:
@@ -206,7 +206,7 @@ class RunByRun(ABC):
         """Identify one run."""
 
     def _together(self, found: Sequence[RunDecay]) -> Combination | None:
-        """The method's own combination of the runs; None where it has none."""
+        """The method's own combination of the runs; None if it has none."""
         del found
         return None
 
@@ -219,10 +219,10 @@ def run_estimate(
     sensor: SensorProperties,
     windows: tuple[WindowEstimate, ...] = (),
 ) -> Found:
-    """The result of a method that does not judge the model: the least-squares residual does.
+    """The result of a method that does not judge the model: the least-squares residual is tested instead.
 
     Args:
-        covariance: of (a, k) as the method gives it, shape (2, 2), in 1/s and 1/s²; None where it gives none.
+        covariance: of (a, k) from the method, shape (2, 2), in 1/s and 1/s²; None where it gives none.
         noise_std: of one sample of the reading, rad.
     """
     reading = Reading.from_record(run.record)
@@ -247,7 +247,7 @@ def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statu
 
     Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ: with a stated spring, gᵢ is 1/Izz for a known moment,
     Kr/Izz for the motion of the spring's root, −1 for the rotation of the base, and a parameter common to the
-    campaign for an input of unknown gain. That gain, and what a body without a spring shows, are remarks.
+    campaign for an input of unknown gain. That gain, and the results for a body without a spring, are remarks.
 
     Args:
         pairs: every run and its own fit, which starts the joint one.
@@ -320,8 +320,8 @@ def _fit_of(item: FittedRun) -> RunFit:
 def with_gains(design: Design, runs: Sequence[Run]) -> Design:
     """A design whose links, of shape (3, p), give the gains of the inputs too: gᵢ, 0 in free runs.
 
-    A gain that is a known number over the inertia depends on no parameter, and its row is zero too. Where the gain
-    of an input is unknown, φ has it, per unit inertia and common to the runs, as last number: shape (3, p + 1).
+    The row of a gain that is a known number over the inertia is zero too. Where the gain of an input is unknown,
+    it is the last element of φ, per unit inertia and common to the runs: shape (3, p + 1).
     """
     place = design.columns.get("g")
     sought = [_gain_sought(run, place) for run in runs]
@@ -352,7 +352,7 @@ def _gain_sought(run: Run, place: int | None) -> bool:
 def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
     """Ids of the runs that are fitted together: those of stated stiffness.
 
-    Without a known moment or a spring in any of them, a body without a spring says nothing on the inertia.
+    Without a known moment or a spring in any of them, a body without a spring does not determine the inertia.
     """
     stated = [run for run in runs if run.spring_stiffness is not None]
     if stated and "g" not in build_design(stated, rig).columns:
@@ -361,16 +361,16 @@ def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
 
 
 def is_remarked(run: Run, joined: set[str]) -> bool:
-    """Whether a note says what a driven run shows by itself: without a spring, or where it gives no coefficient."""
+    """Whether a note describes a driven run alone: without a spring, or where it gives no coefficient."""
     apart = run.id not in joined and run.drive is not None and run.drive.on_body
     return run.unrestrained or (apart and run.known_gain is None)
 
 
 def run_remark(run: Run, gained: Gained) -> Remark:
-    """What a driven run shows by itself, per unit inertia, and what it does not show."""
+    """The parameters that a driven run determines by itself, per unit inertia, and those it does not."""
     assert run.drive is not None
     (rate, _, gain), (rate_std, _, gain_std) = gained.coefficients, gained.deviations
-    gain *= run.drive.kind.scale  # of a base the moment is opposite to the acceleration
+    gain *= run.drive.kind.scale  # for a base, the moment is opposite to the acceleration
     said = f"the gain of the input is {with_std(gain, gain_std)} rad/s² per unit"
     if gained.offset is None:
         return Remark(Outcome.NOTED, (run.id,), said, "state spring_stiffness for a gain in N m per unit")
@@ -395,7 +395,7 @@ def gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inert
 
     Args:
         parameters: φ with the gain last, per unit inertia, shape (p + 1,).
-        covariance: of them, shape (p + 1, p + 1).
+        covariance: of these parameters, shape (p + 1, p + 1).
         inertia: kg m²; None where it was not found.
     """
     value, std = float(parameters[-1]), float(np.sqrt(covariance[-1, -1]))

@@ -33,10 +33,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 
-# Smallest singular value of two columns of unit length, for two runs whose springs or speeds just count as
+# Smallest singular value of two columns of unit length, for two runs whose springs or speeds are just
 # different.
 _RANK_TOLERANCE = LEAST_SPRING_SPREAD / np.sqrt(8.0)
-# Of a stiffness or a moment in SI units; its inverse is the smallest. Fourth powers are formed.
+# Greatest stiffness or moment in SI units; the smallest is its inverse. Fourth powers are formed.
 _GREATEST = 1e60
 
 
@@ -46,7 +46,7 @@ class Design:
 
     Args:
         links: one (2, p) matrix per run: (aᵢ, kᵢ) = Lᵢ φ.
-        columns: places of g, n, d, m in φ; only of those that the campaign separates.
+        columns: places in φ of those of g, n, d, m that the campaign separates.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
     """
@@ -68,9 +68,9 @@ class Derivatives:
     """The campaign's parameters.
 
     Args:
-        names: of `estimate.PARAMETERS`, those that were determined, in that order.
+        names: of the determined parameters, in the order of `estimate.PARAMETERS`.
         values: shape (p,), SI. Without the rig's size, cn_beta and cn_r stand for A·l·Cnβ and A·l²·Cnr.
-        jacobian: of the values to φ, shape (p, size).
+        jacobian: of the values with respect to φ, shape (p, size).
     """
 
     names: tuple[str, ...]
@@ -160,7 +160,7 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
 
 
 def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tuple[Array, Array] | None:
-    """The shared parameters that fit the runs' own decays best, by generalised least squares.
+    """The shared parameters that best fit the runs' own decays, by generalised least squares.
 
     Args:
         decays: (a, k) per run, shape (r, 2), 1/s and 1/s².
@@ -179,7 +179,7 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
 
 
 def derivatives(design: Design, parameters: Array) -> Derivatives:
-    """Cnβ, Cnr, Izz and Cr from the shared parameters; none where the design gives no Izz, or not a positive one.
+    """Cnβ, Cnr, Izz and Cr from the shared parameters; none if the design gives no positive Izz.
 
     Args:
         parameters: φ, shape (p,).
@@ -225,14 +225,14 @@ def filled_estimate(
 ) -> Estimate:
     """The estimate with coefficients, the air of its runs and the wind-off line.
 
-    Without the sizes of the rig the coefficients still multiply A·l and A·l², and only Ka and Ca per run are
+    Without the rig's sizes the coefficients still contain the factors A·l and A·l², and only Ka and Ca per run are
     given.
 
     Args:
         covariance: of the values found, shape (p, p).
-        repeatability: how the runs repeat, where that is in the covariance.
+        repeatability: repeatability of the runs, where the covariance includes it.
     """
-    air: dict[str, dict[str, Any]] = {}  # stiffness and damping of the air in every wind-on run
+    air: dict[str, dict[str, Any]] = {}  # aerodynamic stiffness and damping of every wind-on run
     for name, target, load, unit in (
         ("cn_beta", "aerodynamic_stiffness", design.stiffness_loads, "N m/rad"),
         ("cn_r", "aerodynamic_damping", design.damping_loads, "N m s/rad"),
@@ -267,7 +267,7 @@ def filled_estimate(
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:
     """The statuses of a campaign that follow from its runs, one estimate per run, in the campaign's order.
 
-    Only NO_RUN_IDENTIFIED where no run was identified.
+    Only NO_RUN_IDENTIFIED if no run was identified.
     """
     identified = [estimate.identified for estimate in estimates]
     if not any(identified):
@@ -283,7 +283,7 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
 
 
 def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
-    """MODEL_DEPARTS and NOISE_DISAGREES as they follow from noise levels; None where there is none."""
+    """MODEL_DEPARTS and NOISE_DISAGREES from noise levels; None where there is no level."""
     statuses = set()
     if any(level.departs for level in levels if level is not None):
         statuses.add(Status.MODEL_DEPARTS)
@@ -296,7 +296,7 @@ def design_statuses(design: Design, parameters: Array) -> set[Status]:
     """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
 
     Args:
-        parameters: φ as found, shape (p,).
+        parameters: estimated φ, shape (p,).
     """
     statuses = set()
     if not np.any(design.stiffness_loads > 0.0):
@@ -318,7 +318,7 @@ def wind_off(
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
 
     Args:
-        repeatability: where it counts, the scatter of the springs is in the deviations of the frequencies.
+        repeatability: where it counts, the deviations of the frequencies include the scatter of the springs.
 
     Returns:
         Keyword arguments of `Estimate`; none without wind-off runs.

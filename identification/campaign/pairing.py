@@ -4,8 +4,8 @@
     N̂r = −2 ln 2 (1/t½ − 1/t½₀)                            (eq. 8; printed with the first term squared)
 
 With ωn² = 4π²f² + ln²2/t½² and 2ζωn = 2 ln 2/t½ these are the differences of eqs 10 and 11, which the paper uses
-with its networks: the same code serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the text after eq. 6
-has the signs reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-on runs; Izz is that of eq. 1.
+with its networks: the same code serves both methods. With N̂β = +Ka/Izz and N̂r = +Ca/Izz (the signs in the text
+after eq. 6 are reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-on runs; Izz is from eq. 1.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class _Pairing:
         return cls(stiffness, np.array([load for _, load in sprung]), off, on, [partners[i] for i in on])
 
     def outcome(self, frequency: Array, rate: Array, *, with_line: bool) -> Array:
-        # Izz and Cr, then Ka of each paired run, then Ca of each: the quantities that are propagated.
+        # Izz and Cr, then Ka of each paired run, then Ca of each: the propagated quantities.
         off = self.off
         omega = np.hypot(2.0 * np.pi * frequency[off], rate[off])
         inertia = inertia_of_springs(self.stiffness[off], omega**2, with_line=with_line)
@@ -102,14 +102,14 @@ class _Pairing:
 
 
 def _mean_std(values: Array) -> float:
-    # Of the mean, from the scatter; 0 for too few values, so that the propagated one is used.
+    # Standard deviation of the mean, from the scatter; 0 for too few values, where the propagated one is used.
     if values.size < LEAST_FOR_SCATTER:
         return 0.0
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
 
 
 def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
-    """The scatter between the runs, as for every method; None where none counts."""
+    """The scatter between the runs, computed as for every method; None if it does not count."""
     design = build_design([one.run for one in seen], campaign.rig)
     values, weights = [], []
     for one in seen:
@@ -128,7 +128,7 @@ def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
 
 
 def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: Scatter) -> list[Array]:
-    """What one standard deviation of each kind of scatter does to the outcome, by kind, shape (q, runs)."""
+    """Change of the outcome by one standard deviation of each kind of scatter, by kind, shape (q, runs)."""
     every = []
     values = np.array([seen[:2] for seen in scatter.seen])
     for kind in range(len(scatter.names)):
@@ -150,8 +150,8 @@ def _filled(
     """The estimate, with its wind-off line, with the coefficients and the air of its runs.
 
     The deviations of f and σ are propagated one input at a time (Kragten, Analyst 119 (1994) 2161–2165, doi
-    10.1039/AN9941902161), and so are those of the runs, where scatter between them counts. Where none does, the
-    scatter over the wind-on runs, or of the springs, is used where it is larger.
+    10.1039/AN9941902161), and so are the runs' deviations where scatter between runs counts. Where it does not,
+    the scatter over the wind-on runs or of the springs is used if it is larger.
     """
     rig = campaign.rig
     inertia, count = estimate.wind_off_inertia, len(pairing.on)

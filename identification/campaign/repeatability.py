@@ -1,18 +1,17 @@
-"""How runs repeat: the scatter between runs, and what it makes of the campaign's coefficients.
+"""Repeatability: the scatter between runs, and its effect on the campaign's coefficients.
 
 Run i has its own deviations e of wind speed V, spring stiffness Kr and mechanical damping Cr, relative and normal.
-With Ka ~ V² and Ca ~ V they move its decay rate a and its stiffness k, per unit inertia, by
+With Ka ~ V² and Ca ~ V they change its decay rate a and its stiffness k, per unit inertia, by
 
     δk = Kr g e_K − 2 Ka g e_V,    2 δa = Cr g e_C + Ca g e_V.
 
-The deviations are integrated out (`identification.campaign.between_runs`). Where no repeatability is stated, the
-widths are those of greatest restricted likelihood and prior, and they count only where a likelihood ratio says that
-the runs scatter beyond their noise. Zero is at the end of their range, so that the ratio is at most a mixture of
-two χ² (Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472). Stated widths are
-used as they are.
+The deviations are integrated out (`identification.campaign.between_runs`). Stated widths are used unchanged.
+Otherwise the widths maximise restricted likelihood times prior, and they count only where a likelihood ratio
+shows scatter beyond the runs' noise. Zero is at the end of their range, so the ratio is at most a mixture of
+two χ² (Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472).
 
 Variances with estimated widths have the degrees of freedom of Satterthwaite, Biometrics Bull. 2 (1946) 110–114, doi
-10.2307/3002019, by which Student's t widens them.
+10.2307/3002019; Student's t widens them accordingly.
 """
 
 from __future__ import annotations
@@ -39,12 +38,12 @@ from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Repeatability, Run
 from tunnel_sim.vocabulary.record import Array
 
-_STEP = 0.02  # of ln(width), by which the curvature is taken
+_STEP = 0.02  # of ln(width), for the finite differences of the curvature
 _ZERO = 1e-9  # width, relative to the usual one, that counts as none
 
 
 def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Array]:
-    """What each of `SCATTERED` does to every run's values by its relative size, shape (m, 3).
+    """Derivative of every run's values to the relative size of each of `SCATTERED`, shape (m, 3).
 
     Args:
         design: of the runs, with the gains of inputs where there are driven ones.
@@ -70,13 +69,13 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
-    """Decay rates and stiffnesses of runs, as a method has them, and how deviations of the runs move them.
+    """Decay rates and stiffnesses of runs from a method, and their change with deviations of the runs.
 
     Args:
-        links: by run, shape (m, p): what common parameters φ make of (a, k), or of (a, k, g) with driven runs.
+        links: by run, shape (m, p), from the common parameters φ to (a, k), or to (a, k, g) with driven runs.
         seen: by run, shape (m,).
         weights: inverse covariance of its noise by run, shape (m, m).
-        moves: by run, what each of `SCATTERED` moves by its relative size, shape (m, 3).
+        moves: by run, derivative to the relative size of each of `SCATTERED`, shape (m, 3).
     """
 
     links: Sequence[Array]
@@ -107,7 +106,7 @@ class MeasuredRuns:
         return sum(float(one @ weight @ one) for one, weight in zip(away, self.weights, strict=True))
 
     def floored(self, least: Array) -> MeasuredRuns:
-        """The runs with a noise of at least what the least widths do, so that no width exceeds it by all digits.
+        """The runs with at least the noise of the least widths, so that rounding does not hide it beside a width.
 
         Args:
             least: relative, of each of `SCATTERED`, shape (3,).
@@ -146,13 +145,13 @@ class Scatter:
     """Scatter between runs, and the common parameters of greatest likelihood under it.
 
     Args:
-        names: of `SCATTERED`, those that the runs show.
+        names: the members of `SCATTERED` that the runs show.
         widths: relative standard deviations, shape (k,).
-        uncertain: covariance of ln(widths), shape (k, k); zero of a stated one.
-        stated: those that the campaign states.
+        uncertain: covariance of ln(widths), shape (k, k); zero for a stated width.
+        stated: names of the widths that the campaign states.
         parameters: φ, shape (p,).
         noise: covariance of φ by the noise of the runs alone, shape (p, p).
-        quadratic: χ² with the deviations at their likeliest, dimensionless.
+        quadratic: χ² with the likeliest deviations, dimensionless.
         gains: by run, how φ depends on its values, shape (p, m).
         moves: by run, of one standard deviation of each, shape (m, k).
         seen: by run, its values, shape (m,).
@@ -171,15 +170,15 @@ class Scatter:
 
     @property
     def covariance(self) -> Array:
-        """Of φ, by noise and scatter, not yet widened for estimated widths, shape (p, p)."""
+        """Covariance of φ from noise and scatter, not yet widened for estimated widths, shape (p, p)."""
         moved = self.moved(np.eye(self.parameters.size))
         return np.asarray(self.noise + sum((one @ one.T for one in moved), np.zeros_like(self.noise)))
 
     def moved(self, jacobian: Array) -> list[Array]:
-        """What one standard deviation of each kind does to functions of φ, run by run.
+        """Change of functions of φ by one standard deviation of each kind of scatter, run by run.
 
         Args:
-            jacobian: of the functions to φ, shape (q, p).
+            jacobian: of the functions with respect to φ, shape (q, p).
 
         Returns:
             By kind, shape (q, runs).
@@ -190,14 +189,14 @@ class Scatter:
     def counted(self, noise: Array, moved: Sequence[Array]) -> tuple[Array, list[Array]]:
         """The covariance of noise and scatter together, widened by Student's t where widths are estimated.
 
-        1.96 of the standard deviations on either side are a 95 % interval.
+        An interval of ±1.96 standard deviations has 95 % coverage.
 
         Args:
             noise: covariance without scatter, shape (q, q).
             moved: as of `moved`.
 
         Returns:
-            The covariance, shape (q, q), and what each kind of scatter adds to it.
+            The covariance, shape (q, q), and the contribution of each kind of scatter to it.
         """
         total = noise + sum((one @ one.T for one in moved), np.zeros_like(noise))
         variance = np.diag(total)
@@ -207,10 +206,10 @@ class Scatter:
         return np.asarray(total * wider), [one @ one.T * wider for one in moved]
 
     def of(self, jacobian: Array) -> tuple[Array, RunScatter]:
-        """The covariance of functions of φ, and how the runs repeat.
+        """The covariance of functions of φ, and the repeatability of the runs.
 
         Args:
-            jacobian: of the functions to the first numbers of φ, shape (q, n).
+            jacobian: of the functions with respect to the first elements of φ, shape (q, n).
         """
         size = jacobian.shape[1]
         whole = np.zeros((len(jacobian), self.parameters.size))
@@ -220,10 +219,10 @@ class Scatter:
         return covariance, self.described(added)
 
     def described(self, added: Sequence[Array] = ()) -> RunScatter:
-        """How the runs repeat, for an estimate.
+        """The repeatability of the runs, for an estimate.
 
         Args:
-            added: what each kind of scatter adds to the covariance of its parameters, shape (q, q).
+            added: contribution of each kind of scatter to the covariance of its parameters, shape (q, q).
         """
         reach = float(ndtri(0.975))
         widths: dict[str, Quantity] = {}
@@ -253,12 +252,12 @@ def scatter_between(
     repeatability: Repeatability | None,
     usual: UsualWidths | None = None,
 ) -> Scatter | None:
-    """The scatter between runs; None where none is stated, and the runs show none beyond their noise.
+    """The scatter between runs; None where none is stated and the runs show none beyond their noise.
 
     Args:
         start: φ of generalised least squares without scatter, shape (p,).
-        repeatability: as the campaign states it; it is used as it is.
-        usual: what is known of the widths that are not stated.
+        repeatability: as the campaign states it; used unchanged.
+        usual: prior of the widths that are not stated.
     """
     stated = {} if repeatability is None else repeatability.stated
     usual = usual or UsualWidths()
@@ -306,10 +305,10 @@ def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
 
     Args:
         free: number of widths that are estimated, 1 or more.
-        rate: of exceeding it where no run scatters, at most; a probability.
+        rate: greatest probability of exceeding it where no run scatters.
     """
     low, high = 0.0, float(chdtri(free, rate))
-    while high - low > 1e-6:  # the mixture lies between χ² of one less and of all of them
+    while high - low > 1e-6:  # the mixture lies between χ² of free − 1 and of free degrees of freedom
         middle = 0.5 * (low + high)
         fewer = float(chdtrc(free - 1, middle)) if free > 1 else 0.0
         beyond = 0.5 * (fewer + float(chdtrc(free, middle)))
@@ -318,7 +317,7 @@ def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
 
 
 def _gains(measured: MeasuredRuns, moves: Sequence[Array], found: Marginal) -> tuple[list[Array], Array]:
-    """How φ depends on the values of every run, and its covariance by their noise.
+    """The gain from every run's values to φ, and the covariance of φ from their noise.
 
     The first is H⁻¹ Jᵀ V⁻¹ with V = W⁻¹ + D S² Dᵀ.
     """
@@ -347,7 +346,7 @@ def _uncertainty(runs: RunProducts, widths: Array, prior: WidthPrior) -> Array:
         rows.append((slopes[0] - slopes[1]) / (2.0 * _STEP))
     curvature = np.array(rows)
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
-    # No direction is known worse than the prior says.
+    # In no direction is the variance above the prior's.
     least = 2.0 / (float(np.max(prior.decades[free])) * np.log(10.0)) ** 2
     inverse = vectors @ np.diag(2.0 / np.maximum(values, least)) @ vectors.T
     covariance[np.ix_(free, free)] = inverse

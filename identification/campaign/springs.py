@@ -55,19 +55,18 @@ def fit_springs(
 ) -> SpringFit:
     """Fit the line by least squares and flag outliers.
 
-    The line is the paper's: unweighted, all springs in it. The flags come from the inertia each spring gives by
+    The line is the paper's: unweighted, through all springs. The flags come from the inertia of each spring by
     itself, Kr/ωn² (eq. 1), because the error of a spring is relative. Outliers mask one another, so the rule is
-    the generalised extreme studentised deviate (Rosner, Technometrics 25 (1983) 165–172, doi
     10.1080/00401706.1983.10487848): the spring furthest from the others is tested by its externally studentised
-    residual (Student's t, Bonferroni over the springs left) and removed, repeatedly up to a third of them; all
-    those up to the *last* one beyond chance are flagged. The nominal level is too lenient for ten springs (8.5 %
+    residual (Student's t, Bonferroni over the remaining springs) and removed, repeatedly up to a third of them; all
+    springs up to the *last* one beyond chance are flagged. The nominal level is too lenient for ten springs (8.5 %
     of correct sets at 5 %), so it is calibrated on simulated sets of correct springs with normal relative errors.
     A stiffness common to all runs (a tilted axis) shows in the intercept and in flags on the softest springs.
 
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
         frequency_hz: wind-off frequency with it, Hz, shape (n,).
-        rng: draws the calibration; one of a fixed seed where None, so that the result is repeatable.
+        rng: draws the calibration; None: a fixed seed, so that the result is repeatable.
 
     Raises:
         TunnelError: with fewer than three springs, unequal lengths or values that are not positive.
@@ -92,7 +91,7 @@ def fit_springs(
     line, covariance = _least_squares(np.column_stack((omega_squared, np.ones_like(springs))), springs)
     fitted = line[0] * omega_squared + line[1]
     flagged, p_value = np.zeros(springs.size, dtype=bool), 1.0
-    if springs.size > 3:  # of three springs, two correct ones cannot outvote a wrong one
+    if springs.size > 3:  # two correct springs of three cannot outvote a wrong one
         rng = np.random.default_rng(1) if rng is None else rng
         chances, order = _take_out_the_worst((springs / omega_squared)[None, :])
         least = _take_out_the_worst(rng.standard_normal((_TRIALS, springs.size)))[0].min(axis=1)
@@ -110,13 +109,13 @@ def fit_springs(
 
 
 def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | None:
-    """That the two springs of a campaign give different inertias; None where they agree, or there are others.
+    """A remark that the two springs of a campaign give different inertias; None if they agree or are not two.
 
-    Two springs of which each is known to `SPRING_AT_BEST` are said to disagree at `DIFFERENCE_RATE`.
+    Two springs known to `SPRING_AT_BEST` disagree at the level `DIFFERENCE_RATE`.
 
     Args:
         campaign: states the stiffnesses.
-        runs: the estimates, of which the natural frequencies of free decays with the wind off are compared.
+        runs: the estimates; the natural frequencies of free decays with the wind off are compared.
     """
     still = [run for run in campaign.runs if not run.wind_on and run.drive is None]
     stated = {run.id: run for run in still if run.spring_stiffness}
@@ -152,8 +151,8 @@ def wind_off_line(
 ) -> tuple[Quantity | None, Quantity | None]:
     """Izz [kg m²] from wind-off runs, the gradient of Kr against ωn², and the intercept [N m/rad].
 
-    The standard deviation is the larger of what the scatter about the line gives and what the frequencies' own
-    standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or whose frequencies cannot
+    The standard deviation is the larger of two: from the scatter about the line, and propagated from the
+    frequencies' standard deviations. Springs whose stated stiffnesses are within 1 %, or whose frequencies cannot
     be distinguished, count as one, and Izz is Kr/ωn²: a gradient over them would be dominated by their errors and
     too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1). The
     intercept is then None; both are None where the frequencies fall as the springs get stiffer.
@@ -177,7 +176,7 @@ def wind_off_line(
         return Quantity(float(inertias.mean()), std, "kg m2"), None
     columns = np.column_stack((squared, np.ones_like(squared)))
     line, covariance = _least_squares(columns, stiffness)
-    # A frequency's error moves Kr's line by the gradient times the error of ωn².
+    # A frequency error changes the line's Kr by the gradient times the error of ωn².
     influence = np.linalg.pinv(columns) * (line[0] * squared_std)
     own = np.linalg.norm(influence, axis=1)
     std = np.maximum(own, np.sqrt(np.diag(covariance)))
@@ -186,12 +185,12 @@ def wind_off_line(
 
 
 def inertia_of_springs(stiffness: Array, squared: Array, *, with_line: bool) -> float:
-    """Izz alone, kg m², as by `wind_off_line`, for other frequencies of the same springs.
+    """Izz alone, kg m², as in `wind_off_line`, for other frequencies of the same springs.
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
         squared: ωn² per run, rad²/s², shape (n,).
-        with_line: whether it is the gradient of a line; else the mean of Kr/ωn².
+        with_line: whether Izz is the gradient of a line; else the mean of Kr/ωn².
     """
     if not with_line:
         return float(np.mean(stiffness / squared))
@@ -206,7 +205,7 @@ def _least_squares(columns: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _take_out_the_worst(sets: Array) -> tuple[Array, NDArray[np.intp]]:
-    # Rows are sets of springs. Per step: the Bonferroni chance of the worst one, and which it was.
+    # Rows are sets of springs. Per step: the Bonferroni probability of the worst spring, and its index.
     rows = np.arange(sets.shape[0])
     kept = np.ones(sets.shape, dtype=bool)
     chances, order = [], []
@@ -216,7 +215,7 @@ def _take_out_the_worst(sets: Array) -> tuple[Array, NDArray[np.intp]]:
         squares = np.where(kept, (sets - mean) ** 2, -1.0)
         worst = np.argmax(squares, axis=1)
         own = squares[rows, worst] * count / (count - 1)  # over 1 − leverage
-        # Rounding errors do not count: a set that agrees to the last digits has no outlier.
+        # Rounding errors do not count: a set of equal springs has no outlier.
         floor = (1e-12 * np.abs(mean[:, 0])) ** 2
         rest = np.maximum((np.sum(squares * kept, axis=1) - own) / (count - 2), floor)
         chances.append(np.minimum(1.0, 2.0 * count * stdtr(count - 2, -np.sqrt(own / rest))))

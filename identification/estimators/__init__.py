@@ -2,7 +2,7 @@
 
 To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a
 line to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
-``output_error.OutputError``. It is imported when the estimator is made, so heavy imports wait until then.
+``output_error.OutputError``. It is imported when the estimator is made, so heavy imports are deferred until then.
 """
 
 from __future__ import annotations
@@ -78,10 +78,10 @@ _REMEDY = "state a name and a method estimate(campaign), and let the class need 
 
 
 def register_estimator(kind: KindT) -> KindT:
-    """Add an estimator of one's own by its name; as a decorator too.
+    """Add your own estimator by its name; also as a decorator.
 
     Args:
-        kind: a class with the members of `Estimator` that needs no arguments. It replaces an earlier one of the
+        kind: a class with the members of `Estimator` that needs no arguments. It replaces an earlier class of the
             same name.
 
     Raises:
@@ -109,7 +109,7 @@ def register_estimator(kind: KindT) -> KindT:
 
 
 def register_from(word: str) -> str:
-    """Register the class that a word names as ``module:Class``, and return the name of the estimator.
+    """Register the class named by a word ``module:Class``, and return the name of the estimator.
 
     Args:
         word: the module is imported as Python does: from the folders of ``sys.path``.
@@ -143,8 +143,8 @@ def make_estimator(name: str) -> Estimator:
         name: one of `known_estimators`.
 
     Raises:
-        TunnelError: when there is no such estimator, naming the closest one; or when an installed package states
-            something else than an estimator of that name.
+        TunnelError: when there is no such estimator, naming the closest one; or when the entry of an installed
+            package is not an estimator of that name.
     """
     if name in _registered:
         return cast("Estimator", _registered[name]())
@@ -166,17 +166,17 @@ def make_estimator(name: str) -> Estimator:
 
 
 def free_decay_estimators() -> tuple[str, ...]:
-    """The names of all estimators but those that take driven runs only."""
+    """The names of all estimators except those for driven runs only."""
     return tuple(name for name in known_estimators() if name not in DRIVEN_ONLY)
 
 
 def takes_driven(estimator: Estimator) -> bool:
-    """Whether an estimator takes the input of driven runs: its class attribute ``takes_driven``; False without."""
+    """Whether an estimator takes the input of driven runs: its attribute ``takes_driven``; False if missing."""
     return bool(getattr(estimator, "takes_driven", False))
 
 
 def estimators_of_driven_runs() -> tuple[str, ...]:
-    """The names of all estimators that take driven runs; those that cannot be loaded are left out."""
+    """The names of all estimators that take driven runs, without those that cannot be loaded."""
     found = []
     for name in known_estimators():
         with suppress(TunnelError):
@@ -185,7 +185,7 @@ def estimators_of_driven_runs() -> tuple[str, ...]:
 
 
 def summary_of(name: str) -> str:
-    """One line on an estimator: that of `SUMMARIES`, or the first line of the docstring of one's own."""
+    """One line on an estimator: from `SUMMARIES`, or the first line of your own estimator's docstring."""
     if name in SUMMARIES:
         return SUMMARIES[name]
     with suppress(TunnelError):
@@ -196,11 +196,11 @@ def summary_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class Own:
-    """An estimator of one's own as other processes find it.
+    """A user's estimator, in a form that other processes can load.
 
     Args:
-        place: ``module:Class`` of a registered one that other processes can import; empty of one of an installed
-            package, and of a class from a prompt, a notebook or the inside of a function.
+        place: ``module:Class`` of a registered class that other processes can import; empty for a class of an
+            installed package, and for a class from a prompt, a notebook or the inside of a function.
         code: the first digits of the SHA-256 of the file of its module; empty where it has none.
     """
 
@@ -209,7 +209,7 @@ class Own:
     code: str
 
     def register(self) -> None:
-        """Make it known in this process.
+        """Register it in this process.
 
         Raises:
             TunnelError: when this process cannot import it.
@@ -226,7 +226,7 @@ class Own:
 
 
 def own_estimators(names: Iterable[str]) -> tuple[Own, ...]:
-    """Those of some estimators that are not packaged ones."""
+    """Those among some estimators that are not packaged."""
     found = []
     for name in names:
         if name in SUMMARIES:

@@ -1,15 +1,15 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
-Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so is
-an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
+Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form. An unknown
+noise level is also integrated out, which gives Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
 Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals
 have the stated coverage and do not depend on the choice of parameters (Proc. R. Soc. A 186 (1946) 453–461, doi
-10.1098/rspa.1946.0056): with it
+10.1098/rspa.1946.0056):
 
     p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
 
-with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two are summed
-over a grid. So the logarithm of the likelihood need not be a parabola, which it is not in records of one to three
+with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. Both are summed
+over a grid. So the logarithm of the likelihood need not be a parabola, as it is not in records of one to three
 cycles. The gain of the input of a driven run is one more linear unknown.
 """
 
@@ -43,7 +43,7 @@ _FINER = (7.0, 0.35)
 _WIDENING = 1.25  # of the half width in each refinement after the first: Student's tails are long
 _MOST_REFINEMENTS = 7
 _BORDER_MASS = 1e-4
-_SCALE_BAND = (0.7, 1.4)  # of the standard deviations found over those the grid was made for
+_SCALE_BAND = (0.7, 1.4)  # of the estimated standard deviations over those assumed for the grid
 _FLOOR = -60.0  # of the logarithm of the likelihood relative to its peak: smaller values are neglected
 _STEEPEST = 50.0  # |a| times the record's length: beyond it the record would not show the motion
 _RIDGE = 1e-13  # of a scaled Gram matrix, which is singular for a motion of only a few samples
@@ -54,12 +54,12 @@ TAIL = 0.025
 
 @dataclass(frozen=True)
 class NoiseKnowledge:
-    """What is known of the noise.
+    """Knowledge of the noise.
 
     Args:
         variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
         within: sum of squares within the blocks, rad², which thinning removes from the residual.
-        freedom: ν, number of samples less that of linear unknowns.
+        freedom: ν, number of samples less number of linear unknowns.
     """
 
     variance: float | None
@@ -77,7 +77,7 @@ class DecayPosterior:
         scale: lower triangular: (a, k) = centre + scale z, shape (2, 2).
         axis: of both coordinates z, shape (m,), dimensionless.
         log_likelihood: over the grid without the prior, its largest 0, shape (m, m).
-        log_posterior: with it, shape (m, m).
+        log_posterior: with the prior, shape (m, m).
     """
 
     centre: Array
@@ -97,7 +97,7 @@ class DecayPosterior:
         return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
 
     def log_likelihood_at(self, decays: Array) -> Array:
-        """ℓ of decays (a, k), shape (n, 2), 1/s and 1/s²; beyond the grid it falls like a normal distribution."""
+        """ℓ of decays (a, k), shape (n, 2), 1/s and 1/s²; outside the grid it falls like a normal distribution."""
         z = np.linalg.solve(self.scale, (decays - self.centre).T)
         edge = float(self.axis[-1])
         inside = np.clip(z, -edge, edge)
@@ -123,18 +123,18 @@ class Forced:
     Args:
         response: to unit gain and its derivatives with respect to a and k, at the values of the reading, shape
             (3, n), as a function of the decay.
-        known: the gain over the inertia, where the motion gives it; None where it is a linear unknown.
+        known: the gain over the inertia, where the motion determines it; None where it is a linear unknown.
     """
 
     response: Callable[[Decay], Array]
     known: KnownGain | None
 
     def over(self, centre: Array, scale: Array, axis: Array) -> Array:
-        """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through few of them.
+        """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through a few of them.
 
         Args:
             centre: of the grid, shape (2,), 1/s and 1/s².
-            scale: as of `DecayPosterior`, shape (2, 2).
+            scale: as in `DecayPosterior`, shape (2, 2).
             axis: of both coordinates, shape (m,), dimensionless.
         """
         nodes = chebyshev.chebpts1(_NODES)
@@ -154,8 +154,8 @@ def posterior_of(
     None where the record is too short to bound the decay.
 
     Args:
-        covariance: a guess at that of (a, k), shape (2, 2).
-        forced: of a driven run.
+        covariance: an estimate of the covariance of (a, k), shape (2, 2).
+        forced: for a driven run.
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
     width, step = _FIRST
@@ -193,7 +193,7 @@ def posterior_of(
             centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape)
         )
         mean, spread = found.moments()
-        # It is held where hardly any weight is at the border, in a grid of about the right place and size.
+        # The grid covers it if hardly any weight is at the border, and place and size are about right.
         weights = np.exp(found.log_posterior - found.log_posterior.max())
         inner = weights[1:-1, 1:-1].sum()
         inverse = np.linalg.inv(scale)
@@ -294,7 +294,7 @@ def shared_moments(
     Args:
         links: one (2, p) matrix per run: (a, k) = L φ.
         centre: of the normal approximation, shape (p,).
-        covariance: of the same, shape (p, p).
+        covariance: of the normal approximation, shape (p, p).
     """
     size = centre.size
     half = rng.standard_normal((_PAIRS, size))
@@ -302,7 +302,7 @@ def shared_moments(
     draws = np.concatenate((half, -half))
     proposal = -0.5 * (_TAILS + size) * np.log1p(np.sum(draws**2, axis=1) / _TAILS)
     for _ in range(_ROUNDS):
-        if not determined(covariance):  # all the weight is on a few draws: the caller finds it not determined
+        if not determined(covariance):  # all the weight is on a few draws: the caller reports it
             break
         unit = np.sqrt(np.diag(covariance))
         factor = unit[:, None] * np.linalg.cholesky(covariance / np.outer(unit, unit))
@@ -336,7 +336,7 @@ class Bayesian(RunByRun):
     """Posterior means, deviations and intervals.
 
     Args:
-        blocks_per_cycle: block means per period that the posterior is computed from, at least.
+        blocks_per_cycle: least number of block means per period in the posterior.
     """
 
     name = "bayesian"
@@ -345,7 +345,7 @@ class Bayesian(RunByRun):
     seed: int = 0
 
     def _together(self, found: Sequence[RunDecay]) -> Combination | None:
-        if any(one.gained is not None for one in found):  # their gains are known with (a, k) by moments alone
+        if any(one.gained is not None for one in found):  # only moments give their gains together with (a, k)
             return None
 
         def together(
@@ -387,7 +387,7 @@ class Bayesian(RunByRun):
             found = self._described(run, bare.reading, bare.fit, bare.noise, rows)
             if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
                 return found
-            # the gain given (a, k), as least squares has it
+            # the gain given (a, k), as in least squares
             weight, information, gain = bare.gained.weight, np.zeros((3, 3)), run.known_gain
             moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
             jacobian = np.eye(3)[:, :2]
@@ -418,7 +418,7 @@ class Bayesian(RunByRun):
         noise: NoiseLevel,
         rows: Callable[[Decay], Array] | None = None,
     ) -> Found:
-        """The posterior about a fit; ``rows`` are the response of a driven run, as `driven_rows` gives them."""
+        """The posterior about a fit; ``rows`` are the response of a driven run, as from `driven_rows`."""
         variance = noise.std**2 * noise.slow_ratio
         guess = decay_covariance_of(fit) * variance
         decay, residual, time = fit.decay, fit.residual, reading.time

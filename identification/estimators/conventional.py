@@ -1,7 +1,7 @@
 """The paper's conventional method: spectrum, time to half amplitude, wind-on against wind-off.
 
-Standard deviations of frequency f and decay rate σ are the scatter of one run's peaks: scatter only, not the bias
-of the method. The pairs are compared by eqs 7, 8, 17 and 18 (`identification.campaign.pairing`).
+Standard deviations of frequency f and decay rate σ are the scatter of one run's peaks, without the bias of the
+method. The pairs are compared by eqs 7, 8, 17 and 18 (`identification.campaign.pairing`).
 """
 
 from __future__ import annotations

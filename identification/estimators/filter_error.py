@@ -1,9 +1,9 @@
 """Filter error: maximum likelihood with a random moment on the model and noise in the sensor.
 
-This is for runs in a turbulent stream, where the residual of output error is not white and its intervals are too
+For runs in a turbulent stream, where the residual of output error is not white and its intervals are too
 narrow or, after widening, too wide. A Kalman filter predicts every sample from the previous ones, and decay rate,
 stiffness and intensity of the moment maximise the likelihood of the prediction errors
-(`identification.signal.filter`). For a run without a random moment the result is that of output error; for a body
+(`identification.signal.filter`). A run without a random moment has the result of output error; for a body
 without a spring no random moment is sought.
 """
 
@@ -32,7 +32,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
-_INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle
+_INNOVATIONS_BLOCK = 3  # innovations in an eighth of a cycle
 INTENSITY_UNIT = "rad2/s3"
 
 
@@ -75,7 +75,7 @@ class FilterError(RunByRun):
         if projected is None:
             return Status.NOT_CONVERGED
         fitted, zero = projected
-        # The model is judged by the innovations, which are white if it is right; the residual is not.
+        # The innovations judge the model, since they are white if it is right; the residual is not.
         values, expected = found.innovations.values, found.innovations.variance
         level = noise_level(
             [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
@@ -85,8 +85,7 @@ class FilterError(RunByRun):
         ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
         noise = replace(bare.noise, std=noise_std, departs=departs, slow_ratio=ratio)
         covariance = found.covariance * noise.slow_ratio
-        # The initial state is that of least squares; the part of it due to the moment is of the power of the
-        # residual.
+        # The initial state is from least squares; its error due to the moment has the power of the residual.
         variance = max(noise_std, noise.residual_std) ** 2
         estimate = describe_run(run, reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
         q = found.model.intensity_at_resonance
@@ -100,7 +99,7 @@ class FilterError(RunByRun):
         return RunDecay(estimate, decay, covariance[:2, :2], gained)
 
     def _driven(self, run: Run, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
-        # The fit, and the sensor noise of one sample that it assumes.
+        # The fit, and its assumed sensor noise of one sample.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
             return None
@@ -116,7 +115,7 @@ class FilterError(RunByRun):
         if drive is not None:
 
             def response(decay: Decay) -> Array:
-                """Of the input, in the means of the blocks."""
+                """The response to the input, in the means of the blocks."""
                 driven = input_response(bare.reading, drive, decay, sensor.derivative)
                 motion = Reading(bare.reading.time, driven)
                 return mean_of_blocks(even_reading(motion).yaw, factor)

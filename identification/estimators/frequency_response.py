@@ -1,11 +1,11 @@
-"""Frequency response: the reading over the input, line by line, and a second-order system fitted to it.
+"""Frequency response: the ratio of reading to input, line by line, and a second-order system fitted to it.
 
 The response at a line is the cross spectrum of input and reading over the power of the input, Ĥ1 (Bendat and
-Piersol, Random Data, 4th ed. (2010), ch. 6, doi 10.1002/9781118032428). Of an input that is periodic in the record
-it is taken at the lines of its Fourier transform, of others from segments with Hann windows (Welch, IEEE Trans.
+Piersol, Random Data, 4th ed. (2010), ch. 6, doi 10.1002/9781118032428). For an input that is periodic in the record
+it is computed at the lines of its Fourier transform, for others from segments with Hann windows (Welch, IEEE Trans.
 Audio Electroacoust. 15 (1967) 70–73, doi 10.1109/TAU.1967.1161901). These are shorter than the memory of a lightly
-damped rig, so that leakage would flatten the resonance. The model's response therefore goes through the same
-windows, with its initial state. Lines at which reading and model are not coherent are left out. The least-squares
+damped rig, so that leakage would flatten the resonance. The model's response therefore passes through the same
+windows, with its initial state. Lines without coherence of reading and model are left out. The least-squares
 residual of the record judges the model and gives the noise.
 """
 
@@ -37,9 +37,9 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _EXCITED = 1e-3  # of the input's greatest line, in power, from which a line counts as excited on purpose
-_BETWEEN = 1e-6  # share of the input's power beside these lines, below which it is periodic in the record
+_BETWEEN = 1e-6  # share of the input's power between these lines, below which it is periodic in the record
 _LEAST = 1e-8  # of the input's greatest line, in power: weaker ones are rounding
-_FEWEST = 6  # lines: the real and imaginary parts of five unknowns, and some that judge
+_FEWEST = 6  # lines: the real and imaginary parts of five unknowns, and some to judge the fit
 _STEPS = 30
 _SETTLED = 1e-10  # relative change of the coefficients or of the sum of squares
 
@@ -109,12 +109,12 @@ class FrequencyResponse(RunByRun):
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """How a record becomes the response at some lines: a linear map, whatever the record.
+    """The linear map from a record to its response at some lines.
 
     Args:
         window: shape (length,).
         starts: first sample of every segment, shape (s,).
-        used: numbers of the lines, shape (k,).
+        used: indices of the lines, shape (k,).
         moved: conjugate spectrum of the input over its power, shape (s, k).
         power: of the input, shape (k,).
     """
@@ -151,7 +151,7 @@ class _Lines:
         return np.concatenate([found.real, found.imag], axis=-1)
 
     def adjoint(self, rows: Array) -> Array:
-        """Of rows over the weighted responses, shape (p, 2k), the rows over the samples, shape (p, n)."""
+        """From rows over the weighted responses, shape (p, 2k), to rows over the samples, shape (p, n)."""
         real, imaginary = np.split(rows * np.tile(np.sqrt(self.power), 2), 2, axis=1)
         size = self.window.size
         out = np.zeros((len(rows), int(self.starts[-1]) + size))
@@ -172,7 +172,7 @@ def _fitted(
     parameters, own, last = start, np.zeros(3), np.inf
     step = np.zeros(start.size + 2)
     for _ in range(_STEPS):
-        with np.errstate(all="ignore"):  # a trial far off may overflow; it is taken back then
+        with np.errstate(all="ignore"):  # a distant trial may overflow; it is then rejected
             residual, jacobian = linearised(run, link, parameters, own, derivative)
             left = lines.weighted(residual)
             cost = float(left @ left)

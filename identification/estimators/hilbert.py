@@ -2,8 +2,8 @@
 
 The analytic signal of a finite record is wrong near its ends. So the record is first extended past both ends by a
 few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency and averaged
-over half cycles: the averages of a decay are an exponential sequence again, with independent errors, √2 S/(√m A)
-of logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
+over half cycles: the averages of a decay are again an exponential sequence, with independent errors of √2 S/(√m A)
+in logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
 the scatter about it.
 
 Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay by
@@ -41,7 +41,7 @@ class Envelope:
     Args:
         time: their middles since the first sample, shape (n,), s.
         amplitude: shape (n,), rad.
-        phase: less that of the carrier, unwrapped, shape (n,), rad.
+        phase: relative to the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
     """
 
@@ -162,7 +162,7 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
 
 
 def _fitted(seen: Envelope, part: slice, deviation: Array) -> tuple[Array, Decay, Array]:
-    """The line of the logarithm, and with that of the phase the decay and the covariance of (a, k)."""
+    """The line of the logarithm and, with the line of the phase, the decay and the covariance of (a, k)."""
     columns = np.column_stack((np.ones(deviation.size), -seen.time[part]))
     logarithm, by_envelope = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
     phase, by_phase = weighted_fit(columns, seen.phase[part], deviation**2)

@@ -1,8 +1,8 @@
 """Logarithmic decrement as a regression: a weighted line through the logarithm of every peak.
 
-White noise of S per sample moves the height of a peak by (3/2) S/√m and its instant by √(3/m) S/(w ωd² h), with m
+White noise of S per sample changes the height of a peak by (3/2) S/√m and its instant by √(3/m) S/(w ωd² h), with m
 samples in its half width w and h its height; so the logarithms have the variance (9/4) S²/(m h²). The line's
-gradient is the decay rate, the sensor's zero is fitted along with it, and a second line, through the instants,
+gradient is the decay rate, the sensor's zero is fitted with it, and a second line, through the instants,
 gives the damped frequency. Peaks are used down to ten deviations. Sources: Lord Rayleigh, The Theory of Sound,
 vol. 1 (1894), § 46; Tweten, Ballard & Mann, J. Sound Vib. 333 (2014) 2804–2811, doi 10.1016/j.jsv.2014.01.024
 (regression over many peaks).

@@ -16,7 +16,7 @@ from identification.signal.frequency import pencil_decay, starting_frequency
 from identification.signal.run_fit import describe_run, noise_and_failure
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
-_DECAY_TIMES = 8.0  # in units of 1/σ: later samples hold e^−16 of the energy, and noise
+_DECAY_TIMES = 8.0  # in units of 1/σ: later samples contain e^−16 of the energy, and noise
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MatrixPencil(RunByRun):
         interval = float(thin.time[-1] - thin.time[0]) / max(thin.time.size - 1, 1)
         found = pencil_decay(thin.yaw, interval, 2.0 * np.pi * frequency)
         if found is not None and found.decay.rate * float(thin.time[-1]) > 1.5 * _DECAY_TIMES:
-            # The decay fills a small part of the record: once more over this part.
+            # The decay fills a small part of the record: the pencil is applied again to this part.
             count = int(_DECAY_TIMES / (found.decay.rate * interval))
             found = pencil_decay(thin.yaw[:count], interval, 2.0 * np.pi * frequency) or found
         projected = None if found is None else project_run(reading, found.decay)

@@ -1,9 +1,9 @@
 """The paper's neural networks: three cycles at a time, ζ by 100-5-5-1 and ωn by 2-2-5-1.
 
 The run's ζ and ωn are averages over its windows (the paper's Table III), weighted by their noise; eqs 10, 11, 17
-and 18 then give Cnβ and Cnr (`identification.campaign.pairing`). A standard deviation includes the noise of the
+and 18 then give Cnβ and Cnr (`identification.campaign.pairing`). A standard deviation combines the noise of the
 reading, by the delta method; the posterior of the networks' weights; and their largest error on test responses.
-Where the windows scatter by more than that, it is raised to the scatter and the status says that the model does
+Where the scatter of the windows is larger, the deviation is raised to it and the status says that the model does
 not explain the data.
 """
 
@@ -135,7 +135,7 @@ class WindowReading:
     Args:
         zeta: damping ratio.
         omega_n: natural frequency, rad/s.
-        noise: how the samples' noise, in standard deviations, makes errors of ζ and ωn, shape (2, n).
+        noise: errors of ζ and ωn per standard deviation of each sample's noise, shape (2, n).
     """
 
     window: ThreeCycles
@@ -145,7 +145,7 @@ class WindowReading:
 
     @property
     def variances(self) -> Array:
-        """Of ζ and ωn, from the reading's noise: shape (2,)."""
+        """Variances of ζ and ωn from the reading's noise: shape (2,)."""
         return np.asarray(np.sum(self.noise**2, axis=1))
 
 

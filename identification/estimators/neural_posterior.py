@@ -1,9 +1,9 @@
 """Neural posterior: rival models of every record and of the campaign, weighed by a trained network.
 
 In windows of envelope and phase, the nominal model and each of many rivals is a linear fit
-(`identification.neural.rivals`). Values are medians of the mixture that the network's weights give, with its 95 %
-intervals, and the standard deviation is the interval's width over 3.92. ζ and ωn are those at small amplitude,
-Cnβ, Cnr, Izz and Cr the linear coefficients, whatever else acts. What is unlike anything trained on is refused.
+(`identification.neural.rivals`). Values are medians of the mixture with the network's weights, with its 95 %
+intervals; the standard deviation is the interval's width over 3.92. ζ and ωn are values at small amplitude, and
+Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. Records unlike all training are refused.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class NeuralPosterior:
             return replace(estimate, statuses=by_severity(statuses))
         known_runs = [one.run for one in linked]
         design = build_design(known_runs, campaign.rig)
-        decays: list[Array] = []  # (a, k) of the runs by their nominal fits
+        decays: list[Array] = []  # (a, k) of the runs from their nominal fits
         informations = []
         for one in linked:
             rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
@@ -125,7 +125,7 @@ class NeuralPosterior:
         scatter = scatter_between(measured, combined[0], campaign.repeatability)
         linear = derivatives(design, combined[0] if scatter is None else scatter.parameters)
         if scatter is not None and set(names) <= set(linear.names):
-            # the network knows the noise only; the scatter comes on top, as for a linear combination of the runs
+            # the network knows only the noise; the scatter is added, as in a linear combination of the runs
             rows = linear.jacobian[[linear.names.index(name) for name in names]]
             covariance, added = scatter.counted(covariance, scatter.moved(rows))
             repeatability = scatter.described(added)
@@ -137,16 +137,16 @@ class NeuralPosterior:
             quantity, own = getattr(result, name), posterior.quantity(int(place), "")
             if quantity is None or own.interval is None:
                 continue
-            wider = quantity.std / own.std  # 1 where no scatter counts
+            wider = quantity.std / own.std  # 1 where scatter does not count
             ends = [own.value + wider * (end - own.value) for end in own.interval]
             intervals[name] = replace(quantity, interval=(ends[0], ends[1]))
         return replace(result, **intervals)
 
     def effects(self, campaign: Campaign) -> dict[str, float]:
-        """Probability of every effect of the vocabulary in a campaign, by name; none where it has no coefficients.
+        """Probability of every effect of the vocabulary in a campaign, by name; empty if it has no coefficients.
 
-        They come from simulated campaigns in which any effect is as likely as another. They can order what a
-        diagnosis tries; they are not its answer.
+        The probabilities come from simulated campaigns in which all effects are equally likely. They can order the
+        attempts of a diagnosis; they are not its answer.
         """
         linked = _linked(_runs(campaign.runs, self.networks["record"]))
         runs = [one.run for one in linked]

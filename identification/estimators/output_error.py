@@ -39,7 +39,7 @@ from identification.statistics import (
 )
 from tunnel_sim.vocabulary.campaign import Campaign
 
-_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate; its zero comes on top
+_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate; its own zero is one more
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,13 @@ class OutputError:
     cycles_per_window: int | None = None
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign; runs without a result or a spring stiffness are left out of it.
+        """Identify every run, then the campaign, without runs that lack a result or a spring stiffness.
 
         Raises:
             TunnelError: when a wind-on run states no air density.
         """
         for run in campaign.runs:
-            loads(run, campaign.rig)  # refuses a wind-on run without density before any work is done
+            loads(run, campaign.rig)  # refuses a wind-on run without density before the fits
         fitted = [
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)
             if run.drive is None

@@ -1,1 +1,1 @@
-"""What happens to a campaign before anything is estimated from it, for every command alike."""
+"""The examination of a campaign before any estimate, the same for every command."""

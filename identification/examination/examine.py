@@ -1,7 +1,7 @@
-"""The examination of a campaign before anything is estimated from it, the same for every command.
+"""The examination of a campaign before any estimate, the same for every command.
 
 The sensor may measure the yaw rate or acceleration instead of the angle: every derivative of a linear decay has
-its ωn and ζ, so that the estimators take it as they take an angle.
+the same ωn and ζ, so the estimators treat it as an angle.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
 _ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
-_TIMER_DECIMALS = 10  # steps of the decimals that a timer's must exceed, or any stamps would lie on it
+_TIMER_DECIMALS = 10  # decimal steps that a timer's step must exceed, or any stamps would fit its lattice
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
-_MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
+_MOST_MISSING = 1e3  # ticks per sample: with more, the stamps are not from one clock
 
 
 def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
     """Note readings that are not angles, and runs that swing by more than half a turn to either side.
 
-    Nothing is said of wide swings where the campaign states ``plausible = false``.
+    Wide swings are not noted where the campaign states ``plausible = false``.
     """
     sensor = campaign.sensor
     if sensor.derivative:
@@ -43,13 +43,13 @@ def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
         )
         remedy = "state quantity = 'angle' under [sensor] if the readings are angles"
         noted = (Remark(Outcome.NOTED, tuple(run.id for run in campaign.runs), what, remedy),)
-        unit = sensor.unit.replace("rad", "deg").replace("²", "2")  # as the option takes it
+        unit = sensor.unit.replace("rad", "deg").replace("²", "2")  # in the form of the option
         return (*noted, *_wide_swings(campaign, f"if these are {unit}, import them with --unit {unit}"))
     return _wide_swings(campaign, "if these are degrees, name the column yaw_deg")
 
 
 def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:
-    """Note the runs that swing by more than half a turn to either side; nothing where that is stated."""
+    """Note the runs that swing by more than half a turn to either side; none where the campaign states that."""
     sensor = campaign.sensor
     swings = {run.id: _swing(run.record, sensor.derivative) for run in campaign.runs}
     wide = tuple(name for name, swing in swings.items() if swing > np.pi)
@@ -60,7 +60,7 @@ def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:
 
 
 def _swing(record: Record, derivative: int) -> float:
-    """Greatest angle to either side, rad: that of readings of rates or accelerations at their mean frequency."""
+    """Greatest angle to either side, rad; rates and accelerations are converted at their mean frequency."""
     reading, time = record.yaw_rad, record.time_s
     size = 0.5 * float(np.ptp(reading))
     if not derivative:
@@ -71,10 +71,10 @@ def _swing(record: Record, derivative: int) -> float:
 
 
 def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:
-    """The estimate of readings that were taken for angles, in terms of the angle; the estimate itself for angles.
+    """Convert an estimate from readings taken for angles to angles; an estimate from angles is returned unchanged.
 
-    Amplitudes are then of the angle, and zeros in the unit of the reading. The initial state and the intensity of
-    a random moment are those of the reading and are left out.
+    Amplitudes are then angles, and zeros are in the unit of the reading. The initial state and the intensity of
+    a random moment refer to the reading and are left out.
     """
     if sensor.derivative == 0:
         return estimate
@@ -103,12 +103,12 @@ def _in_unit(quantity: Quantity | None, unit: str) -> Quantity | None:
 
 
 def examine(campaign: Campaign) -> Examined:
-    """Check a campaign's records against one another and against what is stated of them.
+    """Check a campaign's records against one another and against their stated conditions.
 
     Records are mended, and statements that they contradict are refused or noted, by the slips of
     `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples
     before the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are
-    cut to their linear growth, or left out. Runs whose zeros differ get one each.
+    cut to their linear growth, or left out. Each run has its own zero where the zeros differ.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
@@ -121,7 +121,7 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | N
     """Mend the records of a campaign, and measure its free decays.
 
     Returns:
-        The campaign, what was done with it, and what its free decays show; None where all runs are driven, or the
+        The campaign, the changes made, and the evidence of its free decays; None where all runs are driven, or the
         records are refused.
 
     Raises:
@@ -135,7 +135,7 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | N
         return campaign, refused, None
     noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
-    # Driven runs neither begin with a release nor end at rest, and what sustains them is known.
+    # Driven runs neither begin with a release nor end at rest, and their input is known.
     driven, order = [run for run in kept.runs if run.drive is not None], [run.id for run in kept.runs]
     if driven and len(driven) == len(order):
         return kept, (*faults, *noted, *clocks), None
@@ -168,13 +168,13 @@ def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """A uniform clock that a record's samples were taken by.
+    """The uniform clock of a record's samples.
 
     Args:
         interval: s.
         place: of every sample on the clock, shape (n,); increasing, with jumps where samples are missing.
         time: of every sample by the clock, shape (n,), s.
-        away: largest distance of a time stamp from it, s.
+        away: largest deviation of a time stamp from the clock, s.
     """
 
     interval: float
@@ -229,15 +229,15 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 def find_clock(time_s: Array) -> Clock | None:
     """The uniform clock that explains time stamps; samples may be missing. None if there is none.
 
-    Its ticks, rounded to the last decimal of the stamps or to the ticks of a logger's timer, are the stamps. They
-    may be off by a whole step: rounded or cut off, by a logger that is itself a little late.
+    The stamps are its ticks, rounded to their last decimal or to the ticks of a logger's timer. They may be off by
+    a whole step: rounded or truncated, by a logger that is itself a little late.
 
     Args:
         time_s: stamps, increasing, shape (n,), s.
     """
     steps = np.diff(time_s)
     usual = steps[steps < _NO_GAP * np.median(steps)]
-    allowed = 0.0  # step of the coarsest decimal lattice on which all stamps lie
+    allowed = 0.0  # step of the coarsest decimal lattice that contains all stamps
     for decimals in range(_FINEST + 1):
         scaled = time_s * 10.0**decimals
         if np.abs(scaled - np.round(scaled)).max() < _ON_LATTICE:
@@ -245,13 +245,13 @@ def find_clock(time_s: Array) -> Clock | None:
             break
     changes = np.diff(np.sort(steps))
     changes = changes[changes > max(_TIMER_DECIMALS * allowed, CLOCK_TOLERANCE * float(steps.max()))]
-    if changes.size:  # step of a timer that all steps between stamps may be multiples of
+    if changes.size:  # step of a timer whose multiples all steps between stamps may be
         whole = np.round(steps / changes.min())
         step = float(steps @ whole / (whole @ whole))
         if np.abs(steps - step * whole).max() < allowed + _ON_LATTICE * step:
             allowed = max(allowed, step)
     for interval in (float(np.mean(steps)), float(np.mean(usual))):
-        for _ in range(_SWEEPS):  # to the interval that fits the stamps best
+        for _ in range(_SWEEPS):  # to the best-fitting interval
             ticks = np.maximum(np.round(np.diff(time_s) / interval), 1.0)
             place = np.concatenate([[0.0], np.cumsum(ticks)])
             if place[-1] > _MOST_MISSING * time_s.size:
@@ -261,7 +261,7 @@ def find_clock(time_s: Array) -> Clock | None:
             interval = float(slope)
             if settled:
                 break
-        if place[-1] > _MOST_MISSING * time_s.size:  # gaps are most of them
+        if place[-1] > _MOST_MISSING * time_s.size:  # most of the record would be gaps
             continue
         clock = start + interval * (place - place.mean())
         away = float(np.abs(time_s - clock).max())

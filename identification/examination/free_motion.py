@@ -1,9 +1,9 @@
-"""Where the free motion of a record begins and ends, and about which zero it swings.
+"""The start, the end and the zero of the free motion in a record.
 
 It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle: in a longer
-interval between two crossings the body was held, moved by hand, or at rest. A hold in mid-record that is shorter
-than about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a hand
-that pulls the body aside is also known by its slowness: a free swing takes no longer out than back.
+interval between two crossings the body was held, moved by hand, or at rest. A hold in mid-record shorter than
+about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a hand that
+pulls the body aside is also recognised by its slowness: a free swing takes no longer out than back.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ _NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes a
 _LEAST_SAMPLES = 16
 _SMOOTHED = 0.125  # of a cycle, width of the moving average: it reduces noise and hum, and hardly the swing
 _BAND = 0.1  # of the largest swing: a crossing counts if the motion goes this far beyond the centre
-_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, if that is more: no crossing by chance
+_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, if more: no crossing by chance
 _WIDEST_BAND = 0.3
 # A half cycle may be longer than the next ones because of its amplitude alone: a pendulum released at 160 degrees
 # takes twice the time of its small swings.
 _LONGER = 2.0
-_SLOWER = 1.25  # a pull takes this many times as long as the swing back, and a free swing out no longer
-_GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a motion that builds up has no release
-# Of a half cycle: the release lies a quarter cycle back, the previous turning point three quarters.
+_SLOWER = 1.25  # a pull takes this many times as long as the swing back; a free swing out takes no longer
+_GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a growing motion has no release
+# Of a half cycle: the release is a quarter cycle back, the previous turning point three quarters.
 _CARRIED_BACK = 0.75
 _FITTED_HALVES = 4.0  # half cycles after the release that are fitted and extrapolated backwards
 _REGULAR = 2  # half cycles of about the usual length before a release; more are an earlier free motion
@@ -54,7 +54,7 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     frequency = starting_frequency(later)
     if frequency is None:
         return 0
-    # Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
+    # Crossings of the smoothed reading through its centre, in samples; the start of the record counts as the first.
     width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
     total = np.concatenate([[0.0], np.cumsum(yaw - float(np.median(later.yaw_rad)))])
     smooth = (total[width:] - total[:-width]) / width
@@ -133,16 +133,16 @@ class Centre:
 
 
 _EXPLAINED_TO = (
-    0.01  # share to which a shift follows its cause: a wind holds its speed to some tenths of a per cent
+    0.01  # relative tolerance of a shift from its cause: a wind varies by some tenths of a per cent
 )
-_LEAST_BEYOND = 3  # runs more than numbers of the conditions, for the rest of their zeros to be compared
+_LEAST_BEYOND = 3  # runs beyond the number of shifts, for a comparison of the remaining zeros
 
 
 def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Give every run its own zero where the records show that they have one, unless the campaign states it.
+    """Give every run its own zero where the records show different zeros, unless the campaign states one.
 
     Runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
-    amplitude, and in a stream at an angle on the wind. So are all runs, once what such causes shift is taken out.
+    amplitude, and in a stream at an angle on the wind. All runs are also compared, after removing such shifts.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
@@ -173,7 +173,7 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 
 def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
-    """The centres of two runs or more of equal spring, wind and swing."""
+    """Groups of two or more centres of equal spring, wind and swing."""
     by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
     for centre in centres:
         run = centre.run
@@ -190,10 +190,11 @@ def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
 
 
 def _shifts(centres: list[Centre]) -> Array:
-    """What may shift the centre of a run from a zero common to all, in columns, shape (runs, shifts).
+    """Possible shifts of a run's centre from a common zero, in columns, shape (runs, shifts).
 
-    A constant moment, one of the dynamic pressure, and the mean moment of an asymmetric spring, each over the
-    stiffness, which is in proportion to ω²; and an error of the reading in proportion to the square of the angle.
+    They are a constant moment, a moment proportional to the dynamic pressure, and the mean moment of an asymmetric
+    spring, each over the stiffness, which is proportional to ω²; and an error of the reading proportional to the
+    square of the angle.
     """
     omega, square = (np.array([getattr(c, name) for c in centres]) for name in ("omega", "square"))
     pressure = np.array([(c.run.air_density or 1.0) * c.run.wind_speed**2 for c in centres])
@@ -204,7 +205,7 @@ def _shifts(centres: list[Centre]) -> Array:
 
 
 def _scatter(centres: list[Centre], shifts: Array) -> float:
-    """Weighted sum of squares of the zeros about the shifts that fit them best."""
+    """Weighted sum of squares of the zeros about the best-fitting shifts."""
     weight = 1.0 / np.maximum([centre.std for centre in centres], 1e-300)
     zero = weight * np.array([centre.zero for centre in centres])
     columns = weight[:, None] * shifts
@@ -213,10 +214,10 @@ def _scatter(centres: list[Centre], shifts: Array) -> float:
 
 
 def centre_of(run: Run, resolution: float) -> Centre | None:
-    """The centre that a run oscillates about, from its peaks; None where there are too few clear ones.
+    """The centre of a run's oscillation, from its peaks; None where there are too few clear ones.
 
-    Peaks on both sides are equally far from the centre under any symmetric spring and any damping, dry friction
-    included, which may hold the body at another place in the end.
+    Peaks on both sides are equally far from the centre for any symmetric spring and any damping. This includes dry
+    friction, although the body may come to rest elsewhere.
 
     Args:
         resolution: step of the reading, in its unit; 0 where it is not stated.
@@ -244,17 +245,16 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
 
 
 _SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow
-_RESTING = 0.01  # of the largest excursion: the body rests while the reading stays as near its last place
-_KEPT = 3.0  # cycles of rest: they show that the motion ended, and where
-_SETTLED = 0.25  # of the distance from the centre: a reading that moves more at rest drifts
+_RESTING = 0.01  # of the largest excursion: the body rests while the reading stays as near its last value
+_KEPT = 3.0  # cycles of rest to keep: they show that the motion ended, and where
+_SETTLED = 0.25  # of the distance from the centre: a resting reading that changes more is drifting
 
 
 def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Shorten records that end with a long rest beside the centre, with a remark for each.
 
-    A model without friction takes the place of rest, where dry friction holds the body, for the sensor's zero if
-    the rest is longer than the motion. A rest is left where it is unless that is so and it is off the centre
-    beyond chance.
+    Where dry friction holds the body off centre for longer than the motion lasts, a model without friction would
+    mistake the place of rest for the sensor's zero. Only such rests, off the centre beyond chance, are shortened.
     """
     shorter: dict[str, Run] = {}
     remarks = []
@@ -262,7 +262,7 @@ def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         record, resolution = run.record, campaign.sensor.resolution or 0.0
         time, yaw = record.time_s, record.yaw_rad
         if not float(np.abs(yaw).max()) < _SQUARABLE:
-            continue  # refused later, for what it is
+            continue  # refused later, for its own reason
         last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
         near = max(
             _RESTING * float(np.abs(yaw - last).max()),

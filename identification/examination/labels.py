@@ -2,9 +2,9 @@
 
 Every run obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie
 on a straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the
-frequencies beyond chance, and exchanging those of two runs makes them agree, they were exchanged.
+frequencies beyond chance, and agree after exchanging those of two runs, they were exchanged.
 
-The stated springs agree where, with the wind off, Kr/ωn² is the same inertia for all, and the stated one.
+The stated springs agree where Kr/ωn² with the wind off is the same inertia for all, and equals the stated one.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Labels:
 
     @classmethod
     def of(cls, swings: Sequence[Swing]) -> Labels:
-        """Of runs that all state their spring."""
+        """Labels of runs that all state their spring."""
         runs = [swing.run for swing in swings]
         seen = np.array([swing.stiffness for swing in swings])
         std = np.array([swing.stiffness_std for swing in swings])
@@ -82,7 +82,7 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, policy.REFUSAL_RATE))):
             continue
         trials = [(places, _misfit(other, what)[0]) for places, other in _exchanged(labels, away, what)]
-        mended = []  # that agree, or agree better than what is stated by more than chance
+        mended = []  # exchanges that agree, or agree better than the statements beyond chance
         for places, found in trials:
             ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
             if found.agrees or ratio > float(
@@ -102,7 +102,7 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
-    """What the stated springs of the runs may be worth, where their statements contradict the frequencies.
+    """Possible values of Izz and Ka where the stated springs of the runs contradict the frequencies.
 
     Returns:
         Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn,
@@ -121,7 +121,7 @@ def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
 def _fitted(
     labels: Labels, used: NDArray[np.bool_], *, common: bool = False
 ) -> tuple[float, float | None] | None:
-    """Izz and C of Kr = Izz k + C ½ρV², or beside a common stiffness; None where they cannot be separated."""
+    """Izz and C of Kr = Izz k + C ½ρV², or with a common stiffness added; None where they cannot be separated."""
     spring, seen, pressure = labels.spring[used], labels.seen[used], labels.pressure[used]
     windy = bool(np.any(pressure > 0.0))
     columns = [seen, *([pressure] * windy), *([np.ones_like(seen)] * common)]
@@ -137,10 +137,10 @@ def _fitted(
 
 
 def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
-    """Misfit of all runs, and how far each is off.
+    """Misfit of all runs, and the residual of each.
 
-    Of stated springs: of Kr = Izz k + C ½ρV², weighted by the frequencies and the springs' tolerance. The runs of
-    one spring share its error, so they count once together. Of stated wind speeds: of k = k0(spring) - c ½ρV².
+    For stated springs: of Kr = Izz k + C ½ρV², weighted by the frequencies and the springs' tolerance. The runs of
+    one spring share its error, so they count once together. For stated wind speeds: of k = k0(spring) - c ½ρV².
     """
     springs, place, count = np.unique(labels.spring, return_inverse=True, return_counts=True)
     if what == _SPRINGS:
@@ -198,15 +198,15 @@ def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]
     settings = np.split(order, np.flatnonzero(rises) + 1)
     for one, two in itertools.combinations(settings, 2):
         if one.size + two.size == 2:
-            continue  # that is an exchange between two runs
+            continue  # already covered by the exchange of two runs
         other = labels.pressure.copy()
         other[one], other[two] = other[two].mean(), other[one].mean()
         yield tuple(np.sort(np.concatenate([one, two])).tolist()), replace(labels, pressure=other)
 
 
-_LEAST = 3  # springs needed to say which one is wrong
+_LEAST = 3  # springs needed to identify the wrong one
 
-#: What Kr/ωn² over the stated inertia is where a value is in another unit.
+#: Kr/ωn² over the stated inertia where a value is in another unit.
 _SLIPS = {
     1e3: "spring_stiffness in N mm/rad",
     1e2: "spring_stiffness in N cm/rad",
@@ -224,7 +224,7 @@ _SLIPS = {
 
 @dataclass(frozen=True, eq=False)
 class _Springs:
-    """Wind-off, by spring: Kr, ids of the runs, ln(Kr/ωn²) and its standard deviation, shape (springs,)."""
+    """Wind-off values by spring: Kr, ids of the runs, ln(Kr/ωn²) and its standard deviation, shape (springs,)."""
 
     stiffness: Array
     runs: tuple[tuple[str, ...], ...]
@@ -236,7 +236,7 @@ class _Springs:
         stiffness = sorted({float(s.run.spring_stiffness or 0.0) for s in swings})
         groups = [[s for s in swings if s.run.spring_stiffness == value] for value in stiffness]
         seen = [np.mean([np.log(s.stiffness) for s in group]) for group in groups]
-        # Of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring.
+        # Std of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring.
         std = [
             np.hypot(policy.SPRING_TOLERANCE, float(np.mean([s.stiffness_std / s.stiffness for s in group])))
             for group in groups
@@ -268,7 +268,7 @@ class _Springs:
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """Note springs whose stated stiffness does not fit the wind-off frequencies within their tolerance.
 
-    One remark: on the spring that is wrong if three or more show which one it is, else on all of them.
+    One remark: on the wrong spring if three or more springs identify it, else on all of them.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     if len({s.run.spring_stiffness for s in still}) < 2:
@@ -308,10 +308,9 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tuple[Remark, ...]:
-    """Note a stated inertia that the springs, with the wind off, contradict by more than a nominal one is off.
+    """Note a stated inertia that contradicts the wind-off springs by more than a nominal inertia may be off.
 
-    The remark names the slip of units that it looks like; there is none where the campaign states ``plausible =
-    false``.
+    The remark names the probable error of units; there is none where the campaign states ``plausible = false``.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     stated = campaign.rig.yaw_inertia

@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
-_LEAST_SAMPLES = 30  # of a part of a record whose poles are found separately
+_LEAST_SAMPLES = 30  # in a part of a record whose poles are found separately
 _E_FOLDING = 0.5  # e-folds in the first part: both parts then determine the frequency about equally well
 
 
@@ -33,8 +33,8 @@ class Swing:
 
     Args:
         stiffness: k = ωn², 1/s².
-        stiffness_std: its standard deviation, 1/s². It includes the change of k along the run: a frequency that
-            depends on the amplitude is not known better than that.
+        stiffness_std: its standard deviation, 1/s². It includes the change of k along the run, which limits the
+            knowledge of a frequency that depends on the amplitude.
         rate: a = ζωn, 1/s; negative where the motion grows.
         rate_std: its standard deviation, 1/s.
         zero: the sensor's zero, rad.
@@ -59,7 +59,7 @@ class Swing:
 def swing_of(run: Run) -> Swing | None:
     """Measure a run's oscillation by its poles, which need no starting values; None if there is none.
 
-    The residual is taken to be correlated over half a cycle, so a decay that does not explain the record has
+    The residual is assumed to be correlated over half a cycle, so a decay that does not explain the record has
     larger standard deviations. Spring and wind of the run are not used.
     """
     frequency = starting_frequency(run.record)
@@ -103,7 +103,7 @@ def swing_of(run: Run) -> Swing | None:
 
 
 def _poles(reading: Reading, omega: float) -> PencilDecay | None:
-    """The oscillation of a part of a record; None if its poles are not those of an oscillation."""
+    """The oscillation of a part of a record; None if its poles do not describe an oscillation."""
     found = pencil_decay(reading.yaw, float(reading.time[-1]) / (reading.time.size - 1), omega)
     return found if found is not None and found.decay.omega_d > 0.0 else None
 
@@ -111,7 +111,7 @@ def _poles(reading: Reading, omega: float) -> PencilDecay | None:
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """Refuse wind-off runs that grow: their decay rate is negative beyond chance, and their swings become larger.
 
-    A blow in mid-record does not look like that.
+    A blow in mid-record does not show both.
     """
     ids = []
     for swing in swings:
@@ -157,8 +157,7 @@ class AmplitudeWindows:
 def self_excited_runs(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Find wind-on runs whose motion grows, or neither grows nor decays, with a remark and figures for each.
 
-    A run that settles in a limit cycle is cut to the part where its growth is linear, or left out where there is
-    none.
+    A run that settles in a limit cycle is cut to the part of linear growth, or left out if there is no such part.
     """
     kept, remarks = [], []
     for run in campaign.runs:
@@ -185,15 +184,15 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
         remedy = "record its growth from rest, or a decay at a lower wind speed"
         figures = {"kind": "steady", "settled_rad": amplitude, **windows.figures()}
         return None, Remark(Outcome.LEFT_OUT, (run.id,), what, remedy, figures)
-    # Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does. A
-    # window's power is then exponentially distributed: χ² of two degrees of freedom.
+    # Whether the last quarter's power exceeds the first quarter's beyond variations of a buffeted rig's envelope.
+    # A window's power is then exponentially distributed: χ² of two degrees of freedom.
     quarter = windows.amplitude.size // 4
     first, last = (
         float(np.mean(part**2)) for part in (windows.amplitude[:quarter], windows.amplitude[-quarter:])
     )
     grows = bool(fdtrc(2 * quarter, 2 * quarter, last / first) < policy.REFUSAL_RATE)
     # First window of the limit cycle; None where the amplitude still grows at the end. A record that begins late
-    # has a short growth, and is known by an amplitude that stays for the greater part of it.
+    # has a short growth, and is recognised by an amplitude that is constant for most of it.
     below = np.flatnonzero(windows.amplitude < policy.SETTLED_SHARE * _last(windows.amplitude))
     start, settled = int(below[-1]) + 1 if below.size else 0, None
     if windows.time.size - start >= policy.LEAST_GROWTH_WINDOWS:
@@ -220,7 +219,7 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
 
 
 def _is_steady(windows: AmplitudeWindows, start: int) -> bool:
-    """Whether the amplitude is constant from a window on, by the upper end of its change's interval."""
+    """Whether the amplitude is constant from a window on, by the upper end of the interval of its change."""
     time, amplitude = windows.time[start:], windows.amplitude[start:]
     length = float(np.ptp(time))
     if length * float(np.median(windows.frequency[start:])) < policy.LEAST_STEADY_CYCLES:
@@ -231,7 +230,7 @@ def _is_steady(windows: AmplitudeWindows, start: int) -> bool:
 
 
 def windows_of(record: Record) -> AmplitudeWindows | None:
-    """Amplitude and frequency in windows of about three cycles; None where they are too few for a growth."""
+    """Amplitude and frequency in windows of about three cycles; None where they are too few to show growth."""
     frequency = starting_frequency(record)
     if frequency is None:
         return None
@@ -304,5 +303,5 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
 
 
 def in_limit_cycle(figures: Mapping[str, Any]) -> bool:
-    """Whether a remark's figures are those of a run that settles in a limit cycle, or is steady."""
+    """Whether a remark's figures describe a run that settles in a limit cycle, or is steady."""
     return figures.get("settled_rad") is not None

@@ -1,7 +1,7 @@
 """A record as windows of whole periods: envelope, phase, zero and two harmonics, with their weights.
 
-The deviations from one damped oscillation are independent from window to window and nearly normal, so the fits
-that follow are linear. Missing samples only reduce the weight of a window.
+The deviations from one damped oscillation are independent from window to window and nearly normal, so the
+subsequent fits are linear. Missing samples only reduce the weight of a window.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 WINDOWS = 32
 LEAST_WINDOWS = 4
-_PER_CYCLE = 24.0  # block means per period, at least
-_LEAST_SAMPLES = 12  # of a window: seven unknowns are fitted to it
-_PASSES = 3  # each demodulates with the decay of the one before
+_PER_CYCLE = 24.0  # least number of block means per period
+_LEAST_SAMPLES = 12  # in a window: seven unknowns are fitted to it
+_PASSES = 3  # each demodulates with the decay of the previous one
 _LINEAR = 50.0  # information below which the logarithm of a noisy amplitude is replaced by its linear part
 _ROUGH = 1e-6  # least noise over the swing: a hundred times the error of three passes
 _SEEN = 0.5  # amplitude over the noise of a window's amplitude, down to which the record is used
@@ -36,8 +36,8 @@ class Demodulated:
         omega: damped angular frequency of the demodulation, rad/s.
         rate: its decay rate, 1/s.
         time: middles of the windows since the first sample, shape (w,), s.
-        logarithm: of the amplitude, less that of the oscillation, shape (w,).
-        phase: less that of the oscillation, shape (w,), rad.
+        logarithm: of the amplitude over the oscillation's, shape (w,).
+        phase: relative to the oscillation, shape (w,), rad.
         information: inverse variance of either, shape (w,).
         amplitude: of the oscillation, shape (w,), rad.
         zero: mean of the reading, shape (w,), rad.
@@ -76,7 +76,7 @@ class _Windows:
 
 
 def demodulate(record: Record) -> Demodulated | Status:
-    """Reduce a record to windows; a status where nothing oscillates, or too few periods stand out of the noise."""
+    """Reduce a record to windows; a status where nothing oscillates, or too few periods exceed the noise."""
     frequency = starting_frequency(record)
     if frequency is None:
         return Status.NO_OSCILLATION
@@ -190,14 +190,14 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
 Places = NDArray[np.intp]
 Column = tuple[Array | None, Array | None]
 """Of the logarithm of the amplitude and of the phase; None where it is zero."""
-_FLOOR = 0.02  # least amplitude over the first: smaller ones would make inverse powers of noise
+_FLOOR = 0.02  # least amplitude over the first: noise would dominate inverse powers of smaller ones
 _POWERS = (-1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
 _SETTLING = 4.0  # time constants in a record
 
 
 @dataclass(frozen=True, eq=False)
 class RivalWindows:
-    """The windows of all runs, one after the other.
+    """The windows of all runs in sequence.
 
     Args:
         sizes: number of windows of each run, shape (runs,).

@@ -1,7 +1,7 @@
-"""The paper's networks in NumPy: their training sets, value, gradients and posterior, and the files of weights.
+"""The paper's networks in NumPy: their training sets, values, gradients and posteriors, and the files of weights.
 
 Source of the architecture: the paper, section II.B (100-5-5-1 and 2-2-5-1); tanh layers with a linear output.
-Weights are kept as safetensors, with the training record beside them as JSON, without pickle.
+Weights are stored as safetensors, with the training record beside them as JSON, without pickle.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class DataSpec:
         omega_range: natural frequencies, the paper's 0.4 to 26 rad/s.
         zeta_count: number of damping ratios of the first network's set, evenly spaced.
         grid: numbers of damping ratios and of natural frequencies of the second network's set.
-        frequency_scale: how t3 and ωn enter the second network before their mean is removed.
+        frequency_scale: form in which t3 and ωn enter the second network before their mean is removed.
         test_count: number of responses of the test set, drawn at random over the range.
     """
 
@@ -65,7 +65,7 @@ class DataSpec:
         return cls(**{**data, **pairs})
 
     def to_network(self, values: Array) -> Array:
-        """t3 [s] or ωn [rad/s] as the second network takes it, any shape."""
+        """t3 [s] or ωn [rad/s] in the form of the second network, any shape."""
         return np.log(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
 
 
@@ -81,7 +81,7 @@ def training_pairs(spec: DataSpec, which: str) -> tuple[Array, Array]:
 
 
 def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Damping ratios and frequencies [rad/s] that no training set holds, shapes (test_count,).
+    """Damping ratios and frequencies [rad/s] outside every training set, shapes (test_count,).
 
     Half of them are uniform in the logarithm, so that the low ends of the range are tested too.
     """
@@ -121,9 +121,9 @@ class Network:
 
     Args:
         weights: matrix (row by row) and bias of each layer in turn, shape (n,).
-        directions: eigenvectors of the data's information that stand out of the prior, shape (k, n).
+        directions: eigenvectors of the data's information that is significant beside the prior, shape (k, n).
         precision: posterior precision along each of them, shape (k,).
-        prior_precision: of the weights along all others, 2α; dimensionless, as the scaled quantities are.
+        prior_precision: of the weights along all other directions, 2α; dimensionless, like the scaled quantities.
     """
 
     sizes: tuple[int, ...]
@@ -145,7 +145,7 @@ class Network:
         return np.asarray(scaled * self.output.deviation[0] + self.output.mean[0])
 
     def input_gradient(self, inputs: Array) -> Array:
-        """Derivative of the output by its inputs at one point, shape (inputs,): the same shape."""
+        """Derivative of the output with respect to its inputs at one point, shape (inputs,): the same shape."""
         return self._backward(inputs)[0]
 
     def posterior_std(self, inputs: Array) -> float:
@@ -199,10 +199,10 @@ class NetworkErrors:
 
     Args:
         zeta: largest absolute error of ζ, (1).
-        zeta_rms: root mean square of it, (1).
+        zeta_rms: root mean square error of ζ, (1).
         zeta_relative: largest error of ζ over ζ, ratio.
         omega_relative: largest error of ωn over ωn, ratio.
-        omega_relative_rms: root mean square of it, ratio.
+        omega_relative_rms: root mean square of ωn's relative error, ratio.
     """
 
     zeta: float
@@ -259,8 +259,8 @@ class Networks:
     def own_stds(self, zeta: float, t3: float) -> tuple[float, float]:
         """Standard deviations due to the networks, of ζ and, relative, of ωn.
 
-        They combine the posterior of the weights at the noise-free response of this ζ and the largest error of the
-        test set as the half-width of a rectangular distribution (GUM 4.3.7).
+        They combine the posterior of the weights, at the noise-free response of this ζ, and the largest error of
+        the test set as the half-width of a rectangular distribution (GUM 4.3.7).
 
         Args:
             zeta: damping ratio.
@@ -276,7 +276,7 @@ class Networks:
         return float(np.hypot(of_zeta, floor)), float(np.hypot(of_omega, omega_floor))
 
     def trained_for(self, zeta: float, omega_n: float) -> bool:
-        """Whether ζ and ωn lie in the training range.
+        """Whether ζ and ωn are in the training range.
 
         Args:
             zeta: damping ratio.
@@ -302,7 +302,7 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErro
 
 
 def read_stored(weights: Path) -> tuple[bytes, bytes]:
-    """Weights and record of ``tunnel train``: a safetensors file, and the ``.json`` of its name beside it."""
+    """Weights and record from ``tunnel train``: a safetensors file, and the ``.json`` of the same name."""
     remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
     content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
     beside = weights.with_suffix(".json")
@@ -319,7 +319,7 @@ def read_packaged(name: str) -> tuple[bytes, bytes]:
 def open_stored(
     weights: bytes, record: bytes | str, where: str, *, estimator: str
 ) -> Iterator[tuple[Mapping[str, Array], dict[str, Any]]]:
-    """The tensors and the record of two files; what they hold is checked inside the block.
+    """The tensors and the record of two files; their contents are checked inside the block.
 
     Raises:
         TunnelError: when they are malformed, or do not belong together.
@@ -333,7 +333,7 @@ def open_stored(
             )
         try:
             tensors = load(weights)
-        except SafetensorError as error:  # which has no base class but Exception
+        except SafetensorError as error:  # its only base class is Exception
             raise ValueError(error) from None
         yield tensors, document
 

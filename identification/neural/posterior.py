@@ -1,8 +1,8 @@
-"""The network that weighs the rivals, from all rivals and all runs, its files, and the posterior it gives.
+"""The network that weighs the rivals, from all rivals and all runs; its files, and its posterior.
 
 The posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened: the network
-only learns when to believe which rival, and how far. It runs in NumPy for an estimate and in torch for training.
-Trained networks are kept as safetensors, with their record beside them as JSON, without pickle.
+only learns which rival to believe, and how far. It runs in NumPy for an estimate and in torch for training.
+Trained networks are stored as safetensors, with their training record beside them as JSON, without pickle.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LEVELS = (0.025, 0.5, 0.975)
 NORMAL_WIDTH = 3.92  # of a normal distribution's 95 % interval, in standard deviations
 _HALVINGS = 36
 _FAR = 12.0  # standard deviations beyond which no component has weight
-_NEGLIGIBLE = 1e-9  # weight of a component that moves no quantile
+_NEGLIGIBLE = 1e-9  # weight of a component that does not change the quantiles
 
 
 def distribution(weights: Array, means: Array, stds: Array, values: Array) -> Array:
@@ -63,8 +63,8 @@ Tensor = Any
 
 TOKEN, RUN, CONTEXT, HEAD = 32, 32, 128, 32
 _GAIN = 0.5  # greatest change of a rival's shift, as a share
-_CLIP = 4.0  # of standardised inputs: those of records with hardly any noise lie far outside
-_ALLOWANCE = -6.0  # of a rival of one column: there are fifty of them, and their sizes are not known
+_CLIP = 4.0  # of standardised inputs: records with hardly any noise are far outside
+_ALLOWANCE = -6.0  # for a rival of one column: there are fifty of them, and their sizes are not known
 _SIZES = (-4.0, 9.0)  # of the logarithms of widths
 
 
@@ -76,9 +76,9 @@ class Output:
         logarithms: of the weights, shape (b, r).
         means: shape (b, r, d).
         scales: factor on each rival's own width, shape (b, r, 1).
-        extras: variance added to it, shape (b, r, d).
+        extras: added variance, shape (b, r, d).
         effects: logits of the effects' probabilities, shape (b, e).
-        context: of the sample, shape (b, CONTEXT): what the score of unlikeness uses.
+        context: of the sample, shape (b, CONTEXT), for the score of unlikeness.
     """
 
     logarithms: Tensor
@@ -121,7 +121,7 @@ def forward(
 ) -> Output:
     """Put samples through the network.
 
-    Every rival goes through the same layers, and every run through others; runs are pooled, so their order and
+    Every rival passes through the same layers, and every run through others; runs are pooled, so their order and
     number do not matter.
 
     Args:
@@ -168,7 +168,7 @@ def forward(
     along = xp.exp(xp.clip(found[..., 3:4] - 2.0, *_SIZES))
     extras = xp.exp(xp.clip(found[..., 4 : 4 + quantities] - 2.0, *_SIZES))
     means = shifts * (1.0 + _GAIN * xp.tanh(found[..., 1:2])) + extras * xp.tanh(found[..., 4 + quantities :])
-    # Where the network adds nothing, a rival's weight follows from its significance, its χ² and its size.
+    # Without the network's contribution, a rival's weight follows from its significance, its χ² and its size.
     evidence = xp.log(1.0 + 0.5 * xp.sinh(xp.clip(rivals[..., 0], -9.0, 9.0)) ** 2)
     evidence = weights["evidence"][0] * evidence - weights["evidence"][1] * rivals[..., 3]
     logits = found[..., 0] + evidence + weights["allowance"] - 1e9 * (1.0 - valid)
@@ -209,8 +209,8 @@ class TrainedPosterior:
     Args:
         weights: as `weight_shapes`, and the scalings.
         centre: mean context of the training samples, shape (c,).
-        precision: inverse covariance of it, shape (c, c).
-        threshold: squared distance above which a sample is unlike anything trained on.
+        precision: inverse covariance of the context, shape (c, c).
+        threshold: squared distance above which a sample is unlike all training samples.
         effects: names of the effects in the order of their probabilities.
     """
 
@@ -272,7 +272,7 @@ def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPo
         return found
 
 
-# Logarithm of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts.
+# Logarithm of χ² over its freedom: smaller values come from records with hardly any noise.
 _NOISY = float(np.log(0.5))
 
 
@@ -308,7 +308,7 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     known = np.stack([one.known for one in samples])
     longest = max(len(one.runs) for one in samples)
     runs = np.zeros((len(samples), longest, samples[0].runs.shape[1] + 1))
-    for place, one in enumerate(samples):  # with 1 after the features of a run, and 0 after padding
+    for place, one in enumerate(samples):  # with 1 after the features of a run, and 0 for padding
         runs[place, : len(one.runs), :-1], runs[place, : len(one.runs), -1] = one.runs, 1.0
     output = forward(
         np,

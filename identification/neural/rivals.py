@@ -1,9 +1,8 @@
-"""What a network sees of a record or a campaign: rival linear models of its windows, beside the nominal model.
+"""The network's view of a record or a campaign: rival linear models of its windows, beside the nominal model.
 
-By averaging over a cycle, a moment changes the decay rate or the frequency by an amount that depends on the
-amplitude as a power. A rival is such a power with a factor that says how it depends on spring, wind and
-frequency, a change of the reading that depends on the amplitude, or an exact change of a stated number, to first
-order.
+Averaged over a cycle, a moment changes the decay rate or the frequency by a power of the amplitude. A rival is one
+such power, with a factor for its dependence on spring, wind and frequency; or a change of the reading with the
+amplitude; or an exact change of a stated number, to first order.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ SPRINGS = 4
 
 @dataclass(frozen=True, eq=False)
 class RivalConditions:
-    """What is stated of the runs, and what the nominal model makes of them.
+    """The stated conditions of the runs, and the coefficients of their nominal fit.
 
     Args:
         stiffness: Kr, shape (runs,), N m/rad.
@@ -40,7 +39,7 @@ class RivalConditions:
         damping_load: ½ρV·A·l², shape (runs,), N m s; 0 with the wind off.
         speed: V as a ratio to the largest of the campaign, shape (runs,); 0 with the wind off.
         spring: number of the spring among those of the campaign, from the softest, shape (runs,).
-        air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where there are none.
+        air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where they are not determined.
     """
 
     stiffness: Array
@@ -52,7 +51,7 @@ class RivalConditions:
 
     @classmethod
     def of(cls, runs: Sequence[Run], design: Design, air: tuple[float, float]) -> RivalConditions:
-        """Of runs that the design links, each with its spring."""
+        """Conditions of runs that the design links, each with its spring."""
         springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
         speeds = np.array([run.wind_speed for run in runs])
         speeds = speeds / max(float(speeds.max()), 1e-300)
@@ -67,7 +66,7 @@ def _readings(w: RivalWindows) -> list[Column]:
 
 
 def _drifts_and_steps(w: RivalWindows, stiffness: Array | float) -> list[Column]:
-    """A spring or a damper that changes along the run, and steps at the instants where the runs show them best."""
+    """A spring or a damper that changes along the run, and steps at the instants that fit the runs best."""
     turning = (stiffness / w.omega)[w.run]
     phase = np.concatenate([best_step(run, run.phase) for run in w.runs]) * w.omega[w.run]
     size = np.concatenate([best_step(run, run.logarithm) for run in w.runs])
@@ -99,7 +98,7 @@ def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
         (0.0, c.stiffness * c.stiffness_load),
         *((0.0, c.stiffness * (c.spring == number)) for number in range(SPRINGS)),
     ]
-    # A wind speed that is not as stated or drifts, and an air moment behind the motion.
+    # A wind speed that drifts or differs from its statement, and an air moment that lags the motion.
     speed = np.where(on, c.speed, 1.0)
     drag, turning = 0.5 * c.air[1] * c.damping_load, -c.air[0] * c.stiffness_load / w.omega
     wind = [
@@ -130,7 +129,7 @@ def best_step(run: Demodulated, values: Array) -> Array:
         values: logarithm or phase, shape (w,), dimensionless.
     """
     weight, time = run.information, run.time - run.time[-1]
-    # Sums over the windows from each one on: every step, and its products with the line and the values.
+    # Sums over the windows from each one to the last: every step, and its products with the line and the values.
     terms = np.stack((weight, weight * time, weight * time**2, weight * values, weight * time * values))
     sums = np.cumsum(terms[:, ::-1], axis=1)[:, ::-1]
     (a, b, c, d, e), (level, slope) = sums[:, 0], (sums[0, 1:], sums[1, 1:])
@@ -145,8 +144,8 @@ SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
 MORE = len(SETS) + 2
 """Rivals besides those of one column: the nominal model first; the sets and all columns together last."""
-_PRIOR = 1e-6  # least squares of a column's own fit over the prior variance of its effect: 1000 deviations
-_PRIOR_ALL = 1e-3  # the same where all columns act together
+_PRIOR = 1e-6  # variance of a column's own fit over the prior variance of its effect: 1000 deviations
+_PRIOR_ALL = 1e-3  # the same ratio where all columns act together
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +154,9 @@ class Rivals:
 
     Args:
         parameters: of the nominal model, shape (p,).
-        shifts: what each rival adds to them, shape (r, p).
+        shifts: contribution of each rival to them, shape (r, p).
         covariances: of the parameters under each rival, shape (r, p, p).
-        scores: signed significance of a rival's column, shape (r,); of a set, the root of its fall of χ².
+        scores: signed significance of a rival's column, shape (r,); for a set, the root of its fall of χ².
         own: share of a column that the nominal parameters cannot imitate, shape (r,).
         remaining: χ² of each rival, shape (r,).
         freedom: number of values less number of nominal unknowns.
@@ -197,7 +196,7 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
     full = np.einsum("nc,nc->c", seen, seen)
     valid = full > 0.0
     seen = seen / np.sqrt(np.where(valid, full, 1.0))
-    moves = covariance @ (nominal.T @ seen)  # (p, c): how a column shifts the parameters
+    moves = covariance @ (nominal.T @ seen)  # (p, c): shift of the parameters by each column
     own = seen - nominal @ moves
     gram, aim = own.T @ own, own.T @ rest
     alone = np.diag(gram).copy()
@@ -232,7 +231,7 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
 
 
 def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
-    """Forward selection of a number of columns: each lowers χ² most beside those before it.
+    """Forward selection of a number of columns: each lowers χ² most in addition to the previous ones.
 
     Args:
         gram: products of the columns, shape (c, c).
@@ -263,7 +262,7 @@ OWN = 20
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Input of the network, without units, and what turns its output into units.
+    """Input of the network, without units, and the scales of its output.
 
     Shifts of the quantities are in standard deviations of the nominal fit, amplitudes in units of the noise,
     times in periods. Numbers that range over decades are compressed by asinh or the logarithm.
@@ -273,7 +272,7 @@ class Features:
         runs: features of each run, shape (n, k); the last one is 1 with the wind on, else 0.
         shifts: of the quantities under each rival, in standard deviations, shape (r, d); 0 where not determined.
         covariances: of the quantities under each rival, in the same unit, shape (r, d, d).
-        values: of the quantities by the nominal fit, SI, shape (d,).
+        values: of the quantities in the nominal fit, SI, shape (d,).
         stds: their standard deviations, SI, shape (d,); 1 where not determined.
         known: which quantities are determined, shape (d,).
     """
@@ -289,10 +288,10 @@ class Features:
 
 
 def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals] | None]:
-    """Features of records, each by itself, for ζ and ωn, and the fits behind them.
+    """Features of single records, for ζ and ωn, and the fits behind them.
 
     Returns:
-        For each; None where the windows determine no decay.
+        For each record; None where the windows do not determine a decay.
     """
     windows = RivalWindows.of(runs)
     nominal = windows.joined([(-windows.time, None), (None, windows.time)])
@@ -320,7 +319,7 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
 def campaign_features(
     runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
-    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs determine no coefficient."""
+    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs do not determine any coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
     for one, link in zip(seen, design.links, strict=True):
@@ -401,14 +400,14 @@ def _features(found: Rivals, moved: Array, jacobian: Array, known: Mask, runs: A
 
 
 def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, linked: float) -> Array:
-    """The run by itself; ``away`` is how far its own decay lies from that of the campaign."""
+    """The features of a run by itself; ``away`` is the difference of its decay from the campaign's."""
     weight = np.sqrt(run.samples) / run.noise
     zero_time = _slope(run.zero, run.time, weight)
     zero_size = _slope(run.zero, run.amplitude**2, weight)
     root = np.sqrt(run.information)
     size = run.amplitude / run.amplitude[0]
     harmonics: list[float] = []
-    # A sensor mounted the other way round changes the sign of the zero and of the second harmonic: it is left out.
+    # The sign of the zero and of the second harmonic depends on the mounting of the sensor: it is left out.
     for harmonic, power, fold in ((run.second, 1.0, abs), (run.third, 2.0, float)):
         pattern = root * size**power
         level = pattern @ (root * harmonic) / np.sqrt(pattern @ pattern)

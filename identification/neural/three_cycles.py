@@ -1,7 +1,7 @@
 """Windows of three cycles in a record, from its zero crossings alone, each as 100 numbers that depend on ζ alone.
 
-Every step is linear in the reading once the crossings are known. So each result has the weights of the samples in
-it, and white noise is propagated through all steps by the delta method.
+Every step is linear in the reading once the crossings are known. So each result is a weighted sum of the samples,
+and white noise is propagated through all steps by the delta method.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Shape:
 def normalise(points: Array) -> Shape:
     """Remove the mean, and scale the largest value of the first half cycle to 1.
 
-    It is the value of a quartic through the points of the half cycle, which is less sensitive to noise. The scale
+    The largest value is that of a quartic through the points of the half cycle, less sensitive to noise. The scale
     is 0 or less where the half cycle does not rise above the mean.
 
     Args:
@@ -83,7 +83,7 @@ def cycles_time(zeta: Array, omega_n: Array) -> Array:
 HALVES = 2 * CYCLES
 _SAMPLES_PER_CYCLE = 134  # a denser record is thinned to these; about four per point of the 100
 _LEAST_PER_CYCLE = 8.0
-# Of a half cycle, either side of a crossing, that its quintic is fitted to; a cubic biases ζ by 0.1 %.
+# Of a half cycle, either side of a crossing, for the fit of its quintic; a cubic biases ζ by 0.1 %.
 _REACH = 0.25
 _TERMS = 6
 _EXPONENTS = np.arange(_TERMS)[:, None]
@@ -118,7 +118,7 @@ class Propagation:
         points: weights of the samples in the 100 points, shape (100, n).
         timing: weights of the samples in t0 and t3, s/rad, shape (2, n).
         by_timing: derivatives of the points by t0 and t3, rad/s, shape (100, 2).
-        first: index of the first sample that has a weight.
+        first: index of the first sample of nonzero weight.
     """
 
     std: float
@@ -165,14 +165,14 @@ class _Place:
 
 
 def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, ...], float]:
-    """The windows of a record, one after the other, until it ends or the oscillation is lost in the noise.
+    """The windows of a record in sequence, until it ends or the oscillation is below the noise.
 
     Args:
         noise_std: standard deviation of one sample, rad, above 0.
 
     Returns:
-        The windows, and how many cycles of clear oscillation the record holds from its first crossing on; 0 where
-        nothing oscillates.
+        The windows, and the number of cycles of clear oscillation from the first crossing on; 0 where nothing
+        oscillates.
     """
     rough = starting_decay(record)
     if rough is None or rough.omega_d == 0.0:
@@ -184,7 +184,7 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
     yaw = mean_of_blocks(record.yaw_rad, block)
     spline = CubicSpline(time, yaw)
     trace = _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
-    # First crossings: of the smoothed reading through the mean level of its later half, with hysteresis.
+    # First crossings of the smoothed reading through the mean level of its later half, with hysteresis.
     width = max(1, round(period / trace.step / 10.0))
     if yaw.size < 2 * width or period / trace.step < _LEAST_PER_CYCLE:
         return (), 0.0
@@ -221,7 +221,7 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
 
 
 def _refined(trace: _Trace, place: _Place) -> _Place | None:
-    # Seven crossings t0 + k t3/6, zero and decay in turn; None where the decay is lost in noise.
+    # Seven crossings t0 + k t3/6, zero and decay in turn; None where the decay is below the noise.
     number = np.arange(HALVES + 1)
     for _ in range(_ROUNDS):
         instants = np.asarray(place.start + place.half * number, dtype=np.float64)

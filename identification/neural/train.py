@@ -1,7 +1,7 @@
-"""Training of both networks from a seed: several starts each, of which the one with the largest evidence is kept.
+"""Training of both networks from a seed: several starts each, of which the one of largest evidence is chosen.
 
 Full-batch Levenberg–Marquardt in torch float64, on one thread and in a fixed order: the same start gives identical
-weights on the same machine and version of torch, also where it is resumed from a checkpoint.
+weights on the same machine and version of torch, also after resuming from a checkpoint.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ if TYPE_CHECKING:
 class Hyperparameters:
     """The weights α and β of F = β E_D + α E_W, with E_D = Σ e² and E_W = Σ w², by MacKay's evidence.
 
-    Up to a factor it is the paper's F_reg = γ F_e + (1 − γ) F_w (eq. 14). The variance of the errors is 1/(2β),
-    that of the weights 1/(2α). Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415–447, doi
+    Up to a factor F is the paper's F_reg = γ F_e + (1 − γ) F_w (eq. 14). The variance of the errors is 1/(2β), and
+    of the weights 1/(2α). Sources: D. J. C. MacKay, Neural Computation 4 (1992) 415–447, doi
     10.1162/neco.1992.4.3.415; F. D. Foresee and M. T. Hagan, Proc. ICNN'97, 1930–1935, doi
     10.1109/ICNN.1997.614194.
 
@@ -67,7 +67,7 @@ class Hyperparameters:
         return self.beta / (self.beta + self.alpha * weights)
 
     def effective_parameters(self, eigenvalues: Array) -> float:
-        """γ = Σ βλ/(βλ + α), the effective number of parameters; λ of JᵀJ, those that are not zero, shape (k,)."""
+        """γ = Σ βλ/(βλ + α), the effective number of parameters, with the nonzero λ of JᵀJ, shape (k,)."""
         return float(np.sum(self.beta * eigenvalues / (self.beta * eigenvalues + self.alpha)))
 
 
@@ -77,7 +77,7 @@ def updated_hyperparameters(
     """One re-estimation by the evidence: α = γ/(2 E_W), β = (N − γ)/(2 E_D).
 
     Args:
-        eigenvalues: λ of JᵀJ, those that are not zero, shape (k,).
+        eigenvalues: the nonzero λ of JᵀJ, shape (k,).
         squared_errors: E_D, in squared units of the scaled output.
         squared_weights: E_W, (1).
         samples: number N of training pairs.
@@ -102,7 +102,7 @@ def log_evidence(
     It is larger for the better of several trainings on the same data.
 
     Args:
-        eigenvalues: λ of JᵀJ at the optimum, those that are not zero, shape (k,).
+        eigenvalues: the nonzero λ of JᵀJ at the optimum, shape (k,).
         squared_errors: E_D there, in squared units of the scaled output.
         squared_weights: E_W there, (1).
     """
@@ -123,7 +123,7 @@ _FIRST_DAMPING = 5e-3
 _LARGEST_DAMPING = 1e10  # of β: steps are then of the order of rounding errors
 _SMALLEST_DAMPING = 1e-20  # of β
 _FACTOR = 10.0
-_STANDS_OUT = 1e-4  # directions with βλ/α below this are left to the prior
+_STANDS_OUT = 1e-4  # βλ/α below which the prior determines a direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class Problem:
 
     @classmethod
     def of(cls, pairs: tuple[Array, Array], sizes: tuple[int, ...], *, unit_deviation: bool) -> Problem:
-        """Scale inputs and targets to zero mean, and to unit deviation: of the inputs only where asked for."""
+        """Scale inputs and targets to zero mean, and to unit deviation: inputs only on request."""
         inputs, output = Scaling.of(pairs[0]), Scaling.of(pairs[1][:, None])
         if not unit_deviation:
             inputs = replace(inputs, deviation=(1.0,) * len(inputs.deviation))
@@ -177,7 +177,7 @@ def first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> Array:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limit torch to one thread inside the context."""
+    """Limit torch to one thread within the context."""
     import torch
 
     threads = torch.get_num_threads()
@@ -308,13 +308,13 @@ class Checkpoint:
         tensors = {f"weights.{number}": one.weights for number, one in enumerate(kept)}
         state = [
             [one.held.alpha, one.held.beta, one.damping, one.iteration, one.finished] for one in kept
-        ]  # Python writes floats so that they are read back exactly
+        ]  # Python writes floats exactly
         document = {"spec": spec, "state": state, "ended": len(self.ended)}
         return save(tensors or {"none": np.zeros(1)}, {"training": json_line(document)})
 
     @classmethod
     def from_bytes(cls, content: bytes, spec: dict[str, Any]) -> Checkpoint | None:
-        """The inverse of `to_bytes`; None where it is not a checkpoint of that specification."""
+        """The inverse of `to_bytes`; None where the content is not a checkpoint of that specification."""
         try:
             # A safetensors file is the length of its header, the header as JSON, and the tensors.
             header = parse_json(content[8 : 8 + int.from_bytes(content[:8], "little")], "header", "")
@@ -345,7 +345,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
-    """Read the checkpoint of a training; None where there is none, or it belongs to another training."""
+    """Read the checkpoint of a training; None where it is missing, or belongs to another training."""
     return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None
 
 
@@ -370,7 +370,7 @@ class TrainingSpec:
         return asdict(self)
 
     def steps(self, which: str) -> int:
-        """Steps of a network's training, at most."""
+        """Greatest number of steps of a network's training."""
         return self.damping_steps if which == DAMPING else self.frequency_steps
 
     def work(self, which: str) -> int:

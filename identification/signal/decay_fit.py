@@ -24,7 +24,7 @@ _TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the
 _ROUNDING = 1e-9  # a step this small that no longer lowers the cost is limited by rounding
 _MAX_ITERATIONS = 100
 # Where the model fits badly, Gauss–Newton converges slowly. At the last iteration a fall of the cost by less than
-# this share of the residual variance of a sample, a hundredth of a standard deviation, is accepted.
+# this share of a sample's residual variance (a hundredth of a standard deviation) is accepted.
 _SETTLED = 1e-4
 
 
@@ -89,7 +89,7 @@ class DecayFit:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the shared parameters before the runs, as a normal distribution.
+    """Prior of the shared parameters, a normal distribution.
 
     Args:
         mean: of φ, shape (p,).
@@ -101,7 +101,7 @@ class Prior:
     information: Array
 
     def cost(self, parameters: Array) -> float:
-        """What the prior adds to the sum of squares at φ, shape (p,): rad²."""
+        """The prior's contribution to the sum of squares at φ, shape (p,): rad²."""
         away = parameters - self.mean
         return float(away @ self.information @ away)
 
@@ -121,14 +121,14 @@ def fit_decays(
     Args:
         links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
         start: φ to start from, shape (p,).
-        zero: the sensor's zero where it is known, rad; estimated where None.
-        own_zeros: whether an estimated zero is each run's own; otherwise it is common to the runs.
-        prior: the fit is then the maximum of the posterior, and ``normal`` includes the information of the prior.
+        zero: the sensor's zero where it is known, rad; None: estimated.
+        own_zeros: whether each run has its own estimated zero; otherwise it is common to the runs.
+        prior: the fit then maximises the posterior, and ``normal`` includes the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
-        The fit. ``converged`` is False where the iteration stalled: the values are then the best ones found, and
-        ``runs`` is empty where even the start was out of range or held no motion.
+        The fit. ``converged`` is False where the iteration stalled: the values are then the best found, and
+        ``runs`` is empty where even the start was out of range or contained no motion.
     """
     best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior, own_zeros)
     samples = sum(reading.time.size for reading in readings)
@@ -138,7 +138,7 @@ def fit_decays(
         try:
             normal, gradient = _shared_system(best, links, zero is None, prior, own_zeros)
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
-        except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
+        except np.linalg.LinAlgError:  # no motion in a run: nothing can be identified
             break
         size = 0.0
         for link, run in zip(links, best.runs, strict=True):
@@ -180,7 +180,7 @@ def fit_run(
 
 
 def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
-    """The best initial state and zero of a run for a given decay, for example one found by another method.
+    """The best initial state and zero of a run for a given decay, such as one from another method.
 
     Returns:
         The run at that decay and its sensor zero in rad; None where the decay overflows.
@@ -217,7 +217,7 @@ def linearised_at(
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """The runs at one φ, with the linear unknowns at their best."""
+    """The runs at one φ, with the best linear unknowns."""
 
     parameters: Array
     zero: float
@@ -234,7 +234,7 @@ def _project(
     own_zeros: bool = False,
 ) -> _Point:
     decays = [Decay(*map(float, link @ parameters)) for link in links]
-    with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is rejected then
+    with np.errstate(over="ignore", invalid="ignore"):  # a distant trial may overflow; it is then rejected
         rows = [
             response_rows(r.time, decay, constant=True) for r, decay in zip(readings, decays, strict=True)
         ]
@@ -281,7 +281,7 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
         information, score = eliminate(gram[np.ix_(order, order)], moment[order], 1)
         denominator += float(information[0, 0])
         numerator += float(score[0])
-    if not denominator > 0.0:  # motions so slow that they are constants: so is the zero
+    if not denominator > 0.0:  # motions so slow that they cannot be separated from the zero
         raise np.linalg.LinAlgError("the zero cannot be distinguished from the motion")
     return numerator / denominator
 
@@ -328,7 +328,7 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
 
 
 def mean_of_blocks(values: Array, factor: int) -> Array:
-    """Means of consecutive values, shape (n // factor,); those left over at the end are dropped.
+    """Means of consecutive values, shape (n // factor,); the remainder at the end is dropped.
 
     Args:
         values: shape (n,).

@@ -2,8 +2,8 @@
 
 The state and its derivatives with respect to a and k form one linear system of order six, driven by the input
 alone. Its exponential over a sample interval, with the input and its slope as further states (Van Loan, IEEE Trans.
-Automat. Contr. 23 (1978) 395–404), gives the motion and its sensitivities at the samples without an error of
-discretisation, at any damping and for any stiffness, zero included.
+Automat. Contr. 23 (1978) 395–404), gives the motion and its sensitivities at the samples without discretisation
+error, for any damping and any stiffness, zero included.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from scipy.linalg import expm
 from tunnel_sim.vocabulary.record import Array
 
 _STATE = 6  # β, β̇, and their derivatives with respect to a and to k
-_LINES = 24  # spectral lines at least from which a start is found
-_POWER = 0.999  # share of the response's power that these lines hold at least
+_LINES = 24  # least number of spectral lines for a start
+_POWER = 0.999  # least share of the response's power in these lines
 _ROUNDS = 8
 
 
@@ -52,7 +52,7 @@ def driven_rows(
     if steps.size == 1:
         state[1:] = pushed
         power, reach = transition[0], 1
-        while reach < time.size:  # after each round a state holds the pushes of the last `reach` intervals
+        while reach < time.size:  # each round, a state includes the input of the last `reach` intervals
             state[reach:] += state[:-reach] @ power.T
             power, reach = power @ power, 2 * reach
     else:
@@ -66,9 +66,9 @@ def driven_start(
 ) -> tuple[float, float, float] | None:
     """Decay rate, stiffness and gain from the spectra of input and response.
 
-    The equation of motion holds line by line, with a polynomial for the ends of the record; the weights of its
-    residuals are those of the response found before (Sanathanan and Koerner, IEEE Trans. Automat. Contr. 8 (1963)
-    56–58).
+    The equation of motion is satisfied line by line, with a polynomial for the ends of the record; the weights of
+    its residuals come from the response of the previous iteration (Sanathanan and Koerner, IEEE Trans. Automat.
+    Contr. 8 (1963) 56–58).
 
     Args:
         time: of the samples, shape (n,), s.
@@ -77,7 +77,7 @@ def driven_start(
         derivative: 0 where the reading is the angle, 1 where it is the rate.
 
     Returns:
-        a (1/s), k (1/s²) and g (rad/s² per unit); None where the response holds no motion.
+        a (1/s), k (1/s²) and g (rad/s² per unit); None where the response contains no motion.
     """
     count = time.size
     response, moved = np.fft.rfft(reading - reading.mean()), np.fft.rfft(values - values.mean())

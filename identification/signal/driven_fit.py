@@ -1,10 +1,10 @@
-"""Least squares of runs with an input, exact between its samples: one run by itself, or several together.
+"""Least squares of runs with an input, exact between its samples: a single run, or several together.
 
 A run has the decay rate a, the stiffness k and the gain g of its input per unit inertia, (a, k, g) = L φ + c, and
-three numbers of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0, and
-its zero cannot be separated from its initial angle. Its third number is instead a constant acceleration, by a
-moment beside the input. With a spring, such a moment shifts the zero. The method is that of Levenberg and
-Marquardt, with exact derivatives.
+three unknowns of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0,
+and its zero cannot be separated from its initial angle: its third unknown is instead a constant acceleration, from
+a moment added to the input. With a spring, such a moment shifts the zero. The method is Levenberg and
+Marquardt's, with exact derivatives.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
 _MOST_STEPS = 60
-_LEAST_SAMPLES = 4  # per unknown; of fewer the residual does not show the noise
-_SETTLED = 1e-10  # share of the sum of squares by which a last step may lower it
+_LEAST_SAMPLES = 4  # per unknown; with fewer the residual does not show the noise
+_SETTLED = 1e-10  # relative fall of the sum of squares in a step that ends the iteration
 _POOR = 0.5  # share of the expected fall of the sum of squares, below which a step was too long
 _SHORTER = 0.3  # damping after such a step
-_OWN = 3  # numbers of each run: zero or constant acceleration, initial angle, initial rate
+_OWN = 3  # unknowns of each run: zero or constant acceleration, initial angle, initial rate
 _GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start overflows
 
 
@@ -43,9 +43,9 @@ class InputFit:
         own: zero (rad; without a spring the constant acceleration, rad/s²), initial angle (rad) and rate (rad/s) of
             each run, shape (r, 3).
         residuals: reading less model, by run, rad.
-        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers, shape
+        normal: information of φ, of the common zero where there is one, and then of the runs' own unknowns, shape
             (m, m).
-        converged: whether a last step no longer paid.
+        converged: whether the last step reduced the sum of squares negligibly.
     """
 
     parameters: Array
@@ -61,9 +61,9 @@ class Gained:
 
     Args:
         coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
-        weight: their information, all else unknown, shape (3, 3); rows of zeros for a k that is known to be 0, and
-            for a g that is k or a known number.
-        offset: of a body without a spring, the constant moment beside the input, in the unit of the input.
+        weight: their information, the other unknowns eliminated, shape (3, 3); rows of zeros for a k known to be 0,
+            and for a g that is k or a known number.
+        offset: for a body without a spring, the constant moment added to the input, in the unit of the input.
     """
 
     coefficients: Array
@@ -84,7 +84,7 @@ class DrivenRun(FittedRun):
     """A driven run and its fit.
 
     Args:
-        gained: what the fit says of decay rate, stiffness and gain.
+        gained: decay rate, stiffness and gain from the fit.
     """
 
     gained: Gained
@@ -120,7 +120,7 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
         return _failed(run, reading, Status.NOT_CONVERGED)
     if not determined(found.normal):
         return _failed(run, reading, Status.NOT_DETERMINED)
-    # In the order of free runs: the gain eliminated, and a known k with a row of its own.
+    # In the order of free runs: the gain eliminated, and a row for k where it is known.
     size, kept = len(places), sum(place < 2 for place in places)
     order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
     normal = found.normal[np.ix_(order, order)]
@@ -168,7 +168,7 @@ def own_unknowns(run: Run) -> tuple[list[int], Array]:
 
 
 def constant_gain(run: Run) -> Array:
-    """The part c of (a, k, g) that depends on no unknown, shape (3,): that of the gain, rad/s² per unit."""
+    """The part c of (a, k, g) that depends on no unknown, shape (3,): a known gain, rad/s² per unit."""
     known = run.known_gain
     return np.array([0.0, 0.0, 0.0 if known is None else known.constant])
 
@@ -202,11 +202,11 @@ def fit_with_inputs(
         derivative: 0 where the readings are angles, 1 where they are rates.
 
     Returns:
-        The fit; ``converged`` is False where a start overflows, or the steps come to no end.
+        The fit; ``converged`` is False where a start overflows or the steps do not converge.
     """
     parameters, own = start.astype(np.float64), np.zeros((len(runs), _OWN))
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
-        with np.errstate(all="ignore"):  # a start far off may overflow
+        with np.errstate(all="ignore"):  # a distant start may overflow
             residual, jacobian = linearised(run, link, parameters, own[i], derivative)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return InputFit(parameters, own, [], np.zeros((0, 0)), False)
@@ -229,12 +229,12 @@ def fit_with_inputs(
         else:
             moved_own[:, 0] += step[size]
             moved_own[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
-        with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
+        with np.errstate(all="ignore"):  # a distant trial may overflow; it is then rejected
             trial = equations(moved, moved_own)
             after = sum(float(inner(r, r)) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
-            # of large residuals the step is too long, and without damping the fit would go to and fro
+            # with large residuals the step is too long, and the fit would oscillate without damping
             short = cost - after < _POOR * float(step @ (2.0 * gradient - normal @ step))
             damping = max(3.0 * damping, _SHORTER) if short else damping / 10.0
             parameters, own, cost = moved, moved_own, after
@@ -257,7 +257,7 @@ def normal_equations(
     derivative: int = 0,
     filters: Sequence[tuple[Array, Array]] | None = None,
 ) -> tuple[list[Array], Array, Array]:
-    """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
+    """Residuals, information and score of φ, the common zero where there is one, and the runs' own unknowns.
 
     Args:
         links: one per run, shape (3, p): (a, k, g) = L φ + c.
@@ -265,8 +265,8 @@ def normal_equations(
         own: of each run as in `InputFit`, shape (r, 3).
         own_zeros: whether every run has its own zero.
         derivative: 0 where the readings are angles, 1 where they are rates.
-        filters: numerator and denominator per run, shape (3,) each, of a recursive filter that makes its noise
-            white; None where it is white.
+        filters: numerator and denominator per run, shape (3,) each, of a recursive filter that whitens its noise;
+            None where the noise is white.
 
     Returns:
         Residuals in rad; JᵀJ, shape (m, m); Jᵀ residual, shape (m,).
@@ -297,8 +297,8 @@ def linearised(
         link: (a, k, g) = L φ + c, shape (3, p).
         parameters: φ, shape (p,), SI.
         own: zero (rad) or constant acceleration (rad/s²), initial angle (rad) and rate (rad/s), shape (3,).
-        derivative: 0 where the readings are angles; 1 where they are rates, as are then zero and initial state,
-            since free motion has rates that obey the equation of its angles.
+        derivative: 0 where the readings are angles; 1 where they are rates. Zero and initial state are then rates
+            too, since the rates of free motion obey the equation of its angles.
 
     Returns:
         Residual in rad, shape (n,), and derivatives of the model with respect to φ and ``own``, shape (n, p + 3).

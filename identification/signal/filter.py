@@ -1,13 +1,13 @@
-"""A decay that a random moment drives: its likelihood by a steady Kalman filter, and the maximum of it.
+"""A decay driven by a random moment: its likelihood by a steady Kalman filter, and its maximum.
 
 State (β, β̇) with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ
 = −2πfb (w − white), with the same q at low frequency; the reading adds white noise of variance R. In discrete
 time the reading obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance
 of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven part.
-So innovations are one call of a recursive filter over the record, with no loop in Python.
+So innovations need one call of a recursive filter over the record, and no loop in Python.
 
 The initial state and the sensor's zero enter linearly: their responses are filtered like the reading and fitted
-to it by least squares. The covariance that the steady filter assumes for the initial state then has no influence.
+to it by least squares. The steady filter's assumed covariance of the initial state then has no influence.
 Where q is 0, C is D and the innovations are output error's residual. Sources: Maine & Iliff, SIAM J. Appl. Math.
 41 (1981) 558–579, doi 10.1137/0141046 (also the scoring); Åström, Automatica 16 (1980) 551–574, doi
 10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5.
@@ -27,7 +27,7 @@ from identification.statistics import inner, inverse, scaled_solve
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
-_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
+_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is made
 _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
 
 
@@ -55,7 +55,7 @@ def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple
 def steady_filters(
     transition: Array, disturbance: Array, variance: Array
 ) -> list[tuple[Array, Array, float]]:
-    """The steady Kalman filters of systems whose first state is read, as recursive filters.
+    """The steady Kalman filters of systems whose first state is measured, as recursive filters.
 
     Args:
         transition: over one interval, shape (systems, n, n), in SI units.
@@ -64,7 +64,7 @@ def steady_filters(
 
     Returns:
         For each system numerator and denominator, shape (n + 1,) each, of the filter from readings to
-        innovations, and the variance of the innovations, rad²; infinite where the filter does not settle.
+        innovations, and the variance of the innovations, rad²; infinite where the filter does not converge.
     """
     # Prediction covariance of the filters: their Riccati equation by doubling (Anderson, Int. J. Control 28 (1978)
     # 295–306, doi 10.1080/00207177808922455).
@@ -73,7 +73,7 @@ def steady_filters(
     g[:, 0, 0] = 1.0 / variance
     covariance = disturbance
     identity = np.eye(transition.shape[1])
-    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
+    with np.errstate(all="ignore"):  # a diverging trial is rejected by its spread
         for _ in range(_DOUBLINGS):
             inverted = np.linalg.inv(identity + g @ covariance)
             left = a @ inverted
@@ -123,7 +123,7 @@ class Driven:
 
     @property
     def intensity_at_resonance(self) -> float:
-        """The moment's spectral intensity at ωn, which the motion shows best: q/(1 + (ωn/2πfb)²), rad²/s³."""
+        """The moment's spectral intensity at ωn, where the motion is most sensitive: q/(1 + (ωn/2πfb)²) rad²/s³."""
         if self.corner is None:
             return self.intensity
         return self.intensity / (1.0 + self.decay.stiffness / (2.0 * np.pi * self.corner) ** 2)
@@ -138,7 +138,7 @@ class Innovations:
         variance: their expected variance, rad².
         cost: −2 ln L up to a constant, dimensionless.
         gain: of a known input, rad/s² per unit; 0 where there is none.
-        gain_variance: of the gain for the model as it is, in the square of its unit.
+        gain_variance: variance of the gain with the other parameters fixed, in the square of its unit.
     """
 
     values: Array
@@ -151,7 +151,7 @@ class Innovations:
 def innovations(
     values: Array, interval: float, model: Driven, noise_variance: float, response: Array | None = None
 ) -> Innovations | None:
-    """One-step prediction errors, with the initial state, the zero and the gain of a known input at their best.
+    """One-step prediction errors, with the best initial state, zero and gain of a known input.
 
     Args:
         values: readings or block means, shape (n,), rad.
@@ -167,8 +167,8 @@ def innovations(
         motion = response_rows(time, model.decay)[:2]
     known = [] if response is None else [response]
     if model.corner is not None and model.intensity != 0.0:
-        # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion, which
-        # is among the columns already.
+        # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion;
+        # the columns include the latter already.
         known.insert(0, np.exp(-2.0 * np.pi * model.corner * time))
     columns = np.vstack((values, motion, np.ones_like(time), *known))
     if not np.isfinite(columns).all():
@@ -322,7 +322,7 @@ class _DrivenLikelihood:
     def at(self, model: Driven) -> Innovations | None:
         if self.known is None:
             return innovations(self.values, self.interval, model, self.noise_variance)
-        with np.errstate(all="ignore"):  # a trial far off is refused by its columns
+        with np.errstate(all="ignore"):  # a distant trial is rejected by its columns
             row = self.known.response(model.decay)
         if self.known.gain is not None:
             left = self.values - self.known.gain.at(model.decay.stiffness) * row
@@ -330,7 +330,7 @@ class _DrivenLikelihood:
         return innovations(self.values, self.interval, model, self.noise_variance, row)
 
     def with_gain(self, found: DrivenFit) -> Array:
-        """Covariance of (a, k, g), shape (3, 3): that of g for the model as it is, and by that of the model."""
+        """Covariance of (a, k, g), shape (3, 3): g's variance at a fixed model plus the model's contribution."""
         jacobian = np.diag([1.0, 1.0, 0.0])
         for i, nudge in enumerate(self.nudges):
             away = nudge * np.eye(3)[i]

@@ -2,7 +2,7 @@
 
 With a = C/(2 Izz) [1/s], k = K/Izz [1/s²] and Δ = k − a²: β(t) = β₀ u(t) + r₀ s(t), s = e^{−at} S(t), u = e^{−at}
 C(t) + a s, where C = cos(√Δ t) and S = sin(√Δ t)/√Δ are entire functions of Δ. All derivatives with respect to a
-and k are combinations of only two more functions, w = e^{−at} ∂S/∂Δ and t s(t):
+and k combine only two more functions, w = e^{−at} ∂S/∂Δ and t s(t):
 
     ∂u/∂a = −2k w,   ∂u/∂k = a w − t s/2,   ∂s/∂a = −t s − 2a w,   ∂s/∂k = w.
 
@@ -18,8 +18,8 @@ import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
-# |Δt²| below which the series is used: eight terms leave 1e-19 at a quarter; the quotients lose one digit at most
-# above it.
+# |Δt²| below which the series is used: eight terms are accurate to 1e-19 at 0.25; above it the quotients lose at
+# most one digit.
 _SERIES_LIMIT = 0.25
 _SERIES_TERMS = 8
 _SERIES = np.array(
@@ -82,7 +82,7 @@ def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array
         decaying, phase = np.exp(-decay.rate * time), omega * time
         cosine = decaying * np.cos(phase)
         sine[:] = decaying * np.sin(phase) / omega if omega > 0.0 else 0.0
-    else:  # two real exponents; the root nearer to zero comes from the product of both, k, to keep its digits
+    else:  # two real exponents; the root nearer to zero is k over the other one, to keep its digits
         mu = sqrt(-delta)
         far = decay.rate + (mu if decay.rate >= 0.0 else -mu)
         near = decay.stiffness / far

@@ -1,4 +1,4 @@
-"""What a record shows before any fit: its frequency, its peaks, its poles, and the decay that a fit starts from.
+"""Properties of a record before any fit: its frequency, its peaks, its poles, and the decay that starts a fit.
 
 A record is refused here for numerical reasons only; the methods judge everything else.
 """
@@ -19,13 +19,13 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
 # Fourth powers of readings and of times are summed over a record: beyond these limits they overflow or underflow.
 _LEAST, _GREATEST = 1e-60, 1e60
-_ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, in which no motion can be seen
+_ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, with no detectable motion
 
 
 def holds_motion(record: Record) -> bool:
     """Whether a record has enough samples, and a reading that changes by more than rounding.
 
-    Numbers so large or small that their squares cannot be summed hold none.
+    Numbers so large or small that their squares cannot be summed are not a motion.
     """
     if record.time_s.size < LEAST_SAMPLES:
         return False
@@ -44,7 +44,7 @@ def holds_motion(record: Record) -> bool:
 
 _PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
 
-_FEWEST_CYCLES = 2.0  # in a record whose motion lasts as long as it does
+_FEWEST_CYCLES = 2.0  # in a record whose motion lasts to its end
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class SpectralPeak:
     """The highest peak of a power spectral density.
 
     Args:
-        frequency: of the peak, Hz; 0 where the record holds no motion (`holds_motion`).
+        frequency: of the peak, Hz; 0 where the record contains no motion (`holds_motion`).
         prominence: its power over the median's; white noise alone reaches 40 less than once in 1e6 records.
     """
 
@@ -67,8 +67,8 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
 
     Args:
         padding: the record is padded with zeros to at least this number of times its length; 1 is faster, and
-            good enough to start a fit of many cycles.
-        falling: whether the window falls from the start of the record, instead of rising first: it then sees a
+            sufficient to start a fit of many cycles.
+        falling: whether the window falls from the start of the record instead of rising first: it then includes a
             decay that ends long before the record does.
     """
     if not holds_motion(record):
@@ -76,7 +76,7 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     record = evenly_spaced(record, bridged=False)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
-    # Below one cycle per record the spectrum holds the offset's remainder, not the oscillation.
+    # Below one cycle per record the spectrum contains the remaining offset, not the oscillation.
     lowest = max(1, int(size / centred.size))
     place, power = highest_peak(centred * _window(centred.size, falling), size, lowest)
     highest = float(power[lowest:-1].max())
@@ -87,14 +87,14 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
 
 
 def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Array]:
-    """Where the spectrum of a series is highest, in bins, and the power, shape (size // 2 + 1,).
+    """The highest point of the spectrum of a series, in bins, and the power, shape (size // 2 + 1,).
 
-    The place is that of a parabola through the logarithms of the three highest bins.
+    The highest point is the vertex of a parabola through the logarithms of the three highest bins.
 
     Args:
         values: the series, windowed, without its mean, shape (n,).
         size: number of samples it is padded to with zeros, at least n.
-        lowest: first bin to be considered; the last bin is never considered.
+        lowest: first bin considered; the last bin is never considered.
     """
     power = np.abs(np.fft.rfft(values, size)) ** 2
     peak = lowest + int(np.argmax(power[lowest:-1]))
@@ -105,10 +105,10 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
 
 
 def peak_of_swing(swing: Array, size: int) -> float:
-    """Where the spectrum of a decay is highest, in bins, with a Hann window.
+    """The highest point of the spectrum of a decay, in bins, with a Hann window.
 
-    A peak below two cycles of the series is none of the motion's: a heavily damped one is over before the middle
-    of the series. It is then sought with a window that falls from the start.
+    A peak below two cycles of the series does not come from the motion: a heavily damped one is over before the
+    middle of the series. The peak is then sought with a window that falls from the start.
 
     Args:
         swing: the series without its mean, shape (n,), any unit.
@@ -135,8 +135,8 @@ def starting_decay(record: Record) -> Decay | None:
     """A decay close enough for the least-squares fit to converge; None where none fits or nothing moves.
 
     For records of many cycles the candidates are the peak of the power spectral density with several damping
-    ratios; for heavily damped ones, the fit of the twice integrated equation of motion. That of the smallest sum
-    of squares is taken.
+    ratios; for heavily damped ones, the fit of the twice integrated equation of motion. The candidate of least sum
+    of squares is chosen.
     """
     frequency = starting_frequency(record)
     if frequency is None:
@@ -160,10 +160,10 @@ def starting_decay(record: Record) -> Decay | None:
 
 
 def starting_frequency(record: Record) -> float | None:
-    """The approximate frequency of the strongest oscillation, Hz; None where the record holds no motion."""
+    """The approximate frequency of the strongest oscillation, Hz; None where the record contains no motion."""
     if not holds_motion(record):
         return None
-    # A block mean hides an oscillation of two samples per cycle or fewer: a record of some two thousand cycles.
+    # A block mean hides an oscillation of at most two samples per cycle: a record of some two thousand cycles.
     factor = max(1, record.time_s.size // _LONG)
     if factor > 1:
         record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
@@ -188,8 +188,8 @@ def _integral(time: Array, values: Array) -> Array:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
-_LEAST_SAMPLES = 1.5001  # either side of a peak, whose parabola needs three
+PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, on either side of a peak, for the fit of its parabola
+_LEAST_SAMPLES = 1.5001  # on either side of a peak, whose parabola needs three
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
 
@@ -216,7 +216,7 @@ class PeakDecay:
 def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     """The decay rate from a line through the logarithm of the peaks, of both signs, against time.
 
-    The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which lie evenly on both sides of it. Peaks
+    The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which are evenly placed about it. Peaks
     are followed until they fall below a tenth of the first. None where there are fewer than four.
 
     Args:
@@ -244,13 +244,13 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
 
 
 def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> tuple[Array, Array]:
-    """Peaks of both signs, each looked for half a period after the one before; the first past the release itself.
+    """Peaks of both signs, each sought half a period after the previous one; the first after the release itself.
 
     A peak is the vertex of a parabola through the samples within a twelfth of a period of it.
 
     Args:
         frequency: of the oscillation, Hz.
-        sparse: whether three samples make a peak where a twelfth of a period holds fewer, as noise does too.
+        sparse: whether three samples make a peak where a twelfth of a period has fewer, as noise does too.
 
     Returns:
         Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no longer
@@ -280,13 +280,13 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
             if abs(place) <= 0.5:
                 vertex = at + float(place) * width, float(height + 0.5 * slope * place)
                 break
-            # Move up the slope: with curvature of the wrong sign the vertex would lie on the other side.
+            # Move up the slope: with curvature of the wrong sign the vertex would be on the other side.
             rising = slope * np.sign(record.yaw_rad[low:high].mean() - record.yaw_rad.mean()) > 0.0
             at += (0.5 if rising else -0.5) * width
         if vertex is None:
             break
         if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):
-            break  # peaks no longer alternate: the oscillation is lost in the noise
+            break  # peaks no longer alternate: the oscillation is below the noise
         times.append(vertex[0])
         heights.append(vertex[1])
         expected = vertex[0] + half
@@ -302,9 +302,9 @@ def _line(x: Array, y: Array) -> tuple[float, float]:
     return gradient, float(np.sqrt(residual @ residual / (x.size - 2) / spread))
 
 
-_LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more hardly helps elsewhere
+_LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more has little effect elsewhere
 _LEAST_BLOCKS = 8
-_DENSE = 64  # values up to which a full decomposition is faster than the iteration, which noise alone slows
+_DENSE = 64  # values up to which a full decomposition is faster than the iteration, slow in pure noise
 _MAX_SWEEPS = 60
 _SETTLED = 1e-10  # change of the subspace in a sweep
 
@@ -322,7 +322,7 @@ class PencilDecay:
 
 
 def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | None:
-    """The decay of uniformly spaced values by the matrix pencil; None where they are too few, or hold none.
+    """The decay of uniformly spaced values by the matrix pencil; None where they are too few, or contain none.
 
     The Hankel matrix of a decay, with the mean of each row removed, has rank two. A shift by one value maps its
     column space onto itself, and the eigenvalues of this 2×2 map are the exponentials of the poles. The two
@@ -354,7 +354,7 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     gradients = []
     for pole, dual, image in zip(poles, duals, images.T, strict=True):
         # To first order δλ = Σᵢⱼ q(i) e(i + j) v(j) with the noise e: q is the shift's residual on the dual vector;
-        # the mean of v is removed, like that of the rows.
+        # the mean of v is removed, like the mean of the rows.
         q = np.zeros(dual.size + 1, dtype=np.complex128)
         q[1:] += dual
         q[:-1] -= pole * dual

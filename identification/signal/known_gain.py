@@ -1,4 +1,4 @@
-"""Inputs whose gain over the inertia is known, and whose sign or unit the motion may contradict."""
+"""Inputs of known gain over the inertia, and a check of their sign and unit against the motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import evenly_spaced
 
 _DEGREES = 180.0 / np.pi
-_SAME_GAIN = 0.5  # share by which a start may miss a gain: signs and units differ by far more
+_SAME_GAIN = 0.5  # greatest relative error of a start's gain: errors of sign and unit are far larger
 
 
 def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = True) -> None:
     """Refuse the acceleration of a base whose sign or unit the motion contradicts.
 
-    Over the inertia its gain is known. It is refused where the motion shows another one beyond doubt, which is that
-    of the other sign, or of degrees in place of radians.
+    Its gain over the inertia is known. The input is refused where the motion shows another gain beyond doubt: of
+    opposite sign, or in degrees instead of radians.
 
     Args:
         derivative: 0 where the readings are angles, 1 where they are rates.
-        judged: whether a likely slip of units is refused too.
+        judged: whether a probable error of units is refused too.
 
     Raises:
         TunnelError: for such an input.
@@ -34,7 +34,7 @@ def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = T
     record, column = evenly_spaced(run.record), run.drive.column
     values = np.interp(record.time_s, run.record.time_s, run.drive.values)
     start = driven_start(record.time_s, record.yaw_rad, values, derivative=derivative)
-    if start is None or not start[1] > 0.0:  # other checks refuse what does not oscillate
+    if start is None or not start[1] > 0.0:  # other checks refuse a motion that does not oscillate
         return
     ratio = start[2] / run.drive.kind.scale
     turned, degrees, radians = (
@@ -55,7 +55,7 @@ def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = T
 
 
 def _gain_differs(run: Run, start: tuple[float, float, float], derivative: int) -> bool:
-    """Whether the gain that fits a run best differs from the known one far beyond its noise."""
+    """Whether the gain that best fits a run differs from the known gain far beyond its noise."""
     began = np.array(start) - constant_gain(run)
     found = fit_with_inputs([run], [np.eye(3)], began, own_zeros=True, derivative=derivative)
     if not found.converged or not determined(found.normal):

@@ -1,7 +1,7 @@
 """The noise of the sensor, and whether the residual of a fit is that noise and nothing else.
 
-The fast part of a residual (its sixth differences) holds only noise, whatever the model. The slow part (means
-over an eighth of a cycle) also holds what the model does not explain, in the band of the oscillation, which
+The fast part of a residual (its sixth differences) contains only noise, whatever the model. The slow part (means
+over an eighth of a cycle) also contains the misfit of the model, in the band of the oscillation, which
 determines the parameters. White noise has the same power in both: their ratio is tested by F.
 """
 
@@ -35,7 +35,7 @@ class Residual:
     Args:
         values: reading less model, shape (n,), rad.
         unknowns: number of parameters fitted to the run's own data.
-        peak: largest distance of the reading from the sensor's zero, rad.
+        peak: greatest deviation of the reading from the sensor's zero, rad.
     """
 
     values: Array
@@ -62,7 +62,7 @@ def stated_noise(sensor: SensorProperties) -> float | None:
 
 
 def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
-    """The noise level behind the standard deviations: the stated one where the residuals agree, else theirs."""
+    """The noise level behind the standard deviations: the stated one where the residuals agree, else measured."""
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
@@ -110,7 +110,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
 
 
 def reading_noise(record: Record, sensor: SensorProperties) -> float:
-    """`white_noise` of a record of many samples per cycle, whatever its times."""
+    """`white_noise` of a record of many samples per cycle, with any spacing of its times."""
     if record.uniform or record.time_s.size <= 4 * _ORDER:
         return white_noise(record.yaw_rad, sensor)
     # A sixth divided difference is zero for the quintic that a swing resembles over seven samples.

@@ -1,8 +1,8 @@
 """Identification of one run: start, least squares, noise, standard deviations, windows.
 
-One test for every method says whether one damped oscillation explains a record. On a record of little noise a
-method's own motion misses the record by the error of the method alone. So the least-squares motion nearest to the
-method's decay is tested instead, by `noise.noise_level`.
+Every method has the same test of whether one damped oscillation explains a record. With little noise, a method's
+own motion would fail it by the error of the method alone. The least-squares motion nearest to the method's decay
+is tested instead, by `noise.noise_level`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 CYCLES = 3
 _LEAST_WINDOWS = 4
-# A steady change over n windows is n − 1 standard deviations of their successive differences, and 3.29 are needed.
+# A steady change over n windows is n − 1 standard deviations of their successive differences; 3.29 are required.
 _LEAST_TO_SEE_CHANGE = 5
 _LEAST_SAMPLES = 16
 _TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
@@ -70,7 +70,7 @@ class FittedRun:
 
 
 def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
-    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, whatever its spring.
+    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, for any spring.
 
     Args:
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
@@ -99,7 +99,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
 def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
     """The least-squares fit of a run by itself; None where it finds no decay of positive stiffness."""
     if start.omega_d > 0.0:
-        # Block means lead most of the way to the optimum at a twentieth of the cost; the fit uses all samples.
+        # Block means come close to the optimum at a twentieth of the cost; the final fit uses all samples.
         thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
         if thin.time.size <= run.record.time_s.size // 4:
             near = fit_run(thin, start, tolerance=_NEAR)
@@ -111,7 +111,7 @@ def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
 def residuals_of(
     readings: Sequence[Reading], runs: Sequence[RunFit], zero: float, unknowns: int
 ) -> list[Residual]:
-    """The residuals of fitted runs, with what is needed to test them.
+    """The residuals of fitted runs, with the data needed to test them.
 
     Args:
         zero: the sensor's, rad.
@@ -120,7 +120,7 @@ def residuals_of(
     residuals = []
     for reading, run in zip(readings, runs, strict=True):
         omega = float(np.sqrt(abs(run.decay.stiffness)))
-        if omega == 0.0:  # a body without a spring: its root-mean-square rate over that of its angle
+        if omega == 0.0:  # a body without a spring: rms rate over rms angle
             motion = reading.yaw - run.residual
             rate, angle = float(np.std(np.gradient(motion, reading.time))), float(np.std(motion))
             omega = max(rate, 1e-300) / max(angle, 1e-300)
@@ -138,7 +138,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 def noise_and_failure(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
-    """The noise level from the residual of one run's fit, and the status of the failure, None if there is none.
+    """The noise level from the residual of one run's fit, and the status of a failure; None if there is none.
 
     Args:
         zero: its sensor zero, rad.
@@ -163,8 +163,8 @@ def describe_run(
 ) -> RunEstimate:
     """The result of one run from its decay, whatever the method.
 
-    The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading and
-    that of the decay. Its only status is NOT_DETERMINED where the covariance is not positive definite.
+    The initial state and the zero are those that fit the decay best; their uncertainty combines the reading's and
+    the decay's. The only status is NOT_DETERMINED, where the covariance is not positive definite.
 
     Args:
         zero: its sensor zero, rad.
@@ -215,14 +215,14 @@ def _departing_windows(
     omega_n: Quantity,
     windows: tuple[WindowEstimate, ...],
 ) -> tuple[WindowEstimate, ...]:
-    """Windows of a run whose frequency changes so much along it that no oscillation describes it.
+    """Windows of a run whose frequency changes so much along it that no single oscillation describes it.
 
-    The fit then loses step with the motion, and takes the loss for damping. A random moment leaves as large a
+    The fit then loses step with the motion, and mistakes this for damping. A random moment leaves as large a
     residual, but the frequencies of its windows scatter: their successive differences are the measure.
 
     Returns:
-        The windows, of single cycles where the run has few others; none where one oscillation describes the motion
-        itself, or where frequencies differ along the run, and from its own, by no more than such a scatter.
+        The windows, of single cycles where the run has few others; none where one oscillation describes the motion,
+        or where frequencies differ along the run, and from its own, by no more than such a scatter.
     """
     missed = max(float(np.mean(fitted.residual**2)) - noise.std**2, 0.0)
     if missed <= GROSS_MISFIT * float(np.var(reading.yaw)):
@@ -240,7 +240,7 @@ def _departing_windows(
 
 
 def _spanning(value: Quantity, windows: Sequence[Quantity]) -> Quantity:
-    """A quantity of the run whose standard deviation includes its distance from those of its windows."""
+    """A quantity of the run whose standard deviation includes its distance from the windows' values."""
     away = np.array([window.value for window in windows]) - value.value
     return Quantity(value.value, float(np.hypot(value.std, np.sqrt(np.mean(away**2)))), value.unit)
 
@@ -285,13 +285,13 @@ def fit_windows(
     """Fit a decay to each window of a few cycles of a run separately, as in the paper's Table III.
 
     Each window lasts ``cycles`` periods of its own fitted frequency and the next starts where it ends. The
-    sensor's zero is common to them: that of the whole run, or, where one decay does not fit the whole run, the
-    median of the windows' own. The series ends with the record, or where the oscillation is lost in the noise; a
+    sensor's zero is common to them: the zero of the whole run or, where one decay does not fit the whole run, the
+    median of the windows' own. The series ends with the record, or where the oscillation is below the noise; a
     window that one decay does not describe even roughly is skipped.
 
     Args:
         zero: its sensor zero, rad.
-        cycles: periods in a window; where None three, or one where the record is too short for four such.
+        cycles: periods in a window; None: three, or one where the record is too short for four such windows.
     """
     if cycles is None:
         cycles = CYCLES if _LEAST_WINDOWS * _length(run, CYCLES) <= float(reading.time[-1]) else 1
@@ -336,7 +336,7 @@ def _series(
 
 
 def _start_at(reading: Reading, begin: int, decay: Decay, cycles: int) -> Decay:
-    # Where one decay does not fit what went before, its values may be far from those of the window to come.
+    # Where one decay does not fit the preceding windows, its values may be far from those of the next window.
     part = slice(begin, int(np.searchsorted(reading.time, reading.time[begin] + _length(decay, cycles))))
     if part.stop - part.start < _LEAST_SAMPLES or part.stop >= reading.time.size:
         return decay

@@ -1,8 +1,8 @@
-"""The energy that a motion loses from one reversal to the next.
+"""The energy that a motion loses between successive reversals.
 
-At a reversal the body is at rest, and all its energy is in what restores it. Between two reversals friction and
-damping take the work of the input less the gain of that energy, whatever their laws are; of a free decay see Feeny
-& Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411.
+At a reversal the body is at rest, and all its energy is potential. Between two reversals friction and
+damping take the work of the input less the gain in potential energy, whatever their laws; for free decays see
+Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.record import Array
 
-_WINDOW = 0.12  # of the time between reversals, on both sides of one: its extreme is a parabola's there
+_WINDOW = 0.12  # of the time between reversals, on both sides of one: the motion is a parabola there
 _FEWEST = 2  # samples on either side
 
 
@@ -23,10 +23,10 @@ class Strokes:
     """A motion from reversal to reversal, n strokes.
 
     Args:
-        turns: places of the reversals among the samples, shape (n + 1,).
+        turns: indices of the reversals among the samples, shape (n + 1,).
         angle: at the reversals, rad, shape (n + 1,).
         lost: energy that friction and damping have taken, J, shape (n,).
-        spread: standard deviation of those angles over that of white noise of the samples, a ratio, shape (n + 1,).
+        spread: standard deviation of those angles over that of white noise of a sample, a ratio, shape (n + 1,).
     """
 
     turns: NDArray[np.int64]
@@ -41,9 +41,9 @@ class Strokes:
 
 
 def reversals(angle: Array, least: float) -> NDArray[np.int64]:
-    """Places of the extremes of a motion between which it travels far enough, shape (k,).
+    """Indices of the extremes between which a motion travels far enough, shape (k,).
 
-    The ends of the record are none: the body need not be at rest there.
+    The ends of the record do not count: the body need not be at rest there.
 
     Args:
         angle: rad, shape (n,).
@@ -55,7 +55,7 @@ def reversals(angle: Array, least: float) -> NDArray[np.int64]:
             high = place
         if value < angle[low]:
             low = place
-        if upward >= 0 and angle[high] - value >= least:  # it has turned back from a maximum
+        if upward >= 0 and angle[high] - value >= least:  # it has reversed at a maximum
             places.append(high)
             upward, low = -1, place
         elif upward <= 0 and value - angle[low] >= least:
@@ -73,10 +73,10 @@ def strokes(
 
     Args:
         angle: at even times, rad, shape (n,).
-        turns: from `reversals`, of this motion or of one that is nearly the same, shape (k,).
-        stiffness: of what restores the body, N m/rad.
+        turns: from `reversals`, of this motion or of a nearly equal one, shape (k,).
+        stiffness: of the restoring moment, N m/rad.
         moment: of the input on the body at those times, N m, shape (n,); None: a free decay.
-        centre: the angle at which nothing is restored, rad.
+        centre: the angle without restoring moment, rad.
 
     Returns:
         The strokes; the angles of the reversals are the extremes of parabolas through the samples around them.
@@ -98,7 +98,7 @@ def strokes(
 
 
 def _extreme(angle: Array, place: int, gap: int) -> tuple[float, float]:
-    """Of a parabola through the samples around a reversal, rad, and its standard deviation over the noise's."""
+    """The extreme of a parabola through the samples around a reversal, rad, and its std over the noise's."""
     reach = max(_FEWEST, round(_WINDOW * gap))
     first, last = max(place - reach, 0), min(place + reach + 1, angle.size)
     powers = np.vander(np.arange(first - place, last - place, dtype=np.float64), 3)

@@ -1,8 +1,8 @@
 """Natural frequency and damping from turning points, by their own likelihood.
 
-The turning points of a linear decay are half a damped period apart, wherever it rests, and their angles are
-c + (−1)ᵏ A exp(−δ k). A reading is late or early by chance, which to first order changes no angle there.
-The likelihood is therefore a product of two: a straight line of times, and a decaying alternation of angles.
+The turning points of a linear decay are half a damped period apart, about any centre, and their angles are
+c + (−1)ᵏ A exp(−δ k). A timing error changes the angle there only to second order. The likelihood is therefore a
+product of two: a straight line of times, and a decaying alternation of angles.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class TurningPointFit:
-    """What turning points say of a decay.
+    """A linear decay from its turning points.
 
     Args:
         omega_n: natural angular frequency, rad/s.
@@ -43,10 +43,10 @@ class TurningPointFit:
         period: of the damped oscillation, s.
         decrement: logarithmic, of a whole period.
         zero: angle at rest, rad.
-        first_swing: excursion from there at the first turning point, rad.
+        first_swing: excursion from ``zero`` at the first turning point, rad.
         time_scatter: standard deviation of the times about the line, s.
         angle_scatter: of the angles about the decay, rad.
-        said: on the uncertainties, and on what the model does not explain, each in one sentence.
+        said: sentences on the uncertainties, and on departures from the model.
     """
 
     omega_n: Fitted
@@ -70,7 +70,7 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
     first, sides = _decay(k, points.angle_rad)
     columns = _slopes(k, first)
     weights = points.angle_std
-    # One more step of Gauss and Newton from the minimum gives the covariance, and the scatter, of the fit.
+    # One more Gauss–Newton step from the minimum gives the covariance and the scatter of the fit.
     residual = points.angle_rad - _angles(k, first)
     step = _Linear.of(columns, residual, weights, "angles", "rad", said)
     zero, swing, delta = (first + step.solution).tolist()
@@ -110,7 +110,7 @@ class _Linear:
     def of(
         cls, columns: Array, values: Array, stated: Array | None, name: str, unit: str, said: list[str]
     ) -> _Linear:
-        """Fit; the errors follow from the scatter where nothing is stated, or less than it beyond chance."""
+        """Fit; the errors follow from the scatter where none are stated, or where it exceeds them beyond chance."""
         free = values.size - columns.shape[1]
         std = np.ones(values.size) if stated is None else stated
         solution = np.linalg.lstsq(columns / std[:, None], values / std, rcond=None)[0]
@@ -134,7 +134,7 @@ class _Linear:
         return cls(np.asarray(solution, np.float64), covariance, scatter, std, np.asarray(left, np.float64))
 
     def drop(self, columns: Array, further: Array) -> tuple[float, float]:
-        """What a further column would be, and the fall of χ² with it."""
+        """The value of a further column's coefficient, and the fall of χ² with it."""
         wide = np.column_stack([columns, further]) / self.std[:, None]
         target = self.residual / self.std
         found = np.linalg.lstsq(wide, target, rcond=None)[0]
@@ -154,7 +154,7 @@ def _slopes(k: Array, at: Array) -> Array:
 
 
 def _decay(k: Array, angle: Array) -> tuple[Array, Array]:
-    """Zero, first swing and decrement of half a period by least squares, and the swings' course."""
+    """Zero, first swing and decrement of half a period by least squares, and the fitted swings."""
     from scipy.optimize import least_squares  # only here: slow to load
 
     middle = float(np.median(0.5 * (angle[1:] + angle[:-1])))
@@ -183,7 +183,7 @@ def _bends(
     said: list[str],
     half: float,
 ) -> None:
-    """Say where period or decrement change along the decay beyond chance."""
+    """Report a change of period or decrement along the decay beyond chance."""
     bend, drop = times.drop(line, k**2)
     if chdtrc(1, drop) < _RATE:
         change = 200.0 * bend * (k[-1] - 1.0) / half

@@ -1,8 +1,8 @@
 """The uncertainty budget: from noise, stated inputs, scatter of the runs and choice of model to one covariance.
 
 First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2: U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ +
-U_scatter + U_model. Noise and scatter between runs are in the estimate itself, the latter by
-`identification.campaign.repeatability`. How well the stated inputs are known comes from a TOML
+U_scatter + U_model. The estimate itself includes noise and scatter between runs, the latter by
+`identification.campaign.repeatability`. The uncertainties of stated inputs come from a TOML file
 (docs/how-to/state-uncertainties.md). Errors that neither repeats nor other methods with the same model show are not
 included: run the diagnosis.
 """
@@ -55,7 +55,7 @@ COMMON = tuple(_CommonTable.model_fields)
 
 @dataclass(frozen=True)
 class InputUncertainties:
-    """Relative standard uncertainties of the stated inputs; inputs that are not named are exact.
+    """Relative standard uncertainties of the stated inputs; the others are exact.
 
     Args:
         common: by name of `COMMON`: one error for all runs.
@@ -97,7 +97,7 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     """Read a file of uncertainties, as in docs/how-to/state-uncertainties.md.
 
     Raises:
-        TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
+        TunnelError: for the first fault, in one line that names file, key and remedy.
     """
     where, missing = shown(path), "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
     document = read_document(_Document, path, missing=missing)
@@ -130,9 +130,9 @@ def load_uncertainties(path: Path) -> InputUncertainties:
 
 Identify = Callable[[Campaign], Estimate]
 Progress = Callable[[str], None]
-_STEP = 1e-4  # relative, of an input whose influence on (a, k) is found by a difference
+_STEP = 1e-4  # relative, of an input whose influence on (a, k) is found by a finite difference
 _NAMES = (*PARAMETERS, "wind_off_inertia")
-# Powers with which a common scale of a stated input enters; the clock's is that of the time axis.
+# Exponents of a common scale of a stated input; the clock's is the scale of the time axis.
 _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
     "spring_stiffness": (1.0, 1.0, 1.0, 1.0, 1.0),
     "wind_speed": (-2.0, -1.0, 0.0, 0.0, 0.0),
@@ -149,8 +149,8 @@ class Component:
     """One line of the budget.
 
     Args:
-        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may reduce
-            it.
+        covariance: its contribution, shape (p, p), in the products of the quantities' units; a correlation may make
+            it negative.
         note: why it is zero or unknown; otherwise empty.
         known: whether it could be determined; if not, its covariance is zero and the total omits it.
     """
@@ -177,7 +177,7 @@ class Budget:
 
     @property
     def covariance(self) -> Array:
-        """Of the quantities, all components together, shape (p, p)."""
+        """Covariance of the quantities, all components together, shape (p, p)."""
         return np.asarray(np.sum([component.covariance for component in self.components], axis=0))
 
     def std(self, name: str) -> float:
@@ -190,7 +190,7 @@ class Budget:
         return float(component.covariance[place, place] / self.covariance[place, place])
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Per quantity the combined standard uncertainty, per component its variance's root and sign."""
+        """Per quantity the combined standard uncertainty; per component the root of its variance, with its sign."""
         return {
             "combined_std": {name: self.std(name) for name in self.names},
             "components": [
@@ -218,7 +218,7 @@ def make_budget(
     """The budget of a campaign's coefficients.
 
     Args:
-        others: other estimators, by name, whose spread counts as the choice of model.
+        others: other estimators, by name; their spread is the uncertainty of the choice of model.
 
     Raises:
         TunnelError: when the estimate has no coefficients.
@@ -265,7 +265,7 @@ def make_budget(
             continue
         move = np.abs(values - budget.values)
         stds = np.array([getattr(rival, name).std for name in names])
-        # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
+        # The better of two unbiased estimates from the same records is uncorrelated with their difference.
         chance = np.sqrt(np.abs(stds**2 - own_std**2))
         move = np.where(move > policy.DIFFERENCE_DEVIATIONS * chance, move, 0.0)
         if np.any(move > 0.0):
@@ -278,7 +278,7 @@ def make_budget(
 
 
 def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
-    """The estimate with combined standard uncertainties and covariance in place of those of noise."""
+    """The estimate with combined standard uncertainties and covariance in place of the noise's."""
     places = [budget.names.index(name) for name in estimate.parameters]
     total = budget.covariance[np.ix_(places, places)]
     quantities: dict[str, Any] = {
@@ -323,9 +323,9 @@ def _individual(
 def _scatter(
     campaign: Campaign, estimate: Estimate, budget: Budget, individual: Mapping[str, float]
 ) -> tuple[Component, Array]:
-    """What the scatter between runs adds, beyond the stated errors of single springs and runs; and all of it.
+    """The contribution of scatter between runs beyond the stated errors of single springs and runs; and the whole.
 
-    A stated error of its own of every run is scatter between them, and is in the budget already.
+    A stated independent error of every run is scatter between them, and is in the budget already.
     """
     size, name = len(budget.names), "scatter between runs"
     whole, beyond = np.zeros((2, size, size))
@@ -355,7 +355,7 @@ def _values(estimate: Estimate, budget: Budget) -> Array | None:
 
 
 def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
-    """Which runs share one individual error: those of a spring, or a single wind-on run."""
+    """Groups of runs with one individual error: the runs of a spring, or a single wind-on run."""
     if name != "spring_stiffness":
         return [[i] for i, run in enumerate(runs) if run.wind_on]
     springs: dict[float, list[int]] = {}
@@ -366,10 +366,10 @@ def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
 
 
 def with_scaled_input(run: Run, name: str, factor: float) -> Run:
-    """A run with one stated input changed; the same run where it states none.
+    """A run with one stated input changed; the same run if it does not state this input.
 
     Args:
-        factor: what the input is multiplied by (1).
+        factor: factor on the input (1).
     """
     value = getattr(run, name)
     changed: dict[str, Any] = {} if value is None else {name: value * factor}

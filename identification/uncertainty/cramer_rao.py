@@ -1,7 +1,7 @@
 """The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
 
-Exact Fisher information of real damped sinusoids, and of motions under an input, in white Gaussian noise at given
-sample times. For long records of light damping it tends to
+The Fisher information is exact, for real damped sinusoids and for motions under an input, in white Gaussian noise
+at given sample times. For long records of light damping the bound tends to
 
     std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
 
@@ -110,7 +110,7 @@ def damped_sinusoid_bound(
 class CampaignBound:
     """The bound of a campaign's common parameters, every run's initial state and the zero unknown.
 
-    The zero is common to the runs, unless one of them has no spring.
+    The zero is common to the runs, unless a run has no spring.
 
     Args:
         covariance: smallest covariance, shape (p, p), in the products of their units.
@@ -140,7 +140,7 @@ def campaign_bound(
     random_moments: Sequence[float] | None = None,
     repeatability: Repeatability | None = None,
 ) -> CampaignBound:
-    """The bound of Cnβ, Cnr, Izz and Cr together, of free and driven runs; an input is exact between its samples.
+    """The bound of Cnβ, Cnr, Izz and Cr together, from free and driven runs; an input is exact between its samples.
 
     Args:
         campaign: conditions, inputs and sample times; the readings themselves are not used.
@@ -150,14 +150,14 @@ def campaign_bound(
         mechanical_damping: true Cr, N m s/rad.
         noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
         drive_gain: true gain of inputs that state none, unknown to the estimator, N m per unit.
-        initial_states: angle [rad] and rate [rad/s] at each run's first sample; where None, the runs' nominal
-            release angles at rest, and 0 of a driven run.
+        initial_states: angle [rad] and rate [rad/s] at each run's first sample; None: the runs' nominal release
+            angles at rest, and 0 for driven runs.
         random_moments: spectral intensity q of a white random moment on each run over the inertia, ⟨w(t)w(t′)⟩ =
-            q δ(t − t′), rad²/s³; None where there is none. The bound is then that of the response to release and
-            input in noise of known spectrum, by the steady Kalman filter (doi:10.1137/0141046); what the random
-            motion itself says of the coefficients is left out. Samples must be even.
-        repeatability: true standard deviations of the runs' own deviations, normal and to first order; None is
-            zero. The bound is then that of the Gaussian mixed model of known widths.
+            q δ(t − t′), rad²/s³; None: there is none. The bound is then for the response to release and input in
+            noise of known spectrum, by the steady Kalman filter (doi:10.1137/0141046), without the information of
+            the random motion itself. Samples must be evenly spaced.
+        repeatability: true standard deviations of the runs' deviations, normal and to first order; None: zero. The
+            bound is then for the Gaussian mixed model of known widths.
 
     Raises:
         TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a
@@ -193,7 +193,7 @@ def campaign_bound(
     drifting = any(run.unrestrained for run in runs)
     filters = None
     if random_moments is not None:
-        # From readings to innovations, of the variance of a reading.
+        # From readings to innovations, scaled to the variance of a reading.
         dynamics, drive = np.zeros((2, len(runs), 2, 2))
         dynamics[:, 0, 1] = 1.0
         for of_run, link in zip(dynamics, linked.links, strict=True):
@@ -219,10 +219,10 @@ def campaign_bound(
 def _with_deviations(
     runs: Sequence[Run], linked: Design, parameters: Array, repeatability: Repeatability | None
 ) -> tuple[list[Array], Array]:
-    """The links with every run's own deviations behind φ, and the inverse variances of these, shape (d,).
+    """The links with every run's deviations appended to φ, and the inverse variances of these, shape (d,).
 
-    With their prior as information they count as unknowns; eliminated, they leave the information of the marginal
-    distribution (Woodbury's identity).
+    The deviations count as unknowns with their prior as information; eliminating them gives the information of the
+    marginal distribution (Woodbury's identity).
     """
     stated = {} if repeatability is None else repeatability.stated
     widths = np.array([stated.get(name, 0.0) for name in SCATTERED])

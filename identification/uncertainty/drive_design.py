@@ -1,9 +1,8 @@
-"""The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
+"""The most informative drive for Cnβ and Cnr, among those that a plan can express and a rig allows.
 
-Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
-and in the random moments of the plan. The response is linear in the input, so that the amplitude
-follows from the limits. Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identification (1977),
-ch. 6.
+Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, with the noise of its sensor
+and the random moments of the plan. The response is linear in the input, so the limits determine the amplitude.
+Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identification (1977), ch. 6.
 """
 
 from __future__ import annotations
@@ -38,13 +37,13 @@ Goal = Literal["d", "cn_r"]
 _PER_CYCLE = 8.0  # samples while inputs are compared
 _STEPS = (0.16, 0.08, 0.04, 0.02, 0.01)  # relative, of an end of the band
 _WIDER = 1.1  # ratio of an end to the outermost resonance, where the search starts
-_BROAD = 2.0  # ratio to it of a plain broad band
+_BROAD = 2.0  # ratio of an end of a plain broad band to the outermost resonance
 _DIGITS = 3  # of an amplitude and a frequency in the plan
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the rig allows.
+    """The limits of the rig.
 
     Args:
         moment: peak of the input, N m.
@@ -58,8 +57,8 @@ class Limits:
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     """The bound of a plan's coefficients at its truth, of free decays and driven runs.
 
-    Of its effects only random moments of a broad spectrum count; each is taken as white with the intensity that it
-    has at a run's natural frequency.
+    Only random moments of a broad spectrum count among its effects; each is taken as white with its intensity at a
+    run's natural frequency.
 
     Raises:
         TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
@@ -108,10 +107,10 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
 
 
 def peak_response(plan: CampaignPlan, rig: Rig) -> float:
-    """The largest angle that the driven runs of a plan reach at its truth, rad.
+    """The largest angle of the driven runs of a plan at its truth, rad.
 
     Raises:
-        TunnelError: where the motion of a run grows out of range.
+        TunnelError: where the motion of a run diverges.
     """
     peak = 0.0
     inertia = plan.truth.yaw_inertia
@@ -146,7 +145,7 @@ def driven_plan(document: PlanDocument, drive: DriveTable, duration: float) -> P
 def within_limits(
     document: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, duration: float
 ) -> PlanDocument:
-    """The driven plan whose input is as large as the limits allow.
+    """The driven plan with the largest input that the limits allow.
 
     Args:
         duration: of each record, s.
@@ -168,11 +167,11 @@ def propose_drive(
     duration: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> PlanDocument:
-    """The driven plan, of one run for each spring and speed, whose bound is the lowest that the search finds.
+    """The driven plan, of one run for each spring and speed, with the lowest bound that the search finds.
 
-    A stepped sine begins at the resonances and loses frequencies as long as that lowers the bound. Its
-    frequencies, and the ends of a multisine and a chirp, are then moved one at a time. The best of these, of
-    sines at the resonances and of a broad multisine is taken.
+    A stepped sine begins at the resonances, and frequencies are removed as long as the bound falls. Its
+    frequencies, and the ends of a multisine and a chirp, are then changed one at a time. The best of these, of
+    sines at the resonances and of a broad multisine is chosen.
 
     Args:
         document: of free decays; its conditions, sensor and truth are kept.
@@ -188,7 +187,7 @@ def propose_drive(
         remedy = "lower wind_speeds, or stiffen springs"
         raise TunnelError("the wind overcomes the spring: a run has no resonance", remedy=remedy)
     coarse, rate = document, _PER_CYCLE * _BROAD * resonances[-1]
-    if rate < document.sample_rate:  # fewer readings of as much information
+    if rate < document.sample_rate:  # fewer readings with the same information
         sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
         noise = _noise(sensor) * sqrt(rate / document.sample_rate)
         thin = SensorModelTable(sample_rate=rate, noise_std=noise, resolution=0.0)
@@ -210,7 +209,7 @@ def propose_drive(
             amplitude = min(limits.moment, limits.angle / _peak_between_samples(driven, drive, rig))
             if goal == "cn_r":
                 tried[key] = log(bound.std("cn_r")) - log(amplitude)
-            else:  # the geometric mean of both standard deviations
+            else:  # the geometric mean of the two standard deviations
                 places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
                 volume = float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1])
                 tried[key] = 0.25 * volume - log(amplitude)
@@ -223,7 +222,7 @@ def propose_drive(
         _band("multisine")([outer[0] / _BROAD, outer[1] * _BROAD]),
         *(_moved(_band(k), [outer[0] / _WIDER, outer[1] * _WIDER], score) for k in ("multisine", "chirp")),
     ]
-    rates = resonances  # of a stepped sine, without those whose time is better spent at the others, Hz
+    rates = resonances  # of a stepped sine, without those whose time is better spent on the others, Hz
     while len(rates) > 1:
         shorter = min(
             ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))
@@ -242,7 +241,7 @@ def propose_drive(
 def _moved(
     make: Callable[[list[float]], DriveTable], start: list[float], score: Callable[[DriveTable], float]
 ) -> DriveTable:
-    """The input made from frequencies (Hz) that are moved one at a time, in shorter and shorter steps."""
+    """The input made from frequencies (Hz) that are changed one at a time, in shorter and shorter steps."""
     rates, best = start, make(start)
     for step in _STEPS:
         improved = True
@@ -278,7 +277,7 @@ def _rounded(value: float) -> float:
 
 
 def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:
-    """The peak with what samples of the fastest motion may miss of it, rad."""
+    """The peak, with a margin for samples that miss the peak of the fastest motion, rad."""
     fastest = max(
         drive.to_hz or 0.0,
         drive.from_hz or 0.0,

@@ -1,4 +1,4 @@
-"""Effects of the air: of the steady flow, of its lag, of the wind speed, of turbulence and vortices."""
+"""Effects of the air: steady flow and its lag, wind speed, turbulence and vortices."""
 
 from __future__ import annotations
 
@@ -115,10 +115,10 @@ class UnsteadyAeroLag(Effect):
         return [Trial({"lag": size}, "lag", second_order=True) for size in (scale, -scale)]
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """To first order a lag only changes Cnr by a·Cnβ; runs show the second-order remainder alone.
+        """To first order a lag only changes Cnr by a·Cnβ; runs show only the second-order remainder.
 
         With two time constants, as in Jones's approximation (NACA Report 681, 1940), their mean is up to a third
-        below the single constant that fits best; the same holds for a phase lead.
+        below the single constant that fits best; the same is true for a phase lead.
         """
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
@@ -188,7 +188,7 @@ class WindSpeedOffset(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """An offset that leaves half of the slowest wind at least: without wind there is no derivative to fit."""
+        """An offset that leaves at least half of the slowest wind: without wind no derivative can be fitted."""
         at_most = 0.5 * campaign.slowest_wind
         return [dataclasses.replace(trial, at_most=at_most) for trial in super().trials(campaign)]
 

@@ -1,6 +1,6 @@
 """The base class of all effects: parameters, hooks where an effect acts, traits for finding it.
 
-The hooks of the effects of a run are called by its chain (`tunnel_sim.effects.chain`) and nowhere else.
+Only the chain of a run's effects (`tunnel_sim.effects.chain`) calls their hooks.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Condition = Literal["always", "wind_on"]
 Law: TypeAlias = Mapping[str, float]
 Text: TypeAlias = Callable[[float, float | None, str], str]
 
-#: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
+#: Random draw of a run for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
 
 
@@ -53,9 +53,9 @@ Drawn: TypeAlias = float | Array | None
 class Effect:
     """An effect that the nominal model leaves out.
 
-    The first parameter is the severity; at zero severity (the null) the effect does nothing. Every hook does
-    nothing unless an effect overrides it. ``stated`` is the run as the campaign states it, without any effect;
-    ``drawn`` is what `draw` returned for the run.
+    The first parameter is the severity; at zero severity (the null) the effect does nothing. A hook does nothing
+    unless an effect overrides it. ``stated`` is the run as the campaign states it, without any effect; ``drawn`` is
+    the value of `draw` for the run.
 
     Every effect states ``example``, values of its parameters in their order at which it is visible. A built-in one
     also states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect takes the
@@ -63,33 +63,33 @@ class Effect:
 
     Traits, with defaults that an effect overrides:
 
-    - ``law_terms``: the moment law's parameters that the effect's own are, in their order; empty: none.
-    - ``random``: kind of spectrum of a random moment. Vortex shedding has a line too: its phase may wander or not.
-    - ``line``: what sets the frequency of a periodic effect, in a word; its phase differs from run to run.
+    - ``law_terms``: the moment law's parameters for the effect's own, in their order; empty: none.
+    - ``random``: kind of spectrum of a random moment. Vortex shedding also has a line: its phase may wander or not.
+    - ``line``: the cause of a periodic effect's frequency, in a word; its phase differs from run to run.
     - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
-    - ``fitted``: whether a fit of the deterministic motion can find it; else it is read off records or spectra.
-    - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
-    - ``parts``: whether it parts the body from what holds it, as play does.
+    - ``fitted``: whether a fit of the deterministic motion can find it; else records or spectra show it.
+    - ``on_spring``: whether its moment is proportional to the spring's stiffness.
+    - ``parts``: whether it separates the body from its support, as play does.
     - ``driven``: whether it acts on driven runs only.
     - ``delays``: whether it shifts the input of driven runs in time.
     - ``of_moment``: whether it changes an input that an actuator exerts, not the motion of a root or a base.
-    - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia: both
-      are left out where a base turns with a known acceleration.
+    - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
+      neither is included where a base turns with a known acceleration.
     - ``lattice``: whether it changes the quantisation step.
-    - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
+    - ``scatters``: the property of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
-    - ``keeps_time``: the parameter of the moment law that gives a frequency in proportion to the wind speed; empty:
+    - ``keeps_time``: the parameter of the moment law whose frequency is proportional to the wind speed; empty:
       none.
-    - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: a step of the
-      integration that contains one is less accurate, and the tests allow for it.
+    - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
+      integration step across it is less accurate, and the tests allow for this.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
-    - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
-    - ``resembles``: channels that its residual may point to beside its own.
+    - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
+    - ``resembles``: other channels that its residual may point to.
     - ``tries``: how many starting points of a fit are worth trying.
-    - ``size``: its size as a person says it, with the names of parameters in braces; empty: they are listed.
-    - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own. The name of
+    - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
+    - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
     - ``caveat``: how to read the coefficients that are reported with it.
     """
@@ -129,7 +129,7 @@ class Effect:
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        """Refuse a parameter that is not a finite number within its bounds, or not whole where it tells cases."""
+        """Refuse a parameter that is not a finite number within its bounds, or not whole where it selects cases."""
         for info in self.parameters():
             value = getattr(self, info.name)
             number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -169,10 +169,10 @@ class Effect:
 
     @classmethod
     def own_numbers(cls, instants: int) -> tuple[str, ...]:
-        """Names of what every run has of its own for the effect: the phase of a periodic one, or instants.
+        """Names of the effect's unknowns of every run: the phase of a periodic effect, or instants.
 
         Args:
-            instants: how many there are of an effect that skips samples.
+            instants: number of instants of an effect that skips samples.
         """
         if cls.skips:
             return tuple(f"instant_{number + 1}" for number in range(instants))
@@ -180,13 +180,13 @@ class Effect:
 
     @classmethod
     def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
-        """Where a fit starts for an effect that has a phase or instants of its own in every run.
+        """Starting points of a fit, for an effect that has a phase or instants of its own in every run.
 
         Args:
             residuals: of a fit without it.
 
         Returns:
-            What is found of it in the residuals, in each way that it may act.
+            The result of the search in the residuals, for each way in which the effect may act.
         """
         del residuals
         return ()
@@ -198,17 +198,17 @@ class Effect:
 
     @property
     def depends_on_release(self) -> bool:
-        """Whether its moment or its reading depends on more than angle and rate: on time, or the release."""
+        """Whether its moment or its reading depends on more than angle and rate: on time, or on the release."""
         return not self.autonomous
 
     @classmethod
     def chosen_spring(cls) -> str | None:
-        """Name of the parameter that is a spring's stiffness; None where there is none."""
+        """Name of the parameter that is a spring's stiffness; None if there is none."""
         return next((info.name for info in cls.parameters() if info.chosen_spring), None)
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """Its size as a person says it, such as ``dry friction of 0.0040 N m``; empty without ``size``.
+        """Its size in plain words, such as ``dry friction of 0.0040 N m``; empty without ``size``.
 
         Args:
             values: of its parameters, in their units.
@@ -227,7 +227,7 @@ class Effect:
         """Starting values for a fit.
 
         Args:
-            campaign: what the values depend on.
+            campaign: circumstances on which the values depend.
 
         Returns:
             Starting values, the most promising first; empty where such a campaign cannot show the effect.
@@ -239,7 +239,7 @@ class Effect:
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
     ) -> tuple[Array | float, Array | float, float]:
-        """What a relative deviation of 1 of the number that scatters changes of the runs' linear motions.
+        """Change of the runs' linear motions by a relative deviation of 1 of the scattering property.
 
         Args:
             spring: Kr, N m/rad, shape (runs,).
@@ -258,7 +258,7 @@ class Effect:
     def small_swings(
         cls, stiffness: float, damping: float, values: Mapping[str, float]
     ) -> tuple[float, float]:
-        """Stiffness and damping of the rigid body whose small swings are those of the body with the effect.
+        """Stiffness and damping of a rigid body with the same small swings as the body with the effect.
 
         Args:
             stiffness: without it, per unit inertia, 1/s².
@@ -269,7 +269,7 @@ class Effect:
         return stiffness, damping
 
     def plausible(self, omega: float) -> bool:
-        """Whether a fitted effect is still what its name means.
+        """Whether a fitted effect still deserves its name.
 
         Args:
             omega: angular frequency of the motion, rad/s.
@@ -281,22 +281,22 @@ class Effect:
         return True
 
     def alike(self) -> Sequence[Trial]:
-        """Other values of its parameters that change the slow motion alike.
+        """Other values of its parameters with the same effect on the slow motion.
 
         Returns:
             Values, with the one that linear theory may scale; χ² may have another minimum near any of them. Empty
-            where it has one.
+            if there is only one minimum.
         """
         return ()
 
     def stands(self, stiffness: float) -> float:
-        """How far from rest the effect holds a body that has stopped.
+        """Greatest angle from rest at which the effect holds a body that has stopped.
 
         Args:
-            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment is.
+            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment.
 
         Returns:
-            The greatest such angle, rad; 0 for an effect that holds none.
+            The angle, rad; 0 for an effect that cannot hold a body.
         """
         del stiffness
         return 0.0
@@ -308,7 +308,7 @@ class Effect:
             rate: above 0, rad/s, shape (n,).
 
         Returns:
-            The moment, N m, shape (n,); None of an effect that is no friction.
+            The moment, N m, shape (n,); None for an effect other than friction.
         """
         del rate
         return None
@@ -327,7 +327,7 @@ class Effect:
         return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.
+        """Uncertainty of Cnβ and Cnr due to the part of the effect's form that free decays do not show.
 
         Args:
             cn_beta: Cnβ as fitted, 1/rad.
@@ -408,9 +408,9 @@ class Effect:
     def on_rows(
         cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
     ) -> None:
-        """Change the physics of many runs in place, as `on_run` does that of one; steps of integration apart.
+        """Change the physics of many runs in place, as `on_run` does for one; without the integration step.
 
-        An effect that overrides `on_run` may override this as well, which is faster. A test compares both.
+        An effect that overrides `on_run` may also override this hook, which is faster. A test compares both.
 
         Args:
             runs: as the earlier effects left them.
@@ -437,10 +437,10 @@ class Effect:
         return None
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Change when the motion is read.
+        """Change the times at which the motion is read.
 
         Args:
-            time_s: by the time stamps, s, shape (n,).
+            time_s: times by the stamps, s, shape (n,).
 
         Returns:
             The true times, s, shape (n,).
@@ -464,15 +464,15 @@ class Effect:
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
     ) -> Array | None:
-        """An oscillation that the sensor sees beside the body's.
+        """An oscillation in the reading besides the body's.
 
         Args:
             time_s: true times since the release, s, shape (n,).
-            stated: the input of a driven run is that which acts.
+            stated: the input of a driven run is the acting one.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            rad, rad/s or rad/s², shape (n,), which is added to the angle or its derivative; None: none.
+            rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative; None: none.
         """
         del time_s, stated, drawn, derivative
         return None

@@ -1,7 +1,7 @@
 """Chance differences between runs: of the wind speed, the spring and the mechanical damping.
 
-Each run draws a deviation of its own. A single run shows none of them, and no fit of a motion finds them: their
-distribution over the runs is to be found.
+Each run draws its own deviation. No single run shows it, and no fit of a motion finds it; only its distribution
+over the runs can be found.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class StiffnessScatter(BetweenRuns):
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
     ) -> tuple[Array | float, Array | float, float]:
-        """The spring's own."""
+        """The spring's own stiffness changes."""
         del damping, air_stiffness, air_damping
         return spring, 0.0, 0.0
 
@@ -131,6 +131,6 @@ class DampingScatter(BetweenRuns):
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
     ) -> tuple[Array | float, Array | float, float]:
-        """The mechanical one's own."""
+        """The mechanical damping changes."""
         del spring, air_stiffness, air_damping
         return 0.0, damping, 0.0

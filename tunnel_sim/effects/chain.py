@@ -1,4 +1,4 @@
-"""The effects of one run, in the order in which they act: what they change of its physics, times and readings."""
+"""The effects of one run, in the order in which they act: their changes to its physics, times and readings."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class EffectChain:
         return cls(stated, tuple(effects), drawn)
 
     def physics(self) -> RunSettings:
-        """The physics of the run with the effects; a spring whose root moves pulls with its true stiffness."""
+        """The physics of the run with the effects; a spring with a moving root acts with its true stiffness."""
         run = self.stated
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             run = effect.on_run(run, self.stated, drawn)
@@ -61,10 +61,10 @@ class EffectChain:
         return any(effect.skips and not effect.is_null for effect in self.effects)
 
     def true_times(self, time_s: Array) -> Array:
-        """When the motion is read.
+        """The true times of the readings.
 
         Args:
-            time_s: by the time stamps, s, shape (n,).
+            time_s: times by the stamps, s, shape (n,).
 
         Returns:
             The true times since the release, s, shape (n,).
@@ -74,15 +74,15 @@ class EffectChain:
         return time_s
 
     def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
-        """What the sensor sees of a motion before its zero and noise.
+        """The sensor's view of a motion, before its zero and noise.
 
         Args:
-            motion: of the rod's upper end, as long as `physics` asks for.
-            time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
+            motion: of the rod's upper end, as long as `physics` requires.
+            time_s: of the samples by their time stamps, s, shape (n,); need not be the times of the motion.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            The angle seen, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
+            The measured angle, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
             times.
         """
         from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
@@ -92,7 +92,7 @@ class EffectChain:
         return self.angle(np.asarray(path(true, derivative), np.float64), true, derivative)
 
     def angle(self, angle: Array, time_s: Array, derivative: int = 0) -> Array:
-        """The angle that the sensor measures, before zero and noise are added.
+        """The angle measured by the sensor, before zero and noise are added.
 
         Args:
             angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
@@ -103,7 +103,7 @@ class EffectChain:
             The measured angle or its derivative, in the same unit, shape (n,).
         """
         stated = self.stated
-        if stated.drive is not None:  # as it acts
+        if stated.drive is not None:  # with its delay and its actuator
             stated = replace(stated, drive=self.physics().drive)
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             beside = effect.oscillation(time_s, stated, drawn, derivative)
@@ -170,6 +170,6 @@ def quantise(reading: Array, step: float) -> Array:
 
     Args:
         reading: rad, any shape.
-        step: rad; 0 leaves the reading as it is.
+        step: rad; 0: the reading is unchanged.
     """
     return np.round(reading / step) * step if step > 0.0 else reading

@@ -1,8 +1,8 @@
 """Effects of the actuator of a driven run: its lag, its greatest moment and its greatest rate of change.
 
 They change the moment on the body that the run file states, not the motion of a root or a base. Between its samples
-the input is held or linear, as the run states it. However many of them act, the moment is first clipped, then
-limited in its rate, then lagged. A recorded run begins with an actuator that follows its first sample.
+the input is held or linear, as the run states. In any combination, the moment is first clipped, then limited in its
+rate, then lagged. At the start of a recorded run the actuator has settled at its first sample.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
 
 @dataclass(frozen=True)
 class _OfActuator(Effect):
-    """What the effects of an actuator share: they set one of its numbers, where it moves the body."""
+    """Common part of the effects of an actuator: each sets one of its properties, where it moves the body."""
 
     channel = "forcing"
     condition = "always"
@@ -64,7 +64,7 @@ class ActuatorSaturation(_OfActuator):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Limits below the greatest moment that any run asks for."""
+        """Limits below the greatest demanded moment of any run."""
         return [Trial({"limit": share * campaign.greatest_moment}, None) for share in _LIMITS]
 
 
@@ -91,7 +91,7 @@ class ActuatorRateLimit(_OfActuator):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Rates below the greatest one that any run asks for."""
+        """Rates below the greatest demanded rate of any run."""
         return [Trial({"rate": share * campaign.fastest_moment}, None) for share in _RATES]
 
 
@@ -117,5 +117,5 @@ class ActuatorLag(_OfActuator):
     )  # fmt: skip
 
     def plausible(self, omega: float) -> bool:
-        """Whether it is more than a delay of the input to the motion: as slow as `_SLOW`."""
+        """Whether it is more than a delay of the input to the motion: at least as slow as `_SLOW`."""
         return self.lag * omega > _SLOW

@@ -1,4 +1,4 @@
-"""What an effect may search for what is its own in every run: the residuals of a fit without it."""
+"""Searches in the residuals of a fit without an effect, for the effect's own parameters in every run."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """What was found of an effect that has numbers of its own in every run.
+    """The result of a search for an effect that has parameters of its own in every run.
 
     Args:
-        values: of the effect's parameters that belong to its textbook form, in their order and units.
+        values: of the parameters of the effect's textbook form, in their order and units.
         numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
-        drop: of χ² by taking it out, dimensionless.
-        of_input: the value of the parameter that says what the effect has to do with the input, dimensionless.
+        drop: of χ² by removing the effect, dimensionless.
+        of_input: the value of the parameter that relates the effect to the input, dimensionless.
     """
 
     values: tuple[float, ...]
@@ -32,22 +32,22 @@ class Residuals(Protocol):
         """The strongest line at a frequency of the mains in the readings: amplitude (rad) and frequency (Hz)."""
 
     def wind_line(self, least: float, greatest: float, size: str) -> Sought | None:
-        """The strongest line of a moment whose frequency is in proportion to the wind speed.
+        """The strongest line of a moment whose frequency is proportional to the wind speed.
 
         Args:
-            least: frequency times size over wind speed, dimensionless.
-            greatest: likewise.
-            size: of the body that it refers to: ``width`` or ``length``.
+            least: least ratio of frequency times size to wind speed, dimensionless.
+            greatest: greatest such ratio, dimensionless.
+            size: of the body in that ratio: ``width`` or ``length``.
 
         Returns:
-            Its moment coefficient and that number.
+            Its moment coefficient and that ratio.
         """
 
     def ringing(self) -> Sought | None:
         """The strongest decaying line from the release on: amplitude (rad), frequency (rad/s) and damping ratio."""
 
     def excited(self) -> Sought | None:
-        """The strongest oscillation that the input of driven runs excites, likewise."""
+        """The strongest oscillation that the input of driven runs excites; values as in `ringing`."""
 
     def skips(self, *, with_input: bool) -> Sought | None:
         """The instants at which the runs jump ahead by one common time, and that time (s).

@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.units import dimension, in_si
 if TYPE_CHECKING:
     pass
 
-#: What changes during a run: unit, and operation of the moment law.
+#: Variables of a run: unit, and operation of the moment law.
 _INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
 _OF_RUN = {"Kr": "N m/rad", "omega": "rad/s"}
 _MOMENT = frozenset({*_INPUTS, *_OF_RUN})
@@ -30,7 +30,7 @@ _READING = frozenset({"y", "t", "V", *_OF_RUN})
 _UNITS = {name: unit for name, (unit, _) in _INPUTS.items()} | _OF_RUN | {"y": "rad"}
 _WORDS = frozenset({*_UNITS, *FUNCTIONS, "pi"})
 
-#: Where an expression is tried when it is stated: the range of the rigs that the diagnosis was made for.
+#: Test values for a stated expression: the range of rigs that the diagnosis supports.
 _TRIED = {"b": 0.5, "y": 0.5, "r": 10.0, "t": 20.0, "V": 40.0, "Kr": 100.0, "omega": 60.0}
 
 
@@ -60,7 +60,7 @@ class ExpressionEffect(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """The severity's typical size, with the other parameters at their defaults and to both sides of them."""
+        """The severity's typical size, with the other parameters at their defaults and on both sides of them."""
         severity, *others = cls.parameters()
         start = {severity.name: severity.scale * moment_scale(severity, campaign)}
         start |= {info.name: info.default for info in others}
@@ -73,7 +73,7 @@ class ExpressionEffect(Effect):
         return [Trial(start | moved, severity.name) for moved in ({}, *aside)]
 
     def _constants(self, stated: RunSettings) -> dict[str, float]:
-        """What does not change during a run, by name."""
+        """The constants of a run, by name."""
         own = {info.name: float(getattr(self, info.name)) for info in self.parameters()}
         spring = stated.spring_stiffness
         return own | {"Kr": spring, "omega": math.sqrt(spring / stated.yaw_inertia)}
@@ -128,11 +128,11 @@ def expression_effect(
     has no value somewhere.
 
     Args:
-        moment: on the right-hand side of the equation of motion, N m: of the angle ``b`` (rad) and rate ``r``
-            (rad/s) of the rod's upper end, the time ``t`` (s) since the run's start, the wind speed ``V`` (m/s),
-            the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.
-        reading: rad: of ``y`` (rad), the reading without the effect, of ``t``, ``V``, ``Kr`` and ``omega`` as
-            above and of the parameters.
+        moment: on the right-hand side of the equation of motion, N m; a function of the angle ``b`` (rad) and rate
+            ``r`` (rad/s) of the rod's upper end, the time ``t`` (s) since the run's start, the wind speed ``V``
+            (m/s), the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.
+        reading: rad; a function of ``y`` (rad), the reading without the effect, of ``t``, ``V``, ``Kr`` and
+            ``omega`` as above and of the parameters.
     """
     text = moment if reading is None else reading
     if text is None or (moment is not None and reading is not None):

@@ -14,9 +14,9 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
-# At 2 rad/s, saturating friction has then risen to 96 %, and 2 % of a peak remain. Beyond, it would follow damping.
+# At 2 rad/s, saturating friction has risen to 96 %, and 2 % of a peak remain. Beyond, it would resemble damping.
 _LOW_RATE = 1.0  # rad/s
-_SHOWN = 2.0  # standard deviations from which a presliding range is more than the textbook form has
+_SHOWN = 2.0  # standard deviations from which a presliding range goes beyond the textbook form
 _UNCHANGED_AT = 2.0  # rad/s: where the power of the rate is 1, as in the compiled law
 _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "presliding": "presliding",
@@ -25,7 +25,7 @@ _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "friction_peak": "peak",
     "friction_peak_rate": "peak_rate",
 }
-#: Terms of the moment law each of which makes friction depend on the rate.
+#: Terms of the moment law, each of which makes friction depend on the rate.
 AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 
 
@@ -103,7 +103,7 @@ class CoulombFriction(Effect):
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """The friction, and how it depends on the rate."""
+        """The friction, and its dependence on the rate."""
         said = super().phrase(values, stds, text)
         power, saturation, peak = (values.get(name, 0.0) for name in ("exponent", "saturation", "peak"))
         if power > 0.0:
@@ -120,7 +120,7 @@ class CoulombFriction(Effect):
         return said
 
     def stands(self, stiffness: float) -> float:
-        """The angle at which the spring's moment is that of the friction at rest, rad; 0 where it then vanishes."""
+        """The angle at which the spring's moment equals the friction at rest, rad; 0 where the latter vanishes."""
         return self.at_rest / stiffness if stiffness > 0.0 else 0.0
 
     @property
@@ -167,7 +167,7 @@ def friction_of(parameters: Mapping[str, float]) -> CoulombFriction:
     """The friction of a moment law.
 
     Args:
-        parameters: of the law by name, in its units; those not given are 0.
+        parameters: of the law by name, in its units; the others are 0.
     """
     own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
     return CoulombFriction(parameters.get("friction_moment", 0.0), **own)

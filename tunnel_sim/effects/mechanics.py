@@ -123,17 +123,17 @@ class GravityStiffness(Effect):
         scale=0.1,
         lower=-3.2,
         upper=3.2,
-        fit_lower=-1.6,  # beyond a right angle the same moment has the other sign of Kg
+        fit_lower=-1.6,  # beyond a right angle the same moment has the opposite sign of Kg
         fit_upper=1.6,
-        beside_spring=True,  # without a spring it is one with the sensor's zero
+        beside_spring=True,  # without a spring it cannot be separated from the sensor's zero
     )
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """Gravity beside stated springs, or in place of an unstated one.
 
-        An unstated spring absorbs all of a small gravity but its curvature. In place of the spring it leaves the
-        frequency of small swings as it is, so that the curvature shows.
+        An unstated spring absorbs a small gravity except for its curvature. In place of the spring, gravity leaves
+        the frequency of small swings unchanged, so that the curvature shows.
         """
         (trial,) = super().trials(campaign)
         return (replace(trial, replaces="stiffness") if campaign.normalised else trial,)
@@ -197,7 +197,7 @@ class RodFlexibility(Effect):
         first, last = (
             log(s / (1.0 - s)) for s in (self.parameters()[1].fit_lower, self.parameters()[1].fit_upper)
         )
-        count = ceil((last - first) / (2.0 * _RINGING_STEP))  # s/(1 − s) is in inverse proportion to ω²
+        count = ceil((last - first) / (2.0 * _RINGING_STEP))  # s/(1 − s) is inversely proportional to ω²
         ratios = (exp(first + (last - first) * i / count) for i in range(count + 1))
         slow = self.compliance * (1.0 - self.inertia_share) ** 2
         return [
@@ -261,7 +261,7 @@ class SpringMiscalibration(Effect):
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """The spring, and by how much it is softer or stiffer than stated."""
+        """The spring, and its relative deviation from the stated stiffness."""
         error, stated, std = values["error"], values["spring_stiffness"], stds["error"]
         size = text(100.0 * abs(error), None if std is None else 100.0 * std, "%")
         side = "stiffer" if error > 0.0 else "softer"
@@ -270,7 +270,7 @@ class SpringMiscalibration(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Every spring, where there is another to compare it with."""
+        """Every spring, if there is another for comparison."""
         springs = campaign.springs if len(campaign.springs) > 1 else ()
         scale = cls.parameters()[0].scale
         return [Trial({"error": scale, "spring_stiffness": spring}, "error") for spring in springs]
@@ -357,8 +357,8 @@ class StructuralDamping(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Add the loss and, where the body was held at its release angle, the spring's after-effect.
 
-        A loss that is the same at all frequencies is that of relaxing elements at all of them. The slow ones have
-        yielded to the release angle, and go back while the body swings.
+        A loss equal at all frequencies comes from relaxing elements at all frequencies. The slow ones have yielded
+        to the release angle, and recover while the body swings.
         """
         run = super().on_run(run, stated, drawn)
         if (
@@ -391,10 +391,10 @@ class StructuralDamping(Effect):
         return self.after_effect != 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Runs cannot show which frequency sets the loss: that of the motion, or that of the rig in still air.
+        """Runs cannot show which frequency determines the loss: the motion's, or the rig's in still air.
 
-        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may lie between
-        the two cases; their difference counts as a rectangular half-width.
+        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may be between
+        the two cases; their difference is a rectangular half-width.
         """
         del cn_beta
         if not runs:

@@ -1,4 +1,4 @@
-"""The parameters of effects, and what a fit passes to an effect about the runs.
+"""The parameters of effects, and the information on the runs for a fit.
 
 Drifts of several effects share one form: linear, or exponential towards a final value.
 """
@@ -33,13 +33,13 @@ class ParameterInfo:
         lower, upper: least and greatest value allowed, in the unit.
         default: value where none is given, in the unit; zero for the severity.
         fit_lower, fit_upper: least and greatest value a fit of swings from `SWING` on may take, in the unit.
-        rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
-        beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
+        rate_exponent: name of the parameter that is the exponent of the rate in its term; empty: none.
+        beside_spring: whether it can be fitted only beside a spring of stated stiffness; else it is fixed.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
-        inside: whether a fit that ends at a bound of it asks for another law, as with a free exponent.
-        of_input: whether it says what the effect has to do with the input of a driven run; values are tried and not
-            fitted. Free decays do not depend on it.
+        inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
+        of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
+            decays do not depend on it.
         along_run: whether it shapes a change along the run.
     """
 
@@ -66,10 +66,11 @@ class ParameterInfo:
         """Least and greatest value that a fit may take.
 
         Args:
-            swing: largest angle of the motion, rad. Below `SWING` a coefficient per angle may be as much greater,
-                and a least angle is as much smaller: the shares of the moments stay as they are.
+            swing: largest angle of the motion, rad. Below `SWING` a coefficient per angle may be proportionally
+                greater, and a least angle smaller: the ratios of the moments are unchanged.
 
         Returns:
+            Both, in the unit.
             Both, in the unit.
         """
         if "rad" not in self.unit or not 0.0 < swing < SWING:
@@ -160,13 +161,14 @@ def ramp(part: Array, rate: float) -> Array:
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What the starting values for the fit of an effect depend on.
+    """Circumstances that determine the starting values for the fit of an effect.
 
     Args:
         greatest_reading: greatest absolute reading of any run, rad.
         slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
-        greatest_moment: that an input asks for, N m, by the fit without the effect; 0 where none moves the body.
-        fastest_moment: greatest rate of change that an input asks for, N m/s, from sample to sample.
+        greatest_moment: greatest demand of an input, N m, from the fit without the effect; 0 if none moves the
+            body.
+        fastest_moment: greatest demanded rate of change of an input, N m/s, from sample to sample.
     """
 
     springs: tuple[float, ...]

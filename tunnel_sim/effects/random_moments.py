@@ -28,8 +28,8 @@ class RandomMoment(Effect):
 
     Traits of its own:
 
-    - ``source``: the sampled input of a run (`tunnel_sim.physics.run_settings.RunSettings.series`) that carries the
-      moment, in whose unit its standard deviation is.
+    - ``source``: the sampled input of a run (`tunnel_sim.physics.run_settings.RunSettings.series`) for the moment;
+      its standard deviation has the same unit.
     """
 
     source: ClassVar[str]
@@ -44,13 +44,13 @@ class RandomMoment(Effect):
         return float(getattr(self, self.parameters()[1].name))
 
     def moment_density(self, rate: float, reference_moment: float) -> float:
-        """That of the random moment's spectrum at the frequency of the motion."""
+        """Spectral intensity of the random moment at the frequency of the motion."""
         corner = 2.0 * pi * self.corner
         per_severity = reference_moment if self.parameters()[0].per_pressure else 1.0
         return 2.0 * (per_severity * self.severity) ** 2 * corner / (corner**2 + rate**2)
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Array:
-        """White noise that is filtered into the random moment; the first value sets its initial state."""
+        """White noise to be filtered into the random moment; the first value sets its initial state."""
         kicks = rng.standard_normal(int(stated.duration / _INTERVAL) + 2)
         kicks[0] = rng.standard_normal()
         return kicks

@@ -1,4 +1,4 @@
-"""The vocabulary by name: built-in effects, registered ones, and those of a diagnosis under way."""
+"""The vocabulary by name: built-in effects, registered ones, and the effects of a diagnosis in progress."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _OF_SPECTRUM = 2  # parameters of a random moment
 
 
 def check_described(kind: object) -> None:
-    """Refuse what cannot be an effect of the vocabulary, built in or of one's own."""
+    """Refuse a class that cannot be an effect of the vocabulary, built in or a user's."""
     where = f"effect {one_line(getattr(kind, 'name', getattr(kind, '__qualname__', kind)))}"
     if not (isinstance(kind, type) and issubclass(kind, Effect) and dataclasses.is_dataclass(kind)):
         remedy = "derive it from Effect, and write @dataclass(frozen=True) above it"
@@ -51,13 +51,13 @@ def check_described(kind: object) -> None:
     try:
         severity = kind.parameters()[0]
         has_null = severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
-    except (TypeError, IndexError):  # not described, or none
+    except (TypeError, IndexError):  # parameters without a description, or none at all
         has_null = False
     if not has_null:
         what = "the first parameter is its severity, whose default must be 0 within its bounds"
         remedy = "declare its parameters with tunnel_sim.effects.parameters.parameter"
         raise TunnelError(what, where=where, remedy=remedy)
-    for info in kind.parameters():  # the answer is converted from its unit
+    for info in kind.parameters():  # its unit converts the answer
         try:
             dimension(info.unit)
         except TunnelError as error:
@@ -72,14 +72,14 @@ def check_described(kind: object) -> None:
 
 
 def built_in(kinds: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Effects of this package by their place in the vocabulary, checked as those of one's own are.
+    """Effects of this package by their place in the vocabulary, with the checks of users' effects.
 
     Args:
-        kinds: classes; those without a name that others derive from, or whose own name begins with ``_``, are bases
-            and left out.
+        kinds: classes; bases are left out: classes without a name from which others derive, or whose own name
+            begins with ``_``.
 
     Raises:
-        TunnelError: when an effect is not complete, or has no place or that of another.
+        TunnelError: when an effect is not complete, or its place is missing or taken.
     """
     bases = [
         kind
@@ -111,19 +111,19 @@ _defined = [
     if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
 ]
 
-#: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
+#: Every built-in effect, in the order of the vocabulary: defining one in a module of this package is enough.
 ALL_EFFECTS: tuple[type[Effect], ...] = built_in(_defined)
 
 
 def known_effects() -> tuple[type[Effect], ...]:
-    """Every effect that has a name now: the built-in ones, then the registered ones in their order."""
+    """All effects that have a name now: the built-in ones, then the registered ones in their order."""
     _load_entry_points()
     own = _registered | {kind.name: kind for kind in _under_way.get()}
     return (*ALL_EFFECTS, *(kind for kind in own.values() if kind not in ALL_EFFECTS))
 
 
 def register_effect(kind: KindT) -> KindT:
-    """Add an effect of one's own to the vocabulary; as a decorator too.
+    """Add your own effect to the vocabulary; also as a decorator.
 
     Args:
         kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
@@ -137,7 +137,7 @@ def register_effect(kind: KindT) -> KindT:
 
 
 def check_kind(kind: object) -> None:
-    """Refuse what cannot be an effect of one's own."""
+    """Refuse a class that cannot be a user's effect."""
     check_described(kind)
     kind = cast("type[Effect]", kind)
     where = f"effect {kind.name}"
@@ -162,7 +162,7 @@ def _load_entry_points() -> None:
 
 @contextmanager
 def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
-    """Within the block, effects that nobody registered but a diagnosis may answer with are known by name."""
+    """Within the block, unregistered effects that a diagnosis may answer with are known by name."""
     own = [kind for kind in kinds if kind not in ALL_EFFECTS]
     for kind in own:
         check_kind(kind)
@@ -189,7 +189,7 @@ def effect_class(name: str) -> type[Effect]:
         name: such as ``coulomb_friction``.
 
     Raises:
-        TunnelError: when there is none; the message suggests the closest name.
+        TunnelError: when there is no such effect; the message suggests the closest name.
     """
     for kind in known_effects():
         if kind.name == name:

@@ -37,7 +37,7 @@ class SensorNonlinearity(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.2,)
 
-    # a judgement: a reading that is off by more than 60 % at 20° is another sensor's
+    # a judgement: a reading that is off by more than 60 % at 20° comes from another sensor
     coefficient: float = parameter(
         "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-5.0, fit_upper=5.0
     )
@@ -49,7 +49,7 @@ class SensorNonlinearity(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """First a cubic error, then one that is mostly quadratic."""
+        """First a cubic error, then a mostly quadratic one."""
         scale = {info.name: info.scale for info in cls.parameters()}
         mostly_square = {"coefficient": 0.01 * scale["coefficient"], "quadratic": scale["quadratic"]}
         return [*super().trials(campaign), Trial(mostly_square, "quadratic")]
@@ -217,7 +217,7 @@ class SensorQuantisation(Effect):
         return dataclasses.replace(sensor, resolution=max(self.step, sensor.resolution))
 
 
-_MARGIN = 0.1  # s of motion beyond what is read: samples need not divide the time lost
+_MARGIN = 0.1  # s of motion beyond the readings: samples need not divide the lost time
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ class DroppedSamples(Effect):
         return float(rng.uniform(0.1, 0.9))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Let the motion go on for as long as it is read; an input that is lost too is linear where it is."""
+        """Extend the motion to the end of the readings; where the input is lost too, it is linear."""
         if self.is_null:
             return run
         self._instants(drawn)  # an error here, before the motion is computed
@@ -278,7 +278,7 @@ class DroppedSamples(Effect):
     def on_rows(
         cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
     ) -> None:
-        """Let the motions go on for as long as they are read; driven ones run by run."""
+        """Extend the motions to the end of the readings; driven ones run by run."""
         driven = np.array([drive is not None for drive in runs.drive])
         lost = cls.column(effects, "lost_time")
         runs["duration"][:] += np.where((lost != 0.0) & ~driven, lost + _MARGIN, 0.0)
@@ -287,7 +287,7 @@ class DroppedSamples(Effect):
             runs.put(place, run(*one))
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """The true time runs ahead of the stamps from every instant on."""
+        """The true time runs ahead of the stamps after every instant."""
         if self.is_null:
             return time_s
         instants = self._instants(drawn) * stated.duration
@@ -338,9 +338,9 @@ class MainsHum(Effect):
 
 
 _LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
-_DECAYS = 1.01  # a fit that ends at the least damping has found a line that something drives
-_SLOWEST = 0.1  # of the motion's frequency: judgement; what is slower is a drift in a record of ten cycles
-_LEAST_SPRING = 1e-9  # N m/rad: a fit may try none
+_DECAYS = 1.01  # a fit that ends at the least damping has found a driven line
+_SLOWEST = 0.1  # of the motion's frequency: judgement; anything slower is a drift in a record of ten cycles
+_LEAST_SPRING = 1e-9  # N m/rad: a fit may try zero
 
 
 @dataclass(frozen=True)
@@ -393,11 +393,11 @@ class SecondMode(Effect):
 
     @classmethod
     def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
-        """What rings from the release on, and what the input excites."""
+        """The ringing from the release on, and the oscillation excited by the input."""
         return (residuals.ringing(), residuals.excited())
 
     def plausible(self, omega: float) -> bool:
-        """Whether it is an oscillation of its own: it decays, is not the motion's, and not as slow as a drift."""
+        """Whether it is a separate oscillation: it decays, is not the motion's, and not as slow as a drift."""
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
         return (
             decays and self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
@@ -406,7 +406,7 @@ class SecondMode(Effect):
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
     ) -> Array | None:
-        """The second oscillation, at a phase of the run's own or as the input excites it."""
+        """The second oscillation, at the run's own phase or as excited by the input."""
         if self.is_null:
             return None
         if stated.drive is None or self.by_input == 0.0:
@@ -470,8 +470,8 @@ class InputDelay(Effect):
         scale=0.002,
         lower=-1.0,
         upper=1.0,
-        fit_lower=-0.05,  # s, of a resonance of 2 Hz: a tenth of a period early
-        fit_upper=0.2,  # and four tenths of one late, below the delay that turns the phase by half a turn
+        fit_lower=-0.05,  # s, for a resonance of 2 Hz: a tenth of a period early
+        fit_upper=0.2,  # and four tenths of a period late, below the delay of half a turn of phase
     )
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:

@@ -45,14 +45,14 @@ DRIVE = DriveMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an effect obeys a law; the fault is how it is violated, empty where it is obeyed."""
+    """Whether an effect obeys a law; ``fault`` describes the violation, and is empty where it obeys."""
 
     law: str
     fault: str = ""
 
 
 def example(kind: type[Effect], **changed: float) -> Effect:
-    """The effect with the values at which its class says that it is visible, some of them changed."""
+    """The effect with the values at which its class states that it is visible, some of them changed."""
     values = dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
     return make_effect(kind, values | changed)
 
@@ -171,7 +171,7 @@ def integration(kind: type[Effect]) -> str:
     run = follow_fastest(load_rig(), chain.physics())
     usual = forward_motion(load_rig(), run, 100.0)
     finer = forward_motion(load_rig(), replace(run, timestep=0.5 * run.timestep), 100.0)
-    # MuJoCo does not take the input of a driven run
+    # MuJoCo does not support the input of a driven run
     others = [finer] if kind.driven else [finer, simulate_motion(build_model(load_rig(), run), 100.0)]
     error = max(float(np.max(np.abs(other.angle - usual.angle))) for other in others)
     return "" if error < INTEGRATION_TOLERANCE else f"the angle changes by {error:.2g} rad"
@@ -222,14 +222,14 @@ LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
 
 
 def check(kind: type[Effect]) -> list[Verdict]:
-    """Hold an effect to every law that applies to it, in the order of `LAWS`; an exception is a fault."""
+    """Test an effect against every law that applies to it, in the order of `LAWS`; an exception is a fault."""
     unstated = kind.moment_oracle is Effect.moment_oracle
     left_out = [law for law, absent in ((oracle, unstated), (free, not kind.driven)) if absent]
     verdicts = []
     for law in (law for law in LAWS.values() if law not in left_out):
         try:
             fault = law(kind)
-        except (Exception, SystemExit) as error:  # code of others: whatever it raises is a fault of it
+        except (Exception, SystemExit) as error:  # foreign code: any exception is a fault of the effect
             name = "" if isinstance(error, TunnelError) else f"{type(error).__name__}: "
             fault = one_line(f"{name}{error}")
         verdicts.append(Verdict(" ".join((law.__doc__ or "").split()).rstrip("."), fault))

@@ -1,4 +1,4 @@
-"""A model of one's own with one joint that moves: the law of that joint, and the actuator that drives it."""
+"""A user's model with one moving joint: the law of that joint, and the actuator that drives it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, Actuator, JointLaw, Term
 
 _GRID = 361  # positions at which the moment is tabulated
-_EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding
+_EXACT = 1e-8  # of the greatest moment: residual allowed to the terms of the law, the engine's own rounding
 _PRESENT = 1e-9  # of the greatest moment: a smaller term is rounding
-_TURN = 2.0 * math.pi  # rad/s, of a joint that nothing holds: moments are judged against those of its inertia
+_TURN = 2.0 * math.pi  # rad/s, for an unrestrained joint: moments are judged against its inertial moments
 _RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # times the rate of the motion
 _MOMENTS = (
     ("b", "N m/rad"),
@@ -40,11 +40,11 @@ _TYPES = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_S
 
 @dataclass(frozen=True)
 class Recorded:
-    """What the records say of the motion of a joint.
+    """Properties of a joint's motion from the records.
 
     Args:
-        reach: greatest displacement from rest, or of driven runs from the middle, rad (m for a slide).
-        middle: of driven runs, taken as positions of the joint, rad; None: all runs are free decays.
+        reach: greatest displacement from rest, or for driven runs from the middle, rad (m for a slide).
+        middle: of driven runs, read as positions of the joint, rad; None: all runs are free decays.
         controlled: whether the input of a run is the control of an actuator.
         actuator: the name of that actuator; None: the joint has only one.
     """
@@ -57,7 +57,7 @@ class Recorded:
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
-    """A model whose only joint that moves is the one recorded."""
+    """A model whose only moving joint is the recorded one."""
 
     path: Path
     joint: str
@@ -78,8 +78,8 @@ def read_joint_model(
 ) -> JointModel:
     """Read a model, and the law of one joint from the engine's moments, in a process with limits.
 
-    The law is exact: the restoring moment is that of gravity and springs over the whole turn (for a slide,
-    over twice the reach).
+    The law is exact: gravity and springs give the restoring moment over the whole turn (for a slide, over twice
+    the reach).
 
     Args:
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
@@ -134,14 +134,14 @@ def read_joint_model(
 
 
 def prepare() -> None:
-    """Load what `law_of_request` needs, while files can still be opened."""
+    """Load the dependencies of `law_of_request`, while files can still be opened."""
     for name in ("scipy.optimize", "tunnel_sim.physics.expression"):
         import_module(name)
     load_plugin()
 
 
 def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, or what is refused, as JSON; of joint and `Recorded` as JSON, and then the files."""
+    """The law of a joint, or a refusal, as JSON; from joint and `Recorded` as JSON, followed by the files."""
     at = request.index(b"\n") + 1
     joint, given = json.loads(request[:at])
     recorded = Recorded(**given)
@@ -167,7 +167,7 @@ def law_of_request(request: bytes) -> bytes:
             kind = _TYPES.get(int(model.jnt_type[0]))
             if kind is None:
                 raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
-            actuator = _actuator(model, recorded)  # takes its limits away
+            actuator = _actuator(model, recorded)  # removes its limits
             law = replace(_law(model, recorded, slide=kind == "slide"), actuator=actuator)
     except TunnelError as error:
         return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
@@ -175,13 +175,13 @@ def law_of_request(request: bytes) -> bytes:
 
 
 class _Engine:
-    """Moments on the joint as the engine computes them."""
+    """Moments on the joint as computed by the engine."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model, self.data = model, mujoco.MjData(model)
 
     def moment(self, position: float, rate: float = 0.0, control: tuple[int, float] = (0, 0.0)) -> float:
-        """Of gravity, springs, dampers and actuators; constraints excluded, N m.
+        """Moment of gravity, springs, dampers and actuators, without constraints, N m.
 
         Args:
             control: place among the model's controls, and value; the others are zero.
@@ -198,7 +198,7 @@ class _Engine:
         return moment
 
     def inertia(self) -> float:
-        """At the position of the last moment, kg m²."""
+        """Inertia at the position of the last moment, kg m²."""
         full = np.zeros((1, 1))
         mujoco.mj_fullM(self.model, self.data, full)
         return float(full[0, 0])
@@ -207,7 +207,7 @@ class _Engine:
 def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
     """The actuator whose control drives the runs, its moment measured; None where no control does.
 
-    The limits of its force are taken away from the model, since they are checked along the records.
+    The limits of its force are removed from the model, since they are checked along the records.
     """
     if not recorded.controlled and recorded.actuator is None:
         return None
@@ -264,7 +264,7 @@ def _rest(engine: _Engine, grid: Array, moments: Array) -> float:
         what = "does not oscillate: it has no stable rest position nearby"
         raise TunnelError(what, remedy="add the spring, or gravity, that restores it")
     at = falls[np.argmin(np.abs(grid[falls] - float(engine.model.qpos0[0])))]
-    if engine.moment(grid[at]) > 0.0:  # rest lies between the grid's positions
+    if engine.moment(grid[at]) > 0.0:  # rest is between the grid's positions
         return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
     return float(grid[at])
 
@@ -276,7 +276,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
     moments = np.array([engine.moment(x) for x in grid])
     terms: dict[str, float] | None
     if middle is not None and np.ptp(moments) < _PRESENT * engine.inertia() * _TURN**2:
-        rest, span, constant = middle, reach, -float(np.mean(moments))  # nothing holds it; a slide has weight
+        rest, span, constant = middle, reach, -float(np.mean(moments))  # unrestrained; a slide has weight
         terms = {"1": constant} if abs(constant) > _PRESENT * engine.inertia() * _TURN**2 else {}
     else:
         rest = _rest(engine, grid, moments)
@@ -335,10 +335,10 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
 def _fitted(
     forms: Sequence[tuple[str, str]], moving: dict[str, Array], wanted: Array, scale: float
 ) -> dict[str, float] | None:
-    """Coefficients by expression, those that are rounding left out; None where the forms do not make the moment.
+    """Coefficients by expression, without those that are rounding; None where the forms do not fit the moment.
 
-    ``scale`` is the moment (N m) against which rounding is judged. The slope of the sine at rest is left to the
-    linear term, so that the latter is the whole slope.
+    Rounding is judged against the moment ``scale`` (N m). The linear term includes the slope of the sine at rest,
+    so that it is the whole slope.
     """
     from tunnel_sim.physics.expression import parse
 

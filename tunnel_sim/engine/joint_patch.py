@@ -1,4 +1,4 @@
-"""Writing a joint's law into a model of one's own, as native elements and, beside them, the plugin."""
+"""Writing a joint's law into a user's model, as native elements and, where these do not suffice, the plugin."""
 
 from __future__ import annotations
 
@@ -29,13 +29,12 @@ _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that 
 
 @dataclass(frozen=True)
 class ActuatorPatch:
-    """What stands between the control of an actuator and its moment.
+    """Elements between the control of an actuator and its moment.
 
     MuJoCo delays the control, clips it and then filters it. The range of the control clips it before the filter,
-    and leaves out the bias of a servo; ``forcerange`` would do neither.
+    and excludes the bias of a servo; ``forcerange`` would do neither.
 
     Args:
-        index: of the actuator in the model.
         limit: greatest control, in its own unit; 0: the model's own range.
         lag: time constant of its filter, s; 0: none.
         delay: of the control, s; 0: none.
@@ -75,12 +74,12 @@ class JointPatch:
 
 @dataclass(frozen=True)
 class Start:
-    """Where a run starts.
+    """The start of a run.
 
     Args:
         time: since the start of the record, s.
         angle, rate: displacement from rest, rad, and its rate, rad/s.
-        drive: what drives it from there on; None: a free decay.
+        drive: its drive from then on; None: a free decay.
     """
 
     run: str
@@ -92,7 +91,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Written:
-    """An attribute that was written, in SI units: its element and name, its values before and after, the unit."""
+    """A written attribute, in SI units: its element and name, its values before and after, the unit."""
 
     name: str
     before: tuple[float, ...]
@@ -103,11 +102,11 @@ class Written:
 def patched(
     model: JointModel, patch: JointPatch, starts: Sequence[Start] = ()
 ) -> tuple[mujoco.MjSpec, tuple[Written, ...]]:
-    """The model with a law written into it, its runs' starts as keyframes, and what was written."""
+    """The model with a law written into it, its runs' starts as keyframes, and the written attributes."""
     spec = model.spec()
     before = spec.compile()
     joint = spec.joint(model.joint)
-    joint.springdamper = (0.0, 0.0)  # stiffness and damping are written themselves
+    joint.springdamper = (0.0, 0.0)  # stiffness and damping are written explicitly
     weight = _write_inertia(spec, before, model, patch)
     _write_spring(spec, before, model, patch, weight)
     joint.damping = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]]) + patch.damping
@@ -133,7 +132,7 @@ def patched(
             spec.add_numeric(name=name, data=[value], size=1)
         if patch.program:
             spec.add_numeric(name="moment_program", data=list(patch.program), size=len(patch.program))
-    if patch.noise != 0.0:  # on the joint's position sensor, which is added where there is none
+    if patch.noise != 0.0:  # on the joint's position sensor, which is added if missing
         kind = mujoco.mjtSensor.mjSENS_JOINTPOS
         own = (one for one in spec.sensors if one.type == kind and one.objname == model.joint)
         if (sensor := next(own, None)) is None:
@@ -184,7 +183,7 @@ def _refusals(model: JointModel) -> AbstractContextManager[None]:
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
-    """The MJCF of a model from `patched`; the paths of its meshes are those from ``folder``."""
+    """The MJCF of a model from `patched`, with paths of its meshes from ``folder``."""
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
@@ -195,14 +194,12 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
 def _write_inertia(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
 ) -> float:
-    """More inertia as armature; less as a smaller one, or as bodies drawn in towards the axis.
+    """Added inertia as armature; reduced inertia as a smaller armature, or as bodies drawn in towards the axis.
 
     Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
-    the inertia. On a slide they lose mass instead; returned is the share of the weight that remains.
+    the inertia. On a slide they lose mass instead; the result is the share of the weight that remains.
     """
-    rotors = float(
-        np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature)
-    )  # they stay as they are
+    rotors = float(np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature))  # they are unchanged
     armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
     if armature >= 0.0:
         spec.joint(model.joint).armature = armature
@@ -233,13 +230,13 @@ def _write_inertia(
 
 
 def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
-    """How much more inertia a joint seems to have when it is simulated in steps, kg m².
+    """Apparent additional inertia of a joint due to simulation in steps, kg m².
 
-    At the end of a step of h, an integrator of first order has the moment of a damper C at the step's end or start
-    instead of that in its middle: this adds C h/2 to the inertia, or takes it off.
+    A first-order integrator with steps h uses the moment of a damper C at the step's end or start instead of its
+    middle: this adds C h/2 to the inertia, or subtracts it.
 
     Args:
-        damping: of the joint itself, N m s/rad; that of its actuators is the model's own.
+        damping: of the joint itself, N m s/rad; the damping of its actuators is taken from the model.
     """
     options, kinds = model.opt, mujoco.mjtIntegrator
     if options.integrator == int(kinds.mjINT_RK4):
@@ -253,10 +250,10 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
 
 
 def creep_rate(model: mujoco.MjModel, rest: float) -> float:
-    """The rate up to which ``frictionloss`` yields as a damper does, as the engine computes it at rest, rad/s.
+    """The rate up to which ``frictionloss`` yields as a damper, computed by the engine at rest, rad/s.
 
     Args:
-        model: whose joint has a ``frictionloss``.
+        model: its joint has a ``frictionloss``.
         rest: position of the joint at which no other moment acts, rad.
     """
     data, forces = mujoco.MjData(model), []
@@ -280,7 +277,7 @@ def _write_spring(
         moment, own_actuator = -float(total.coef[0]), model.law.actuator
         if moment == 0.0:
             return
-        # a constant moment is the bias of the actuator that drives the joint, or of one that is added
+        # a constant moment is the bias of the actuator that drives the joint, or of an added one
         if own_actuator is None:
             name, kind = f"{model.joint}_moment", mujoco.mjtTrn.mjTRN_JOINT
             actuator = spec.add_actuator(name=name, trntype=kind, target=model.joint)
@@ -306,7 +303,7 @@ def _write_spring(
 
 
 def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
-    """What may be written into a model, by name and unit."""
+    """The attributes of a model that may be written, by name and unit."""
     moving = [i for i in range(model.nbody) if model.body_weldid[i]]
     spring = model.jnt_stiffness[0], *model.jnt_stiffnesspoly[0]
     damping = model.dof_damping[0], *model.dof_dampingpoly[0]
@@ -346,13 +343,13 @@ def simulate_joint(
 ) -> Motion:
     """Simulate one run of a patched model, by displacement from rest, with the model's own integrator and steps.
 
-    In every step the input has its mean over the step. A delayed control is read between steps by integrators of
-    higher order: they take its means around the steps' starts.
+    In every step the input has its mean over the step. Higher-order integrators read a delayed control between
+    steps: they use its means around the steps' starts.
 
     Args:
         law_rest: the joint's position at rest, rad.
         duration: s.
-        actuator: whose control the input is; None: it is a moment on the joint (``qfrc_applied``).
+        actuator: its control is the input; None: the input is a moment on the joint (``qfrc_applied``).
     """
     steps = duration / model.opt.timestep
     remedy = "lengthen the model's timestep"
@@ -373,14 +370,14 @@ def simulate_joint(
         for i in range(count):
             angle[i], rate[i], pushed[at] = data.qpos[0], data.qvel[0], given[i]
             mujoco.mj_step(model, data)
-    if data.time < 0.5 * count * model.opt.timestep:  # the engine has reset a motion that grew without bound
+    if data.time < 0.5 * count * model.opt.timestep:  # the engine has reset a diverging motion
         what = "the patched model's motion grows without bound"
         raise TunnelError(what, where=f"run {start.run}", remedy="shorten its timestep")
     return Motion(np.arange(count) * model.opt.timestep, angle - law_rest, rate)
 
 
 def _begin(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, control: float) -> None:
-    """Let an actuator begin as one whose control has been constant for long."""
+    """Start an actuator as if its control had been constant for long."""
     low, high = model.actuator_ctrlrange[actuator]
     if _filters(model, actuator):
         held = min(max(control, low), high) if model.actuator_ctrllimited[actuator] else control

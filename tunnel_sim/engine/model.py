@@ -1,6 +1,6 @@
 """The rig's MuJoCo model: the structure comes from ``mjcf/rig.xml``, the numbers from the rig description.
 
-Shapes that are drawn do not affect the motion. Each is a single mesh, because MuJoCo computes the pose of
+Drawn shapes do not affect the motion. Each is a single mesh, because MuJoCo computes the pose of
 every geom in every step.
 """
 
@@ -110,7 +110,7 @@ def glass_mesh(section: WorkingSection) -> Mesh:
 
 
 def frame_mesh(rig: Rig) -> Mesh:
-    """The beams along the edges of the working section, and the yoke above it that carries spring and sensor."""
+    """The beams along the edges of the working section, and the yoke above it for spring and sensor."""
     section = rig.working_section
     x, y, z = section.length / 2, section.width / 2, section.height
     b, parts = _BEAM, []
@@ -140,7 +140,7 @@ def marks_mesh(rig: Rig) -> Mesh:
 
 _SERIES = ("wind_speed", "forcing", "ambient")
 _THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
-_COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; only copies are given away
+_COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; callers get copies only
 _MOST_COMPILED = 16
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
 
@@ -187,7 +187,7 @@ class Model:
         return Model(mj, self.rig, settings)
 
     def release_state(self) -> mujoco.MjData:
-        """The state at the release, where the body has been held and rod and spring are in equilibrium."""
+        """The state at the release, with the body held and rod and spring in equilibrium."""
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
         end = spring_end_angle(self.settings)
@@ -201,7 +201,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
-    """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
+    """Build the model of one run; compiling, the slowest part, is done once for all runs of a layout.
 
     Args:
         settings: spring, damper, inertia, air and every further term of the moment law.
@@ -292,7 +292,7 @@ def _set_inertia(body: mujoco.MjsBody, rig: Rig, yaw_inertia: float, mass: float
 
 
 def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
-    """Principal inertias, kg m²: yaw as given, the others (which never matter) as of a box in proportion."""
+    """Principal inertias, kg m²: yaw as given, the others (which never matter) in the proportions of a box."""
     length, height = rig.body.length, rig.body.height
     width = max(rig.body.width, _THINNEST * length)
     scale = yaw_inertia / (length**2 + width**2)

@@ -1,7 +1,7 @@
-"""The files of a model of one's own, MJCF or URDF.
+"""The files of a user's model, MJCF or URDF.
 
-They are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo is given their content, so
-it opens no file, and the model stays the same however often it is compiled.
+They are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo receives their content, so
+it opens no file, and the model is the same at every compilation.
 """
 
 from __future__ import annotations
@@ -28,16 +28,14 @@ _VALUE = r"\s*=\s*(\"[^\"]*\"|'[^']*')"
 _DOCUMENT = re.compile(r"<(?:include|model)\s[^<>]*?\bfile" + _VALUE)
 _FILE = re.compile(r"\bfile(?:name|up|down|left|right|front|back)?" + _VALUE)
 _FOLDER = re.compile(r"\b(?:asset|mesh|texture)dir" + _VALUE)
-_STRIPPED = re.compile(
-    r"<robot\b|\bstrippath\s*=\s*[\"']true"
-)  # MuJoCo takes the last part of a URDF's names
+_STRIPPED = re.compile(r"<robot\b|\bstrippath\s*=\s*[\"']true")  # MuJoCo uses the last part of a URDF's names
 _MOST_FOLDERS = 20  # of a model: each name is looked for in each
 _SMALLER = "leave out what the motion of the joint does not need"
 
 
 @dataclass(frozen=True)
 class ModelFiles:
-    """The content of a model's files: its MJCF or URDF, and further XML and assets by the name MuJoCo asks for."""
+    """The content of a model's files: its MJCF or URDF, and further XML and assets by MuJoCo's name for them."""
 
     text: str
     documents: Mapping[str, bytes]
@@ -58,7 +56,7 @@ class ModelFiles:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> ModelFiles:
-        """The files of `to_bytes`."""
+        """The files from the bytes of `to_bytes`."""
         at = content.index(b"\n") + 1
         parts: list[dict[str, bytes]] = []
         for sizes in json.loads(content[:at]):
@@ -70,7 +68,7 @@ class ModelFiles:
 
 
 def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
-    """Read a model and the files that it names, from its own folder or the further one."""
+    """Read a model and the files that it names, from its own folder or a further one."""
     text, where = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file"), shown(path)
     folders, stripped = {""}, False
     names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
@@ -108,7 +106,7 @@ def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
                 check_count(size, limits.ASSET_BYTES, "bytes of meshes and images", where, _SMALLER)
         if not places.keys() & assets.keys():
             missing.append(name)
-    # MuJoCo would take a file of the same name from another folder in its place.
+    # Otherwise MuJoCo would use a file of the same name from another folder.
     taken = {posixpath.basename(place).lower() for place in assets}
     for name in missing:
         if posixpath.basename(name).lower() in taken:
@@ -118,7 +116,7 @@ def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
 
 
 def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> bytes | None:
-    """The content of a file of a model; None where there is none."""
+    """The content of a file of a model; None if it does not exist."""
     path = model.parent / place
     try:
         if not os.path.lexists(path):
@@ -126,7 +124,7 @@ def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> byt
         real = Path(os.path.realpath(path))
     except ValueError:
         return None
-    if path.is_dir():  # a name that is put together from a folder of other files
+    if path.is_dir():  # a name composed from a folder of other files
         return None
     roots = [Path(os.path.realpath(one)) for one in (model.parent, asset_dir) if one is not None]
     if not any(real.is_relative_to(root) for root in roots):
@@ -137,20 +135,20 @@ def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> byt
 
 
 def _places(name: str, bases: Sequence[str], folders: Iterable[str]) -> list[str]:
-    """Where a file may be, as MuJoCo would name it from the model's folder."""
+    """Possible places of a file, as MuJoCo would name it from the model's folder."""
     name = name.replace("\\", "/")
     found = (posixpath.join(base, folder, name) for base in bases for folder in folders)
     return list(dict.fromkeys(posixpath.normpath(one) for one in found))
 
 
 def _values(pattern: re.Pattern[str], text: str) -> set[str]:
-    """The values of an attribute, those that are empty left out."""
+    """The values of an attribute, without empty ones."""
     return {html.unescape(found[1][1:-1]) for found in pattern.finditer(text)} - {""}
 
 
 @contextmanager
 def engine_refusals(what: str, remedy: str, where: str = "") -> Iterator[None]:
-    """Convert what MuJoCo raises for a model; its warnings are left out."""
+    """Convert MuJoCo's exceptions for a model; its warnings are omitted."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

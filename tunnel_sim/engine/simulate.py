@@ -67,7 +67,7 @@ def simulate(
         deviations: of the true wind speed, spring and mechanical damping from the settings, relative, by name.
 
     Raises:
-        TunnelError: when the motion grows without bound or the settings are refused.
+        TunnelError: when the motion diverges or the settings are refused.
     """
     chain = replace(EffectChain.draw(settings, effects, rng), deviations=deviations or {})
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
@@ -89,7 +89,7 @@ def simulate_motions(
         nthread: number of threads; 0 uses all processors.
     """
     runs: list[RunSettings] = []
-    groups: dict[tuple[object, ...], list[int]] = {}  # of runs that can share one compiled model
+    groups: dict[tuple[object, ...], list[int]] = {}  # of runs that share a compiled model
     for i, stated in enumerate(settings):
         try:
             run = follow_fastest(rig, stated)
@@ -117,7 +117,7 @@ def simulate_motions(
 
 
 class RunBatch:
-    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run."""
+    """Runs of one layout on ``mujoco.batch``, each with its own numbers; ``row`` is the index of a run."""
 
     def __init__(self, model: Model, count: int, steps: int, nthread: int) -> None:
         self._batch = mujoco_batch.Batch(model.mj, nsim=count, nthread=nthread)
@@ -129,7 +129,7 @@ class RunBatch:
 
     @property
     def state(self) -> Array:
-        """MuJoCo's `STATE` of the runs, in SI units, shape (runs, n); a row that is written to sets its run."""
+        """MuJoCo's `STATE` of the runs, in SI units, shape (runs, n); writing a row sets its run."""
         state: Array = self._batch.state
         return state
 
@@ -143,7 +143,7 @@ class RunBatch:
         return tuple(float(self._states[name][row, self._address]) for name in ("qpos", "qvel"))  # type: ignore[return-value]
 
     def start(self, row: int, model: Model) -> tuple[float, float]:
-        """Start the run of a model at its release; result as of `now`."""
+        """Start the run of a model at its release; result as in `now`."""
         data = model.release_state()
         for name in _VARIED:
             self._fields[name][row] = getattr(model.mj, name)
@@ -159,9 +159,9 @@ class RunBatch:
         Args:
             samples: number of samples after the first.
             first: angle (rad) and rate (rad/s) of the rod's upper end now, shape (2, runs).
-            rows: indices of the runs to be advanced; all where None.
+            rows: indices of the runs to advance; None: all.
             control: departure of the wind speed in each sample interval, shape (runs, samples), m/s, and moment on
-                the rod's upper end, shape (runs,), N m, of the runs advanced; None: nothing acts.
+                the rod's upper end, shape (runs,), N m, for the advanced runs; None: neither.
 
         Returns:
             Angle (rad) and rate (rad/s) of the rod's upper end, now and at each sample, shape (runs, samples + 1).
@@ -193,7 +193,7 @@ class RunBatch:
 
 @contextmanager
 def no_log() -> Iterator[None]:
-    """Suppress MuJoCo's warnings on the terminal and in a log file; the caller reports the same."""
+    """Suppress MuJoCo's warnings on the terminal and in a log file; the caller reports the same fault."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -204,7 +204,7 @@ def no_log() -> Iterator[None]:
 
 @contextmanager
 def no_timers() -> Iterator[None]:
-    """Stop MuJoCo's timers, which nobody reads here and which take two fifths of a step."""
+    """Stop MuJoCo's timers, which are not used here and take two fifths of a step."""
     before = mujoco.get_mjcb_time()
     mujoco.set_mjcb_time(_no_clock())
     try:

@@ -38,11 +38,11 @@ def simulate_campaign(
         progress: called with (runs done, runs in all).
 
     Returns:
-        The campaign as a rig engineer would have measured it: it states the rig's nominal inertia, not that of
-        the truth, and contains no other trace of the truth.
+        The campaign as a rig engineer would have measured it: it states the rig's nominal inertia, not the true
+        one, and contains no other trace of the truth.
 
     Raises:
-        TunnelError: when an effect is unknown or the motion of a run grows without bound.
+        TunnelError: when an effect is unknown or the motion of a run diverges.
     """
     (campaign,) = simulate_campaigns([plan], rig, nthread=nthread, progress=progress)
     return campaign
@@ -64,17 +64,17 @@ def simulate_campaigns(
         progress: called with (runs done, runs in all).
 
     Returns:
-        One campaign per plan, bit-identical to those of `simulate_campaign`.
+        One campaign per plan, bit-identical to the result of `simulate_campaign`.
 
     Raises:
-        TunnelError: when sample rates differ, an effect is unknown or the motion of a run grows without bound.
+        TunnelError: when sample rates differ, an effect is unknown or the motion of a run diverges.
     """
     rig = load_rig() if rig is None else rig
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:
         remedy = "simulate each rate separately"
         raise TunnelError(f"the plans have {len(rates)} different sample rates", remedy=remedy)
-    drawn = [run for plan in plans for run in _drawn(plan)]  # of every run in the plans' order
+    drawn = [run for plan in plans for run in _drawn(plan)]  # for every run, in the plans' order
     true = [run.chain.physics() for run in drawn]
     motions = simulate_motions(rig, true, *rates, nthread=nthread, progress=progress)
     simulated = zip(motions, drawn, strict=True)
@@ -94,7 +94,7 @@ def simulate_campaigns(
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What a run has drawn: its generator, the effects in it, its own sensor, and its deviations from the plan."""
+    """The draws of a run: its generator, its effects, its own sensor, and its deviations from the plan."""
 
     rng: np.random.Generator
     chain: EffectChain
@@ -102,7 +102,7 @@ class _Drawn:
 
     @property
     def between_runs(self) -> dict[str, float]:
-        """The deviations of the run by name, of the effects and of the plan together: relative."""
+        """The deviations of the run by name, from the effects and the plan together: relative."""
         found = dict(self.chain.deviations)
         for effect, drawn in zip(self.chain.effects, self.chain.drawn, strict=True):
             if isinstance(effect, BetweenRuns):
@@ -112,7 +112,7 @@ class _Drawn:
 
 
 def _drawn(plan: CampaignPlan) -> list[_Drawn]:
-    """What every run of a plan draws before it is simulated."""
+    """The draws of every run of a plan before it is simulated."""
     effects = plan_effects(plan)
     for condition in plan.conditions:
         if condition.wind_speed > 0.0 and condition.drive is not None and condition.drive.kind.of_base:
@@ -182,7 +182,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     for setting in plan.effects:
         effect = effect_from(setting.name, setting.parameters)
         severity = effect.parameters()[0]
-        if severity.name not in setting.parameters:  # with the default severity it would do nothing
+        if severity.name not in setting.parameters:  # its default severity has no effect
             remedy = f"give the {severity.meaning} in {severity.unit}, such as {severity.scale:g}"
             raise TunnelError(f"{severity.name} is missing", where=f"effect {effect.name}", remedy=remedy)
         effects.append(effect)
@@ -202,7 +202,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         parameter = effect.chosen_spring()
         chosen = None if parameter is None else getattr(effect, parameter)
         if chosen is not None and not any(isclose(k, chosen, rel_tol=SPRING_TOLERANCE) for k in springs):
-            what = f"no run has a spring_stiffness of {chosen:g} N m/rad"  # so it would do nothing
+            what = f"no run has a spring_stiffness of {chosen:g} N m/rad"  # so it would have no effect
             remedy = f"give one of {', '.join(f'{spring:g}' for spring in springs)}"
             raise TunnelError(what, where=where, remedy=remedy)
         if effect.driven and not drives:
@@ -224,9 +224,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:
-    """The content of ``truth.json``, as plain JSON values, which estimators and diagnosis never read.
+    """The content of ``truth.json``, as plain JSON values; estimators and diagnosis never read it.
 
-    Scatter between runs stands beside the effects: its widths, and the deviations of every run.
+    Scatter between runs is listed beside the effects: its widths, and the deviations of every run.
     """
     effects = [effect for effect in plan_effects(plan) if not effect.is_null]
     scattering = [effect for effect in effects if effect.scatters]
@@ -248,7 +248,7 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
 
 
 def _scatter_truth(plan: CampaignPlan, scattering: Sequence[Effect]) -> dict[str, Any]:
-    """How wide the scatter between the runs is, and every run's own deviations; empty where the runs repeat."""
+    """The widths of the scatter between the runs, and every run's own deviations; empty where the runs repeat."""
     widths = plan.scatter.stated | {effect.scatters: effect.severity for effect in scattering}
     if not widths:
         return {}

@@ -1,7 +1,7 @@
 """Gymnasium environments of the rig; ``import tunnel_sim.envs`` registers them, which ``gymnasium.make`` needs.
 
-``gymnasium.make("tunnel_sim.envs:tunnel_sim/FreeDecay-v0")`` imports this module by itself. Gymnasium reads no
-entry points since its version 1.0.
+``gymnasium.make("tunnel_sim.envs:tunnel_sim/FreeDecay-v0")`` imports this module by itself. Gymnasium does not
+read entry points since its version 1.0.
 
 ``tunnel_sim/FreeDecay-v0``: an episode is one run (docs/reference/envs/free-decay.md).
 ``tunnel_sim/Campaign-v0``: an episode is a campaign and a step is a run. It needs identification and diagnosis, so
@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 
 def as_env_error(error: TunnelError, where: str) -> EnvError:
-    """Convert an error of a lower layer to an `EnvError`, which concerns ``where`` if it does not say itself."""
+    """Convert an error of a lower layer to an `EnvError`, concerning ``where`` unless it names a place itself."""
     return EnvError(error.what, where=error.where or where, remedy=error.remedy)
 
 

@@ -1,4 +1,4 @@
-"""The conditions of episodes: what an environment is configured with, and what it draws."""
+"""The conditions of episodes: the configuration of an environment, and its draws."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _NUMBERS: Mapping[str, Number] = {
 
 @dataclass(frozen=True)
 class FreeDecayConfig:
-    """What all episodes of an environment have in common.
+    """The common properties of all episodes of an environment.
 
     Args:
         preset: ``operator``: the action sets the wind-speed set-point and an applied yaw moment; ``plain``: no
@@ -135,7 +135,7 @@ def free_decay_config(arguments: Mapping[str, Any], beside: Iterable[str] = ()) 
 
     Args:
         arguments: by name, in the units of `FreeDecayConfig`.
-        beside: names that the environment takes beside them, for the remedy.
+        beside: names of the environment's other arguments, for the remedy.
     """
     known = [item.name for item in fields(FreeDecayConfig)]
     refuse_unknown(arguments, (*known, *beside), WHERE)
@@ -209,7 +209,7 @@ def plan_run(
     """The run of one episode.
 
     Args:
-        rng: draws what the options do not give, in the order spring, wind speed, release angle, truth in the
+        rng: draws the properties without options, in the order spring, wind speed, release angle, truth in the
             order of `TRUTH`, effects. Nothing is drawn for given options.
     """
     given = _checked(options or {}, OPTIONS, "reset options")
@@ -225,7 +225,7 @@ def plan_run(
     elif given.get("spring_stiffness") is not None:
         stiffness = _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
     else:
-        # Of those whose stiffness exceeds Ka at any drawn speed, or else of all.
+        # From springs whose stiffness exceeds Ka at any drawn speed, or else from all.
         needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
             CN_BETA[1], **rig.body.flow(rig.air.density, WIND_SPEED[1])
         )
@@ -263,7 +263,7 @@ def plan_run(
         one_run = CampaignPlan("episode", 0, truth, (condition,), sensor, tuple(settings))
         effects = plan_effects(one_run)
         for effect in effects:
-            # An episode reads the motion as it goes: none of it can be passed over.
+            # An episode reads the motion as it proceeds: none of it can be skipped.
             if effect.skips and not effect.is_null:
                 what = "an episode cannot drop samples"
                 remedy = "inject it with tunnel simulate, which makes whole records"
@@ -304,7 +304,7 @@ def _effects(
     if stated is None:
         if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
             return []
-        # of one run, which shows no scatter between runs
+        # for one run, which shows no scatter between runs
         kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven or kind.scatters)]
         kind = kinds[int(rng.integers(len(kinds)))]
         severity = kind.parameters()[0]

@@ -59,7 +59,7 @@ class Models:
 
 
 class OneRun:
-    """A single run with its own model, of some samples in each control period; its ``row`` is always 0."""
+    """A single run with its own model and some samples in each control period; its ``row`` is always 0."""
 
     def __init__(self, models: Models, samples: int) -> None:
         self._models = models
@@ -91,7 +91,7 @@ class OneRun:
         return angle, rate
 
     def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run, as ``mj_getState`` gives it for `STATE`, shape (n,)."""
+        """MuJoCo's state of a run, as from ``mj_getState`` for `STATE`, shape (n,)."""
         del row
         assert self._model is not None
         state = np.empty(mujoco.mj_stateSize(self._model.mj, STATE))
@@ -99,7 +99,7 @@ class OneRun:
         return state
 
     def set_state(self, row: int, state: Array) -> None:
-        """Put a run into a state.
+        """Set the state of a run.
 
         Args:
             state: from `get_state`, for a run of the same layout, shape (n,).
@@ -159,7 +159,7 @@ class ManyRuns:
         return np.array(self._batches[self._layout[row]].state[row])
 
     def set_state(self, row: int, state: Array) -> None:
-        """Put a run into a state; arguments as in `OneRun.set_state`."""
+        """Set the state of a run; arguments as in `OneRun.set_state`."""
         batch = self._batches[self._layout[row]]
         batch.state[row] = state
         self._last[:, row] = batch.now(row)

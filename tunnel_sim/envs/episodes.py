@@ -1,4 +1,4 @@
-"""Parallel episodes: readings, information, end, and the campaign they give; a vector environment has many.
+"""Parallel episodes: readings, information, end, and the resulting campaign; a vector environment has many.
 
 Readings are bit-identical to those of `tunnel_sim.effects.chain.read_motion`: zero, noise and quantisation are
 vectorised, effects act run by run.
@@ -100,7 +100,7 @@ class Episodes:
         time = self.step_count[row] * self._config.control_period
         shown = np.clip(self._readings.held(row, end_angle), -READING_BOUND, READING_BOUND)
         observation = np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
-        given = ("spring_stiffness", "wind_speed", "air_density", "release_angle")  # to the operator
+        given = ("spring_stiffness", "wind_speed", "air_density", "release_angle")  # known to the operator
         info: dict[str, Any] = {name: getattr(plan.condition, name) for name in given}
         if self._config.expose_truth:
             info["truth"] = plan
@@ -179,7 +179,7 @@ class Episodes:
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
-        """Continue an episode from a state of the same configuration; the generator that it uses from now on."""
+        """Continue an episode from a state of the same configuration; returns the generator for its next steps."""
         rng = self._readings.restore(row, state.arrays["readings"], state.sensor, state.rng)
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
@@ -266,10 +266,10 @@ class Readings:
         (self._altered.discard if running.chain.reads_plainly else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
-        """Readings (rad) of the control period before the release, shape (samples,), with noise of their own.
+        """Readings (rad) of the control period before the release, shape (samples,), with independent noise.
 
         Args:
-            angle: at which the rod's upper end is held, rad.
+            angle: of the held upper end of the rod, rad.
         """
         chain, sensor = self._of(row).chain, self._of(row).sensor
         time = np.arange(-self._samples, 0, dtype=np.float64) * self._interval
@@ -321,7 +321,7 @@ class Readings:
     def restore(
         self, row: int, values: Array, running: RunningSensor, rng: np.random.Generator
     ) -> np.random.Generator:
-        """Restore a run from a snapshot, with copies; the generator that it uses from now on.
+        """Restore a run from copies of a snapshot; returns the generator for its next steps.
 
         Args:
             values: readings from `snapshot`, shape (n,), rad.

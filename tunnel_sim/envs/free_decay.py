@@ -60,7 +60,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Start a run; the options that the environment's page lists fix its properties, the others are drawn."""
+        """Start a run; the options on the environment's page fix its properties, the others are drawn."""
         super().reset(seed=seed)
         observation, info = self._episodes.start(0, options, self.np_random)
         if self.render_mode == "human":
@@ -235,7 +235,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return self._episodes.get_state(index)
 
     def set_state(self, index: int, state: EpisodeState) -> None:
-        """Put one run into a state of an environment of the same configuration."""
+        """Set one run to a state of an environment of the same configuration."""
         self._rngs[index] = self._episodes.set_state(index, state)
 
     def information(self, index: int) -> Array:
@@ -251,5 +251,5 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
     def close_extras(self, **kwargs: Any) -> None:
         """Close the rendering context."""
         del kwargs
-        if hasattr(self, "_view"):  # Gymnasium before 1.3 closes also what could not be made
+        if hasattr(self, "_view"):  # Gymnasium before 1.3 also closes environments that could not be made
             self._view.close()

@@ -1,4 +1,4 @@
-"""The information that a run gives about Cnβ and Cnr, sample by sample, from the sensitivities along its motion.
+"""The information of a run on Cnβ and Cnr, sample by sample, from the sensitivities along its motion.
 
 docs/reference/envs/free-decay.md has the equations. In each sample interval the homogeneous part of a
 sensitivity is propagated exactly; its drive is integrated by Simpson's rule, with the middle value from the
@@ -56,7 +56,7 @@ _PRIOR_UNITS = {
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before the run, as standard deviations; 0: known exactly, except of those `REWARDED`.
+    """Prior knowledge of a run, as standard deviations; 0: known exactly, except for `REWARDED`.
 
     Args:
         yaw_inertia, mechanical_damping: as a share of Izz and Cr; known from wind-off runs with the spring.
@@ -103,16 +103,16 @@ class Information:
         self._samples, self._interval, self._variance, self._prior = samples, interval, variance, prior
         self._runs = np.ones((7, count))
         self._x = np.zeros((2, count, DYNAMIC))  # sensitivity of the angle, and its rate
-        self._speed = np.full(count, np.nan)  # for which the propagators hold
+        self._speed = np.full(count, np.nan)  # for which the propagators are valid
         self._propagator = np.zeros((6, count))
         self._decay = np.zeros((2, count))
         size = len(UNKNOWNS)
-        self._scale = np.ones((count, size))  # the matrices use the prior standard deviations as units
+        self._scale = np.ones((count, size))  # the prior standard deviations are the units of the matrices
         self.scaled = np.tile(np.eye(size), (count, 1, 1))
         self.known = np.zeros(count)
 
     def start(self, row: int, run: RunSettings, body: Body) -> None:
-        """Start a run, its physics without effects, of a body."""
+        """Start a run with its physics without effects, and a body."""
         inertia = run.yaw_inertia
         stiffness = 0.5 * run.air_density * body.frontal_area * body.length / inertia
         damping = stiffness * body.length
@@ -149,7 +149,7 @@ class Information:
             whole = propagator(a, k, self._interval)
             half = propagator(a, k, 0.5 * self._interval)
             self._propagator = np.stack((*whole, half[1], half[3]))
-        # What u adds to value and rate in each interval: kicks, shape (2, samples, runs, DYNAMIC).
+        # Contribution of u to value and rate in each interval: kicks, shape (2, samples, runs, DYNAMIC).
         h = self._interval
         a, k = self._decay
         _, f01, _, f11, m01, m11 = self._propagator

@@ -1,6 +1,6 @@
 """Pictures of the rig during an episode, off-screen or in MuJoCo's viewer.
 
-A separate model is posed like the run and drawn, so that one window lasts for all episodes and many runs
+A separate model is drawn in the pose of the run, so that one window lasts for all episodes and many runs
 share one rendering context.
 """
 
@@ -86,7 +86,7 @@ class RigView:
                 if not _has_display():
                     remedy = "use render_mode='rgb_array'"
                     raise EnvError("there is no display", where="render_mode human", remedy=remedy)
-                from mujoco import viewer  # imported here because it needs the libraries of a display
+                from mujoco import viewer  # only here: it needs the libraries of a display
 
                 sides = {"show_left_ui": False, "show_right_ui": False}
                 self._window = viewer.launch_passive(self._model, self._data, **sides)
@@ -111,7 +111,7 @@ class RigView:
 
 
 def render_modes() -> list[str]:
-    """The modes that this machine can draw in: a window needs a display."""
+    """The modes in which this machine can draw: a window needs a display."""
     return [mode for mode in RENDER_MODES if mode != "human" or _has_display()]
 
 
@@ -124,7 +124,7 @@ def _has_display() -> bool:
 class _Canvas:
     """An off-screen rendering context.
 
-    `mujoco.Renderer` chooses its back end when MuJoCo is first imported; without a display it then chooses one that
+    `mujoco.Renderer` chooses its back end when MuJoCo is first imported, and without a display chooses one that
     needs a window. Here the back end is chosen when the first picture is drawn.
     """
 
@@ -171,7 +171,7 @@ def _context(width: int, height: int) -> Any:
         except (ImportError, OSError, RuntimeError, AttributeError) as error:
             reasons.append(f"{name}: {' '.join(str(error).split())[:80]}")
             if "MUJOCO_GL" not in os.environ and "OpenGL.platform" not in sys.modules:
-                os.environ.pop("PYOPENGL_PLATFORM", None)  # set by the back end that failed
+                os.environ.pop("PYOPENGL_PLATFORM", None)  # set by the failed back end
         else:
             return context
     raise EnvError(f"off-screen rendering does not work here ({'; '.join(reasons)})", remedy=_REMEDY)

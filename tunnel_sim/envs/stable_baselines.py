@@ -29,7 +29,7 @@ class BaselinesVecEnv(VecEnv):
     Args:
         envs: the native ``gymnasium.make_vec("tunnel_sim/FreeDecay-v0", ...)``, or a ``SyncVectorEnv`` whose
             observations are boxes; either may be in Gymnasium's ``NormalizeObservation``, but in no other wrapper.
-        options: of every reset; properties that they leave out are drawn.
+        options: of every reset; the other properties are drawn.
     """
 
     def __init__(self, envs: VectorEnv[Any, Any, Any], options: dict[str, Any] | None = None) -> None:
@@ -41,7 +41,7 @@ class BaselinesVecEnv(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> Array:
-        """Start all runs, with the seeds of ``seed()`` where there are any."""
+        """Start all runs, with the seeds of ``seed()`` if there are any."""
         seeds: Any = list(self._seeds)
         observations, infos = self._envs.reset(seed=seeds, options=dict(self._common))
         self.reset_infos = [_of_run(infos, row) for row in range(self.num_envs)]
@@ -60,11 +60,11 @@ class BaselinesVecEnv(VecEnv):
         if done.any():
             last, observations = observations, observations.copy()
             # Gymnasium's NormalizeObservation refuses to restart only some of the runs. So they are restarted
-            # inside it, and their observations enter its statistics here.
+            # inside it, and their observations are added to its statistics here.
             first, started = self._inner.reset(options={**self._common, "reset_mask": done})
             fresh = first[done]
             if self._normal is not None:
-                statistics: Any = self._normal.obs_rms  # Gymnasium's class is typed in parts only
+                statistics: Any = self._normal.obs_rms  # Gymnasium's class is only partly typed
                 if self._normal.update_running_mean:
                     statistics.update(fresh)
                 fresh = (fresh - statistics.mean) / np.sqrt(statistics.var + self._normal.epsilon)
@@ -91,7 +91,7 @@ class BaselinesVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the vector environment that takes the index of a run first."""
+        """Call a method of the vector environment whose first argument is the index of a run."""
         method = getattr(self._inner, method_name)
         return [method(row, *method_args, **method_kwargs) for row in self._get_indices(indices)]
 
@@ -106,7 +106,7 @@ class BaselinesVecEnv(VecEnv):
 
 
 def _of_run(infos: dict[str, Any], row: int) -> dict[str, Any]:
-    """The infos of one run from those of a vector environment."""
+    """The infos of one run from the infos of a vector environment."""
     return {
         name: _of_run(value, row) if isinstance(value, dict) else value[row]
         for name, value in infos.items()

@@ -165,7 +165,7 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
 
 
 def _stated(values: dict[str, Any]) -> dict[str, Any]:
-    # NumPy scalars become Python floats, which TOML can hold; -0.0 and all digits are kept.
+    # NumPy scalars become Python floats, as TOML requires; -0.0 and all digits are kept.
     return {
         key: float(value) if isinstance(value, np.floating | np.integer) else value
         for key, value in values.items()
@@ -184,7 +184,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
 
     Args:
         folder: the campaign's folder, or the ``campaign.toml`` in it.
-        progress: called with the number of runs that are read, and of all; None: nothing is reported.
+        progress: called with the numbers of runs read and of all runs; None: nothing is reported.
 
     Returns:
         The campaign, angles in radians.
@@ -251,7 +251,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
 
 
 def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
-    """Refuse what a run states of an input that its column does not have."""
+    """Refuse statements of a run on an input that its column does not have."""
     for key in ("drive_gain", "servo_kv"):
         value = getattr(run, key)
         if value is not None and key not in INPUTS[column].keys:
@@ -264,7 +264,7 @@ def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
 
 
 def as_campaign(given: Campaign | Path | str) -> Campaign:
-    """A campaign, read where its folder, its ``campaign.toml`` or one file of a data logger is given."""
+    """A campaign, read if its folder, its ``campaign.toml`` or one file of a data logger is given."""
     if isinstance(given, Campaign):
         return given
     path = Path(given)
@@ -286,7 +286,7 @@ def write_campaign(
     beside: Mapping[str, bytes] | None = None,
     checked: bool = False,
 ) -> Path:
-    """Write a campaign so that reading it gives the same numbers: whole, or not at all.
+    """Write a campaign so that reading it gives the same numbers: completely, or not at all.
 
     Args:
         campaign: what to write; it must pass every check of the reader.
@@ -294,9 +294,9 @@ def write_campaign(
         run_format: ``parquet`` or ``csv``.
         truth: the simulated truth, written as ``truth.json``; None: no such file.
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
-        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
+        text: makes the text of ``campaign.toml`` from its tables, for comments in it.
         beside: further files of the folder, by name.
-        checked: whether every record has passed `checked_record`, so that this need not be done again.
+        checked: whether every record has already passed `checked_record`, which is then not repeated.
 
     Raises:
         TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
@@ -308,7 +308,7 @@ def write_campaign(
     if run_format not in RUN_FORMATS:
         remedy = did_you_mean(run_format, RUN_FORMATS)
         raise TunnelError(f"unknown run format '{run_format}'", where=shown(folder), remedy=remedy)
-    clear_leftovers(folder.resolve().parent)  # restores what a killed command had set aside
+    clear_leftovers(folder.resolve().parent)  # restores a folder set aside by a killed command
     _check_target(folder, overwrite=overwrite)
     # Run files are named by id where all ids are safe file names, else by number.
     ids = [run.id for run in campaign.runs]
@@ -356,7 +356,7 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
     if entries and not (folder / CAMPAIGN_FILE).is_file():
         remedy = "choose another one, or empty it"
         raise TunnelError("the folder does not contain a campaign", where=where, remedy=remedy)
-    # Files that the writer did not create belong to somebody: replacing the folder would delete them.
+    # Files from another source belong to the user: replacing the folder would delete them.
     own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
     strange = [p for p in entries if p.name not in own]
     runs = folder / RUN_FOLDER

@@ -88,7 +88,7 @@ def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
-    """The conditions of a run, None where they are not stated, and the stated sizes and scatter."""
+    """The conditions of a run, None if they are not stated, and the stated sizes and scatter."""
     stated = _conditions(run)
     return {key: stated.get(key) for key in _condition_keys(campaign)} | _of_campaign(campaign)
 
@@ -99,7 +99,7 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
 
 
 def _conditions(run: Run) -> dict[str, float | str]:
-    """The stated conditions of a run by key; of a driven run those of its input too."""
+    """The stated conditions of a run by key; for a driven run also those of its input."""
     stated: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
     if run.drive is not None:
         stated |= run.drive.stated
@@ -113,7 +113,7 @@ def _input_columns(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
-    """A group for each run, with its id and conditions as attributes; an id may hold any character."""
+    """A group for each run, with its id and conditions as attributes; an id may contain any character."""
     h5py = library("h5py", "HDF5", "import", where)
     with h5py.File(stream, "w") as file:
         file.attrs.update({"name": campaign.name, **_of_campaign(campaign)})
@@ -135,7 +135,7 @@ def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
                 where=where,
                 remedy="choose --file-format hdf5 or mat",
             )
-    # Texts that look like formulas or links stay texts.
+    # Texts that look like formulas or links remain texts.
     options = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
     with xlsxwriter.Workbook(stream, options) as book:
         names = [f"run {place}" for place in range(1, len(campaign.runs) + 1)]

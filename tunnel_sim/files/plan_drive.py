@@ -1,4 +1,4 @@
-"""``[drive]`` of a plan: what drives its runs, and the input of each driven run."""
+"""``[drive]`` of a plan: the kind of drive, and the input of each driven run."""
 
 from __future__ import annotations
 
@@ -78,12 +78,12 @@ class DriveTable(StrictModel):
 
     @property
     def column(self) -> InputColumn:
-        """The column of the input, where it is not that of a file."""
+        """The column of the input, unless a file gives it."""
         return next(kind.column for name, kind in _OF_AMPLITUDES.items() if getattr(self, name))
 
 
 def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
-    """Refuse a drive that misses a key, has one that its kind does not take, or cannot be sampled.
+    """Refuse a drive with a missing key, with a key that its kind does not take, or too fast for the samples.
 
     Args:
         samples: of a run (a count).
@@ -132,7 +132,7 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
 
 
 def _check_gain(gain: float | None, column: InputColumn, where: str) -> None:
-    """Refuse an input that needs a gain and has none, or has one that it does not take."""
+    """Refuse an input that lacks a required gain, or has one that it does not take."""
     needs = INPUTS[column] in _OF_GAIN
     if needs != bool(gain):
         what = f"the input {column} needs a gain" if needs else f"the input {column} does not take a gain"
@@ -147,7 +147,7 @@ def _check_sampled(name: str, frequency: float | None, sample_rate: float, where
 
 
 def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
-    """The input of one driven run that is not that of a file.
+    """The input of one driven run, unless a file gives it.
 
     Args:
         amplitude: peak, in the unit of the input.

@@ -1,4 +1,4 @@
-"""The plan of a campaign: the tables of its TOML file, and reading them; and the tables of an effects file.
+"""The plan of a campaign: the tables of its TOML file, and their reader; and the tables of an effects file.
 
 The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
 """
@@ -182,7 +182,7 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
 
 
 def first_twice(values: Iterable[HashableT]) -> HashableT | None:
-    """The first value that occurs a second time; None where all differ."""
+    """The first value that occurs a second time; None if all differ."""
     seen: set[HashableT] = set()
     for value in values:
         if value in seen:
@@ -209,7 +209,7 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
     Args:
         path: a TOML file like the packaged ``paper-campaign.toml``.
         rig: defines the numbered springs, and the inertia, damping and air density that the description does not
-            state; None uses the packaged rig.
+            state; None: the packaged rig.
 
     Returns:
         The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
@@ -223,7 +223,7 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
 
 
 def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path()) -> CampaignPlan:
-    """The plan defined by a validated campaign description; the file of a drive is sought in the folder."""
+    """The plan from a validated campaign description; a file for the drive is sought in the folder."""
     table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
     given = None
     if table is not None and table.file is not None:

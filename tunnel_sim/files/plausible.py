@@ -1,8 +1,8 @@
-"""Whether a run can be what it is said to be: plausible ranges, increasing times, angles in radians, three cycles.
+"""Plausibility of a run: plausible ranges, increasing times, angles in radians, three cycles.
 
 Outside the plausible ranges of a rig, its air and its clock a wrong unit is more likely than such a rig. The
 ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres. Stiffness
-and inertia have none, because both scale with the fifth power of a rig's size.
+and inertia have no range, because both scale with the fifth power of a rig's size.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record, count_cycles
 
 KEEP = "state plausible = false under [sensor] to keep it"
-#: With fewer samples per cycle the peaks are only resolved to 5 %, and the record may be an undetectable alias of a
-#: motion above half the sample rate.
+#: With fewer samples per cycle the peaks are only resolved to 5 %, and the record may be an undetectable alias of
+#: a motion above half the sample rate.
 LEAST_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 _TWO_TURNS = 4.0 * np.pi
-# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
-# other difference is allowed: a run with times may have a rate of its own.
+# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Other
+# differences are allowed: a run with times may have its own sample rate.
 _TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
 _SLIP_TOLERANCE = 0.1
 MINIMUM_CYCLES = 3.0
-# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
+# The count is uncertain, most with heavy damping or a drifting sensor; a run of three cycles must pass.
 CYCLE_TOLERANCE = 0.25
 # If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
 _SLIP_RATIO = (50.0, 75.0)

@@ -1,4 +1,4 @@
-"""The readers of files, by the ending of the name; and run files: tables of times and angles in CSV or Parquet."""
+"""The readers of files, by file extension; and run files: tables of times and angles in CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names
 
 @dataclass(frozen=True)
 class FileTable:
-    """The table of a run file: at least its `USED_COLUMNS`, perhaps as texts below a line of headings.
+    """The table of a run file: at least its `USED_COLUMNS`, possibly as texts below a line of headings.
 
     Args:
-        names: of all columns of the file, those that the frame leaves out included.
+        names: of all columns of the file, including those that are not in the frame.
     """
 
     frame: pl.DataFrame
@@ -56,14 +56,14 @@ class FileTable:
 
 @dataclass(frozen=True)
 class Reader:
-    """How one format is read. Its functions raise `TunnelError` for content of another format, or too large.
+    """The reader of one format. Its functions raise `TunnelError` for content of another format, or too large.
 
     Args:
         limit: largest file, bytes.
         read_run: the table of a campaign's run file, from its content, its name for messages, and the greatest
             number of samples; None where such files are not run files.
-        read_tables: the tables of a file that an instrument wrote, from its content and its name for messages; it
-            runs in a process with limits. None where such files are imported as text.
+        read_tables: the tables of an instrument's file, from its content and its name for messages; it runs in a
+            process with limits. None where such files are imported as text.
     """
 
     kind: str
@@ -94,12 +94,12 @@ RUN_ENDINGS = (".csv", ".parquet")
 
 
 def reader_place(ending: str) -> str | None:
-    """Where the reader of an ending (with its dot, in small letters) is, ``module:name``; None: nowhere."""
+    """The place ``module:name`` of the reader of an extension (with its dot, in lower case); None: it has none."""
     return READERS.get(ending) or _added_places().get(ending)
 
 
 def load_reader(ending: str) -> Reader | None:
-    """The reader of files with an ending, as for `reader_place`; None where there is none."""
+    """The reader of files with an extension, as in `reader_place`; None where there is none."""
     place = reader_place(ending)
     if place is None:
         return None
@@ -114,20 +114,20 @@ def load_reader(ending: str) -> Reader | None:
 
 
 def run_endings() -> list[str]:
-    """The endings of a campaign's run files, with their dots, those of installed packages included."""
+    """The extensions of a campaign's run files, with their dots, including those of installed packages."""
     readers = ((ending, load_reader(ending)) for ending in {**READERS, **_added_places()})
     return [ending for ending, reader in readers if reader is not None and reader.read_run is not None]
 
 
 @functools.cache
 def _added_places() -> dict[str, str]:
-    """Where the readers of installed packages are, by ending; read once."""
+    """The places of the readers of installed packages, by extension; read once."""
     return {f".{name.lower()}": point.value for name, point in added_to(ENTRY_POINTS).items()}
 
 
 @contextmanager
 def faults(kind: str, where: str) -> Iterator[None]:
-    """Convert whatever a library raises on a malformed file, except `MemoryError`, to a `TunnelError`."""
+    """Convert any exception of a library for a malformed file, except `MemoryError`, to a `TunnelError`."""
     try:
         yield
     except (TunnelError, MemoryError):  # the guard reports memory
@@ -146,12 +146,12 @@ RUN_FORMATS = ("parquet", "csv")
 
 @dataclass(frozen=True, eq=False)
 class RunTableValues:
-    """What a run file holds.
+    """The content of a run file.
 
     Args:
         time_s: sample times, shape (n,), s; None without a column time_s.
         reading: shape (n,), rad, rad/s or rad/s².
-        input: shape (n,), in the unit of its column; None of a free decay.
+        input: shape (n,), in the unit of its column; None for a free decay.
     """
 
     time_s: Array | None
@@ -224,7 +224,7 @@ def _held(
 
 
 def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
-    """Read the input of a driven run, and its times, s, increasing, from a file that need not hold a reading."""
+    """Read the input of a driven run, and its times, s, increasing, from a file that need not contain a reading."""
     held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
     column = _input_column(held.names, where)
     if column is None or "time_s" not in held.names:
@@ -239,10 +239,10 @@ def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
 def table_bytes(
     record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
 ) -> bytes:
-    """The content of a run file, of the path's format, with readings in radians, to the last digit."""
+    """The content of a run file, in the format of the path, with readings in radians, to the last digit."""
     given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
     table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
-    # CSV values have the fewest digits that read back as the same float.
+    # CSV values have the fewest digits that are read as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
@@ -259,7 +259,7 @@ def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
 
 
 def _numbers(series: pl.Series, text: bool, where: str) -> Array:
-    """The values of a column as finite floats, or a message naming the first that is not."""
+    """The values of a column as finite floats, or a message naming the first that is not finite."""
     if series.dtype == pl.String and text:
         numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
     else:
@@ -289,7 +289,7 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     check_count(lines - 1, most, "samples", where, "split the file, or thin it out")
     check_count(lines * columns, limits.CELLS, "cells", where, "leave out columns that are not needed")
     try:
-        # All columns, though few are used: Polars does not see a value too many in a line that it reads in part.
+        # All columns, though few are used: Polars does not detect an extra value in a line that it reads in part.
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
     except pl.exceptions.PolarsError as error:
         what = f"not a comma-separated table ({one_line(error, 60)})"
@@ -306,7 +306,7 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
     if twice is not None:
         raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
-    # Other columns that have no name, or share one, are named by their position.
+    # Other columns without a name, or with a shared one, are named by their position.
     names = [name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)]
     used = [i for i, name in enumerate(names) if name in USED_COLUMNS]
     frame = rows[1:, used]

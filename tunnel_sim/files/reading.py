@@ -29,14 +29,14 @@ _MARKER = "campaign.toml"
 
 
 def nearest(path: Path) -> str:
-    """The file or folder whose name is most similar to a missing one, as a question; empty where none is."""
+    """The file or folder whose name is most similar to a missing one, as a question; empty if there is none."""
     names = [entry.name for entry in _entries(path.parent) if entry.name != path.name]
     found = get_close_matches(path.name, names, n=1)
     return _question(path.parent / found[0]) if found else ""
 
 
 def nearest_campaign(folder: Path) -> str:
-    """The campaign around or inside a folder that is not one, as a question; empty where there is not one."""
+    """The campaign around or inside a folder that is not one, as a question; empty if there is none."""
     around = [folder.parent] if (folder.parent / _MARKER).is_file() else []
     inside = [folder / entry.name for entry in _entries(folder) if (folder / entry.name / _MARKER).is_file()]
     found = around or inside
@@ -44,7 +44,7 @@ def nearest_campaign(folder: Path) -> str:
 
 
 def inside(folder: Path) -> str:
-    """The remedy where a file is wanted and a folder is given: what it is, or a file in it; empty if none."""
+    """The remedy where a folder is given instead of a file: its kind, or a file in it; empty if none."""
     if (folder / _MARKER).is_file():
         return "it is a campaign, which tunnel identify and tunnel diagnose take"
     files = sorted(entry.name for entry in _entries(folder) if (folder / entry.name).is_file())
@@ -127,7 +127,7 @@ def check_utf8(content: bytes, where: str) -> None:
         try:
             decoder.decode(part, final=start + _CHUNK >= len(content))
         except UnicodeDecodeError as error:
-            at = start + len(part) - len(error.object) + error.start  # bytes kept from the piece before
+            at = start + len(part) - len(error.object) + error.start  # bytes kept from the previous piece
             raise _not_utf8(content, at, where) from None
 
 
@@ -142,10 +142,10 @@ def _line(content: bytes, at: int) -> str:
 
 
 def check_lines(content: bytes, where: str, remedy: str) -> None:
-    """Refuse bytes that are not lines of text: with NUL bytes, or longer lines than a table has.
+    """Refuse bytes that are not lines of text: with NUL bytes, or with longer lines than in a table.
 
     Args:
-        remedy: where the text holds NUL bytes.
+        remedy: for NUL bytes in the text.
     """
     nul = content.find(b"\0")
     if nul >= 0:
@@ -162,7 +162,7 @@ def check_lines(content: bytes, where: str, remedy: str) -> None:
 
 
 def is_blank(content: bytes) -> bool:
-    """Whether a file holds nothing but white space."""
+    """Whether a file contains only white space."""
     return not content or content.isspace()
 
 
@@ -216,7 +216,7 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 def frame_schema(
     content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
 ) -> dict[str, pl.DataType]:
-    """The types by name of a Parquet file whose metadata says that it is not too large; no row is read."""
+    """The types by name of a Parquet file whose metadata states an acceptable size; no row is read."""
     import polars as pl
 
     with _parquet_faults(where, remedy):
@@ -252,7 +252,7 @@ def check_count(count: float, limit: int, what: str, where: str, remedy: str) ->
     """Refuse a number above its limit, before anything is expanded; the message states both.
 
     Args:
-        count: the number of what, a plural (a count).
+        count: the number (a count) of ``what``, a plural.
     """
     if not count <= limit:
         number = f"{count:,}" if isinstance(count, int) and count < 10**15 else f"{float(count):.3g}"

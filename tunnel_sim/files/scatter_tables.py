@@ -22,7 +22,7 @@ class RepeatabilityTable(StrictModel):
 
     @property
     def value(self) -> Repeatability | None:
-        """What the table states; None where it states nothing."""
+        """The statement of the table; None if it is empty."""
         found = Repeatability(**self.model_dump())
         return found if found.stated else None
 
@@ -46,5 +46,5 @@ class ScatterTable(StrictModel):
 
     @property
     def value(self) -> Scatter:
-        """What the table states."""
+        """The statement of the table."""
         return Scatter(**self.model_dump())

@@ -89,7 +89,7 @@ def _check_magnitudes(value: object, where: str, key: str = "") -> None:
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document whose ``schema_version`` this program does not read."""
+    """Refuse a document whose ``schema_version`` this program cannot read."""
     remedy = f"put schema_version = {SCHEMA_VERSION} at the top of the file"
     if "schema_version" not in document:
         raise TunnelError("no schema_version", where=shown(path), remedy=remedy)
@@ -115,7 +115,7 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
         problems = error.errors(include_url=False)
         problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
         loc, kind = problem["loc"], problem["type"]
-        # Where it is: run 'r01', [[effects]] number 2, [rig], or nothing for the top level.
+        # The place: run 'r01', [[effects]] number 2, [rig], or nothing for the top level.
         first, number = loc[0], loc[1] if len(loc) >= 2 else None
         where = shown(path)
         if first == "runs" and isinstance(number, int):

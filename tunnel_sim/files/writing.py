@@ -1,8 +1,8 @@
 """Output files: written whole or not at all, as text and as JSON.
 
 While a file or folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target;
-a folder about to be replaced is renamed ``.NAME.MARK.replaced``. The mark holds machine, process and its
-start time, so that another command can tell what a killed one left.
+a folder about to be replaced is renamed ``.NAME.MARK.replaced``. The mark gives machine, process and its
+start time, so that another command can recognise the leftovers of a killed one.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def json_text(document: Mapping[str, object]) -> str:
-    """A document as indented JSON; a number that is not finite is a bug, and a ValueError says where."""
+    """A document as indented JSON; a number that is not finite is a bug, and a ValueError names its place."""
     return _encoded(document, indent=2) + "\n"
 
 
@@ -100,7 +100,7 @@ def temporary_names(target: Path) -> tuple[Path, Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what killed commands of this machine left in a folder, and restore what they had set aside."""
+    """Remove the leftovers of killed commands of this machine from a folder, and restore replaced folders."""
     try:
         names = [entry.name for entry in os.scandir(folder) if entry.name.startswith(".")]
     except OSError:
@@ -121,12 +121,12 @@ def clear_leftovers(folder: Path) -> None:
 
 @lru_cache(maxsize=64)
 def clear_leftovers_once(folder: Path) -> None:
-    """As `clear_leftovers`, but only the first time that this process writes to the folder."""
+    """Call `clear_leftovers`, but only the first time that this process writes to the folder."""
     clear_leftovers(folder)
 
 
 def discard(folder: Path, partial: Path) -> None:
-    """Remove a folder that was set aside; renamed first, so that an interruption does not restore the rest."""
+    """Remove a replaced folder; it is renamed first, so that an interruption does not restore the rest."""
     if folder.exists():
         folder.rename(partial)
         shutil.rmtree(partial, ignore_errors=True)
@@ -180,7 +180,7 @@ def output_folder(folder: Path) -> Path:
 
 
 def remove_empty_folders() -> None:
-    """Remove the folders that this process has made for its output and that hold nothing, as after a full disk."""
+    """Remove empty folders that this process has made for its output, as after a full disk."""
     for folder in sorted(_made, key=lambda path: len(path.parts), reverse=True):
         with suppress(OSError):
             folder.rmdir()
@@ -188,7 +188,7 @@ def remove_empty_folders() -> None:
 
 
 def refuse_unwritable(path: Path) -> None:
-    """Refuse a file that cannot be written, before the work whose result it is for."""
+    """Refuse a file that cannot be written, before the work for its content."""
     target = _target(path)
     if not target.parent.is_dir():
         folder = shown(target.parent)
@@ -206,7 +206,7 @@ def write_whole(path: Path, content: bytes) -> Path:
     """
     target = _target(path)
     with refusals(path):
-        stream = None  # a standard stream of this process, to which a path such as /dev/stdout refers
+        stream = None  # a standard stream of this process, if a path such as /dev/stdout refers to one
         for standard in (sys.__stdout__, sys.__stderr__):
             with suppress(OSError, ValueError):
                 own = standard is not None and os.path.samestat(path.stat(), os.fstat(standard.fileno()))
@@ -235,7 +235,7 @@ def write_encoded(path: Path, encode: Callable[[BinaryIO], object]) -> Path:
 
 
 def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
-    """The output of a library's writer in memory; the path it is meant for is named in messages."""
+    """The output of a library's writer in memory; messages name the path for which it is meant."""
     stream = io.BytesIO()
     with refusals(path):
         encode(stream)
@@ -251,8 +251,8 @@ def write_json(path: Path, document: Mapping[str, object]) -> Path:
 def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
     """Write a folder completely or not at all: a new, empty one, which is renamed at the end.
 
-    Missing parents are created; symbolic links are followed. A folder that holds something is replaced or
-    else refused, also one that another process has written meanwhile.
+    Missing parents are created; symbolic links are followed. A folder with content is replaced or refused,
+    even if another process has written it meanwhile.
     """
     target = Path(os.path.realpath(folder))
     with refusals(folder, (OSError,)):
@@ -268,7 +268,7 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
                 with suppress(OSError):
                     target.rmdir()  # an empty folder may be in the way
             try:
-                partial.rename(target)  # the system refuses it where a folder holds something
+                partial.rename(target)  # the system refuses it where a folder has content
             except BaseException as error:  # also for an interruption: the old folder must be restored
                 if replace and replaced.exists():
                     replaced.rename(target)

@@ -1,7 +1,7 @@
 """An actuator between the stated input and the body: its greatest moment, its greatest rate of change, its lag.
 
-They act in this order: a clipped command changes at a limited rate, and the moment follows that with a lag. So the
-moment keeps to both limits whatever the lag. Before the first sample the input has been constant for long.
+They act in this order: a clipped command changes at a limited rate, and the moment follows it with a lag. So the
+moment obeys both limits for any lag. Before the first sample the input has been constant for long.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
-_JUMP = 1e-8  # of an interval, which a jump takes: a shorter part than the integrator tells from rounding
+_JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot separate a shorter part from rounding
 _ULPS = 8.0  # at least, so that the times still increase in other units
-_SERIES = 0.01  # interval over time constant, below which a series is more exact
-_FIRST_LOOK = 32  # intervals in which the end of a ramp is looked for first
+_SERIES = 0.01  # interval over time constant, below which a series is more accurate
+_FIRST_LOOK = 32  # intervals of the first search for the end of a ramp
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Samples:
         return self.values[:-1] if self.held else self.values[1:]
 
     def clipped(self, limit: float) -> Self:
-        """Within ±``limit``, in the unit of the values; exact for both holds."""
+        """The input limited to ±``limit``, in the unit of the values; exact for both holds."""
         if not np.max(np.abs(self.values)) > limit:
             return self
         time, values = self.time_s, self.values
@@ -61,7 +61,7 @@ class Samples:
         return type(self)(time, np.clip(values, -limit, limit), self.held)
 
     def at_rate(self, rate: float) -> Self:
-        """Followed at a limited rate, in the unit per s; exact for both holds."""
+        """The input followed at a limited rate, in the unit per s; exact for both holds."""
         time, width = self.time_s, np.diff(self.time_s)
         jump = np.diff(self.values)
         if self.held:
@@ -70,9 +70,7 @@ class Samples:
             return self
         ramps = _Ramps(self, rate)
         steep = np.flatnonzero(np.abs(jump) > rate * width)
-        free = np.ones(
-            width.size, np.bool_
-        )  # intervals at whose end the input has been reached without a ramp
+        free = np.ones(width.size, np.bool_)  # intervals at whose end the input is reached without a ramp
         at = 0
         while at < steep.size:
             end = ramps.follow(int(steep[at]), float(self.after[steep[at] - self.held]))
@@ -90,10 +88,10 @@ class Samples:
         return type(self)(both, given[first], False)
 
     def lagged(self, lag: float) -> Self:
-        """Followed with a lag of first order.
+        """The input followed with a first-order lag.
 
-        In every interval the response is a line and an exponential; the line with the same impulse and the same
-        first moment takes the place of the exponential.
+        In every interval the response is a line and an exponential; the exponential is replaced by a line of equal
+        impulse and first moment.
 
         Args:
             lag: time constant, s.
@@ -104,7 +102,7 @@ class Samples:
         slope = (self.before - self.after) / width
         ratio = width / lag
         left, missed = np.exp(-ratio), -np.expm1(-ratio)
-        line = self.after - slope * lag  # which the response approaches, at the interval's start
+        line = self.after - slope * lag  # asymptote of the response, at the interval's start
         added = np.concatenate([self.values[:1], line * missed + slope * width])
         state = recurrence(np.append(0.0, left), added)
         departure = state[:-1] - line
@@ -118,7 +116,7 @@ class Samples:
 
 
 class _Ramps:
-    """The stretches in which an input is followed at the greatest rate, as nodes between which it is linear."""
+    """The stretches in which an input is followed at the greatest rate, as nodes with lines in between."""
 
     def __init__(self, given: Samples, rate: float) -> None:
         self.given, self.rate = given, rate
@@ -130,14 +128,14 @@ class _Ramps:
         self.values.append(np.array([value]))
 
     def follow(self, first: int, value: float) -> int:
-        """Follow from the start of an interval on, until the input has been reached at an interval's end.
+        """Follow the input from the start of an interval until it is reached at an interval's end.
 
         Args:
             first: the interval.
-            value: that has been reached before it.
+            value: reached before it.
 
         Returns:
-            The first interval that starts where the input is.
+            The first interval at whose start the input is reached.
         """
         given, time = self.given, self.given.time_s
         at, look = first, _FIRST_LOOK
@@ -169,7 +167,7 @@ class _Ramps:
                 if since < width:
                     self._node(float(time[at + 1]), float(given.before[at]))
                 return at + 1
-            value -= way * (width - since)  # the input runs away, the other way
+            value -= way * (width - since)  # the input moves away in the opposite direction
             at += 1
             self._node(float(time[at]), value)
         return at
@@ -177,7 +175,7 @@ class _Ramps:
 
 @dataclass(frozen=True)
 class Actuator:
-    """What an actuator makes of the moment that it is told to exert.
+    """The limits of an actuator on the demanded moment.
 
     Args:
         limit: greatest moment, N m; 0: none.
@@ -190,7 +188,7 @@ class Actuator:
     lag: float = 0.0
 
     def exerted(self, asked: Samples, scale: float) -> Samples:
-        """What it makes of the samples asked for.
+        """The moment exerted for the demanded samples.
 
         Args:
             scale: N m per unit of the samples.
@@ -208,14 +206,14 @@ DIRECT = Actuator()
 
 
 def _shortest(time: Array, width: Array) -> Array:
-    """How long a jump takes at these times in intervals of these widths, s, shape (n,)."""
+    """The duration of a jump at these times in intervals of these widths, s, shape (n,)."""
     return np.maximum(_JUMP * width, _ULPS * np.spacing(np.abs(time)))
 
 
 def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
     """States of x_k = factor_k x_(k−1) + added_k from x_(−1) = 0, shape (n,), real or complex."""
     factor, state, reach = factor.copy(), added.copy(), 1
-    while reach < state.size:  # each from twice as many steps as before
+    while reach < state.size:  # each round covers twice as many steps
         state[reach:] += factor[reach:] * state[:-reach]
         factor[reach:] *= factor[:-reach]
         reach *= 2
@@ -223,7 +221,7 @@ def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
 
 
 def _tilt(ratio: Array, left: Array, missed: Array) -> Array:
-    """By how much the line that takes the place of exp(−r v), 0 ≤ v ≤ 1, rises, for every r, shape (n,)."""
+    """Rise of the line that replaces exp(−r v), 0 ≤ v ≤ 1, for every r, shape (n,)."""
     small = ratio < _SERIES
     r = np.where(small, 1.0, ratio)
     exact = (missed - r * left) / r**2 - 0.5 * missed / r

@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.units import NUMBER, Dimension, in_si, product
 
-#: A number, a name, or an operation and what it acts on.
+#: A number, a name, or an operation and its operands.
 Node: TypeAlias = "float | str | tuple[Any, ...]"
 
 _BINARY = {ast.Add: "add", ast.Sub: "subtract", ast.Mult: "multiply", ast.Div: "divide", ast.Pow: "power"}
@@ -67,7 +67,7 @@ def parse(text: str, names: frozenset[str]) -> Expression:
     if len(text) > limits.EXPRESSION_CHARACTERS:
         remedy = f"give one of {limits.EXPRESSION_CHARACTERS} or fewer"
         raise TunnelError(f"an expression of {len(text)} characters", remedy=remedy)
-    if "#" in text:  # Python would take the rest for a comment
+    if "#" in text:  # Python would read the rest as a comment
         raise _refused(f"{one_line(text)!r} is not a formula")
     try:
         with warnings.catch_warnings():
@@ -82,7 +82,7 @@ def parse(text: str, names: frozenset[str]) -> Expression:
     return Expression(text, root)
 
 
-_DEEPEST = 24  # values held at once; the compiled law has room for 32
+_DEEPEST = 24  # values kept at once; the compiled law has room for 32
 
 
 def _refused(what: str) -> TunnelError:
@@ -90,7 +90,7 @@ def _refused(what: str) -> TunnelError:
 
 
 def _node(tree: ast.expr, names: frozenset[str]) -> Node:
-    """The tree of an expression from Python's."""
+    """The tree of an expression from Python's tree."""
     match tree:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             if math.isfinite(value):
@@ -123,7 +123,7 @@ def _names(node: Node) -> set[str]:
 
 
 def _height(node: Node) -> int:
-    """Values that the program holds at once."""
+    """Number of values that the program keeps at once."""
     if not isinstance(node, tuple):
         return 1
     return max(i + _height(one) for i, one in enumerate(node[1:]))
@@ -136,7 +136,7 @@ def _value(node: Node, values: Mapping[str, float | Array]) -> Any:
 
 
 def _folded(node: Node, constants: Mapping[str, float]) -> Node:
-    """The tree with the value of everything that is constant, and with products for small powers."""
+    """The tree with all constants evaluated, and with products for small powers."""
     if isinstance(node, str):
         return constants.get(node, node)
     if not isinstance(node, tuple):
@@ -162,7 +162,7 @@ def _code(node: Node, inputs: Mapping[str, str]) -> tuple[float, ...]:
 
 
 def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
-    """The dimension of a node; None for zero, which has any."""
+    """The dimension of a node; None for zero, which fits any."""
     if isinstance(node, str):
         return known[node]
     if not isinstance(node, tuple):
@@ -196,8 +196,8 @@ def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
     return NUMBER
 
 
-# Terms of the moment law as expressions of angle b (rad) and rate r (rad/s): the coefficient without which there is
-# none, the effect in words, and the moment (N m).
+# Terms of the moment law as expressions of angle b (rad) and rate r (rad/s): the coefficient that enables the term,
+# the effect in words, and the moment (N m).
 _CUBIC = "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)"
 _SQUARE = "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent"
 _DAMPING = "-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)"

@@ -1,6 +1,6 @@
 """The compiled forward integrator: the plugin's moment law without MuJoCo, for fits of many runs.
 
-It uses RK4 steps, treats the aerodynamic lag as the plugin does, and locates reversals under Coulomb
+It uses RK4 steps, computes the aerodynamic lag as the plugin does, and locates reversals under Coulomb
 friction. Tests compare it with the MuJoCo model for every term. Calls release the global interpreter lock.
 """
 
@@ -26,12 +26,12 @@ _NONE: Array = np.zeros(0)
 def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
     """Integrate runs of equal length: angle (rad) and rate (rad/s) of the rod's upper end, shape (n, samples).
 
-    The status is 0, or one more than the index of the first run whose motion grew without bound (that run and
+    The status is 0, or one more than the index of the first run whose motion diverged (that run and
     the later ones are unset).
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; the arrays that its pointers name must stay alive.
+        runs: shape (n,), of `run_dtype`; the arrays behind its pointers must stay alive.
         samples: samples per run, the first at time 0.
     """
     count = len(runs)
@@ -52,7 +52,7 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
 
 
 def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:
-    """Integrate one run with its timestep; a ValueError where the motion grows without bound.
+    """Integrate one run with its timestep; a ValueError where the motion diverges.
 
     Args:
         sample_rate: Hz.
@@ -68,7 +68,7 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 
 
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
-    """A run at its release for the compiled code, shape (1,), of `run_dtype`, and the arrays to be kept alive."""
+    """A run at its release for the compiled code, shape (1,), of `run_dtype`, and the arrays to keep alive."""
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
@@ -117,7 +117,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         }
     names = run_dtype().names
     assert names is not None
-    row = tuple(fields.get(name, 0) for name in names)  # in one go: setting fields one by one is slow
+    row = tuple(fields.get(name, 0) for name in names)  # at once: setting single fields is slow
     return np.array([row], dtype=run_dtype()), (values, imposed, beside, program, *driven)
 
 
@@ -135,10 +135,10 @@ def backlash(angle: Array, half_width: float, start: float) -> Array:
     return result
 
 
-# A rod rings many times faster than the body swings and decays soon, but an integrator has to follow it to the
+# A rod rings many times faster than the body swings and decays soon, but an integrator has to resolve it to the
 # end. Here the two oscillations of the linear rig are separated instead. The slow one is integrated with a rigid
 # rod whose inertia, damping and lead of the body give its exact frequency, damping and shape. The ringing is added
-# in closed form. Nonlinear terms act on the slow motion alone.
+# in closed form. Nonlinear terms act only on the slow motion.
 
 #: How many times faster than the body the rod must ring for the two to be separated.
 SEPARATION = 5.0
@@ -175,11 +175,11 @@ class Ringing:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """A run with a rigid rod that moves as the slow oscillation of the run with a flexible one.
+    """A run with a rigid rod and the slow oscillation of the run with a flexible rod.
 
     Args:
         lead: of the body before the upper end, as a share of the angle there.
-        rod_stiffness: of the rod that leads, seen from the upper end, N m/rad.
+        rod_stiffness: of the leading rod, seen from the upper end, N m/rad.
         body_release: the body's release angle, rad.
     """
 
@@ -220,7 +220,7 @@ def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
     lead, root = 0j, 0j
     for _ in range(_MOST_ITERATIONS):
         previous = root
-        # the whole rig's balance, its body moving 1 + lead times as far as the upper end
+        # the balance of the whole rig, whose body moves 1 + lead times as far as the upper end
         body = 1.0 + lead
         root = _upper_root(upper + lower * body, loss - air_damping * body, spring - air * body)
         lead = lead_at(root)

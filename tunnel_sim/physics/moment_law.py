@@ -1,6 +1,6 @@
-"""The compiled moment law: where its library lies, and the names of parameters, states and operations it lists.
+"""The compiled moment law: the place of its library, and its names of parameters, states and operations.
 
-Python looks the names up, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
+Python reads the names from it, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def parameter_units() -> Mapping[str, str]:
 
 
 def parameter_vector(values: Mapping[str, float]) -> Array:
-    """The law's parameters, in its units, in the form that the compiled code takes; those not given are zero."""
+    """The law's parameters, in its units, in the form of the compiled code; the others are zero."""
     return np.array([float(values.get(name, 0.0)) for name in parameter_names()])
 
 
@@ -82,7 +82,7 @@ def state_names() -> tuple[str, ...]:
 
 
 def state_vector(values: Mapping[str, float]) -> Array:
-    """The plugin's state (rad, rad/s, s) in the form of ``mjData.plugin_state``; values not given are zero."""
+    """The plugin's state (rad, rad/s, s) in the form of ``mjData.plugin_state``; the other values are zero."""
     if unknown := set(values) - set(state_names()):
         raise ValueError(f"the plugin's state has no {', '.join(sorted(unknown))}")
     return np.array([float(values.get(name, 0.0)) for name in state_names()])

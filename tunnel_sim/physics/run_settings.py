@@ -42,7 +42,7 @@ def _check(name: str, value: float, *, above: float = -inf, least: float = -inf)
 
 @cache
 def _further() -> frozenset[str]:
-    """Names of the law's parameters that have no field of their own."""
+    """Names of the law's parameters without a field of their own."""
     return frozenset(parameter_names()) - _OWNED
 
 
@@ -68,7 +68,7 @@ class Series:
 
 @dataclass(frozen=True)
 class RodTwist:
-    """A rod that twists between its upper end, which carries spring and sensor, and the body.
+    """A rod that twists between its upper end, with spring and sensor, and the body.
 
     Args:
         compliance: 1/Krod, rad/(N m), positive.
@@ -116,11 +116,11 @@ class DriveMoment:
         time_s: of the samples, since the run's start, shape (n,), s, increasing.
         values: at these times, shape (n,), any unit.
         scale: N m per unit.
-        delay: by which it acts later than its samples, s.
+        delay: time by which it acts later than its samples, s.
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
-        actuator: what stands between the samples and the body.
-        offset: a constant moment beside it, which does not pass through the actuator, N m.
-        by_actuator: whether it is what an actuator is asked for, where it acts on the body.
+        actuator: limits and lag between the samples and the body.
+        offset: an added constant moment, which does not pass through the actuator, N m.
+        by_actuator: whether it is the demand on an actuator, where it acts on the body.
     """
 
     time_s: Array
@@ -144,7 +144,7 @@ class DriveMoment:
 
     @cached_property
     def acting(self) -> DriveMoment:
-        """What acts, as samples that need no actuator and no offset."""
+        """The acting moment, as samples without an actuator or an offset."""
         if self.actuator == DIRECT and not self.offset:
             return self
         given = self.actuator.exerted(Samples(self.time_s, self.values, self.held), self.scale)
@@ -155,12 +155,12 @@ class DriveMoment:
 
     @property
     def through_actuator(self) -> bool:
-        """Whether it is a moment that an actuator exerts, which the effects of an actuator change."""
+        """Whether it is a moment exerted by an actuator, which the effects of an actuator change."""
         return self.on_body and self.by_actuator
 
     @property
     def as_sampled(self) -> bool:
-        """Whether it acts at the times of its samples, and as they are; a constant moment may be beside it."""
+        """Whether it acts at the times and with the values of its samples; a constant moment may be added."""
         return self.delay == 0.0 and self.actuator == DIRECT
 
     @property
@@ -206,13 +206,13 @@ class DriveMoment:
     def oscillation(
         self, frequency: float, damping_ratio: float, time_s: Array, derivative: int = 0
     ) -> Array:
-        """How an oscillator follows the moment u from rest: q̈ + 2ζω q̇ + ω² q = ω² u, exact for both holds.
+        """The response of an oscillator at rest to the moment u: q̈ + 2ζω q̇ + ω² q = ω² u, exact for both holds.
 
         Args:
             frequency: undamped, ω, rad/s.
             damping_ratio: ζ below 1, dimensionless.
             time_s: since the run's start, at which it begins at rest, shape (n,), s.
-            derivative: which derivative of q is asked for: 0, 1 or 2.
+            derivative: which derivative of q is returned: 0, 1 or 2.
 
         Returns:
             q in N m, or its derivative per s or s², shape (n,).
@@ -319,13 +319,13 @@ class RunSettings:
         """
         parameters = {**self.parameters, **values}
         if not values.keys() <= _further():
-            return replace(self, parameters=parameters)  # which says what is wrong
+            return replace(self, parameters=parameters)  # its checks raise the error
         copy = object.__new__(RunSettings)  # its other fields were checked
         copy.__dict__.update(self.__dict__, parameters=parameters)
         return copy
 
     def with_deviations(self, deviations: Mapping[str, float]) -> RunSettings:
-        """A copy whose wind speed, spring or mechanical damping differ from what is stated; never below zero.
+        """A copy whose wind speed, spring or mechanical damping deviate from their statements; never below zero.
 
         Args:
             deviations: relative, by name, dimensionless.
@@ -339,7 +339,7 @@ class RunSettings:
         return replace(self, series=series, **changed)
 
     def layout(self) -> tuple[object, ...]:
-        """What runs must have in common to share one compiled model.
+        """Properties that runs must share to use one compiled model.
 
         Returns:
             Timestep, names and lengths of the series, lengths of program and drive, the drive's delay, and whether
@@ -381,14 +381,14 @@ def spring_end_angle(run: RunSettings) -> float:
 
 
 def released_by_spring_end(run: RunSettings) -> RunSettings:
-    """The run with the body's release angle, given one with that of the spring's end, which a record shows."""
+    """The run with the body's release angle, given the angle of the spring's end, which a record shows."""
     if run.rod_twist is None:
         return run
     return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
 
 
 def _body_per_end(run: RunSettings) -> float:
-    """The body's angle over that of the spring's end, in balance; 1 for a rigid rod."""
+    """The ratio of the body's angle to the spring end's, in balance; 1 for a rigid rod."""
     twist = run.rod_twist
     return 1.0 if twist is None else 1.0 + run.spring_stiffness * twist.compliance
 

@@ -30,7 +30,7 @@ def column_places() -> Mapping[str, int]:
 
 @functools.cache
 def _further() -> Mapping[str, int]:
-    """Places of the law's parameters that `RunSettings` has no field for."""
+    """Places of the law's parameters that have no field in `RunSettings`."""
     own = {*_FIELDS, *_DERIVATIVES, *_SIZES}
     return {name: place for name, place in column_places().items() if name not in own}
 
@@ -39,7 +39,7 @@ def _further() -> Mapping[str, int]:
 class SettingsTable:
     """The settings of many runs, which effects change in place.
 
-    An integration step is not among them, since a fit chooses its own.
+    The integration step is not included, since a fit chooses its own.
 
     Args:
         numbers: the numbers of `RunSettings` and the law's parameters by column (`column_places`), in their units,
@@ -58,13 +58,13 @@ class SettingsTable:
 
     @classmethod
     def empty(cls, count: int) -> SettingsTable:
-        """So many runs whose numbers are 0."""
+        """A table of this many runs whose numbers are 0."""
         numbers = np.zeros((count, len(column_places())))
         return cls(numbers, [{}] * count, [None] * count, [()] * count, [None] * count)
 
     @classmethod
     def of(cls, runs: Sequence[RunSettings]) -> SettingsTable:
-        """A table of some runs."""
+        """A table from some runs."""
         table = cls.empty(len(runs))
         for place, run in enumerate(runs):
             table.put(place, run)
@@ -100,7 +100,7 @@ class SettingsTable:
         return self.numbers[:, : len(parameter_names())]
 
     def copy(self) -> SettingsTable:
-        """A table that changes apart from this one."""
+        """An independent copy of the table."""
         lists = (list(self.series), list(self.rod_twist), list(self.program), list(self.drive))
         return SettingsTable(self.numbers.copy(), *lists)
 

@@ -22,7 +22,7 @@ def term_places() -> Mapping[str, int]:
 
 @functools.cache
 def most_winds() -> int:
-    """How many changes of a wind of samples there may be derivatives along."""
+    """Greatest number of changes of a sampled wind for which derivatives are computed."""
     return int(forward_library().vwt_most_winds())
 
 
@@ -31,7 +31,7 @@ def terms(law: Array, runs: NDArray[np.void]) -> Array:
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; the arrays that its pointers name must stay alive.
+        runs: shape (n,), of `run_dtype`; the arrays behind its pointers must stay alive.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     values = np.zeros((len(runs), len(term_places())))
@@ -45,10 +45,11 @@ class Slopes:
 
     Args:
         angle: of the rod's upper end, rad, shape (n, samples).
-        rate: of it, rad/s, shape (n, samples).
-        by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where there is
-            none; or of the weighted sums, shape (n, columns, samples − 1). Along changes of the wind they are last.
-        by_rate: derivatives of the rate, of that shape; of weighted sums none.
+        rate: of the rod's upper end, rad/s, shape (n, samples).
+        by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where they do
+            not exist; or of the weighted sums, shape (n, columns, samples − 1). Along changes of the wind they are
+            last.
+        by_rate: derivatives of the rate, of that shape; none for weighted sums.
         status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
     """
 
@@ -76,8 +77,8 @@ def slopes(
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
             between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
-        winds: changes of the winds of samples, along which there are derivatives too, m/s, by run, shape (changes,
-            samples of the run's wind), `most_winds` changes at most; in a constant wind the derivatives are NaN.
+        winds: changes of the sampled winds, along which derivatives are also computed, m/s, by run, shape (changes,
+            samples of the run's wind), at most `most_winds` changes; in a constant wind the derivatives are NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     runs["samples"] = samples

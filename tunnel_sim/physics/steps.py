@@ -1,4 +1,4 @@
-"""How long an integration step may be; no other module decides it.
+"""The length of an integration step; no other module decides it.
 
 With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of
 angular frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120: a spurious damping ratio of
@@ -6,8 +6,8 @@ angular frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)
 its spring (`FREQUENCY_ERROR`), for a flexible rod's own mode to half a radian, and for any mode to
 `_UNSTABLE`.
 
-Fits predict thousands of runs: their steps are longer (`fit_substeps`) and make up for their own error
-(`compensated`). What is reported is predicted once more in shorter steps (`report_substeps`). Steps are only
+Fits predict thousands of runs: their steps are longer (`fit_substeps`), with compensation for their error
+(`compensated`). Reported results are predicted again in shorter steps (`report_substeps`). Steps are only
 divided by whole numbers, so that a sample interval remains a whole number of steps.
 """
 
@@ -34,20 +34,20 @@ BODY_TURN = (120.0 * FREQUENCY_ERROR) ** 0.25
 ROD_TURN = 0.5
 #: Greatest number by which a step is divided: a run then takes hundreds of times the usual time and memory.
 MOST_SUBSTEPS = 320
-USUAL_RATE = 1000.0  # steps per second where no faster motion asks for more
-#: Shortest step, s; by a rounding less than `MOST_SUBSTEPS` of the usual one.
+USUAL_RATE = 1000.0  # steps per second, unless a faster motion requires more
+#: Shortest step, s; slightly less than `MOST_SUBSTEPS` of the usual one, for rounding.
 LEAST_STEP = 0.999 / (USUAL_RATE * MOST_SUBSTEPS)
 
-#: Longest step of what is reported, s.
+#: Longest step of reported results, s.
 REPORT_STEP = 2e-3
 
 _FIT_STEP = 8.75e-3  # s: a body at the 2 Hz to which the fits scale time turns by `_FIT_BODY_TURN`
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
 _FIT_MOST_STRIDE = 3  # block means per step
-#: Parameters of moments that a long step of a fit does not follow: kinks, and a spring that is not linear.
+#: Parameters of moments that a long step of a fit does not resolve: kinks, and a nonlinear spring.
 _ROUGH = ("friction_moment", "free_play", "gravity_stiffness")
-_FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, which leaves an error of second order
-_FIT_SHORTEST = 2e-4  # s, however stiff the rod
+_FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, whose error is of second order
+_FIT_SHORTEST = 2e-4  # s, for any stiffness of the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
 _REPORT_ROD_TURN = 0.25  # rad
 _REPORT_SHORTEST = 1e-4  # s
@@ -63,10 +63,10 @@ def whole_steps(sample_rate: float) -> float:
 
 
 def fit_substeps(runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
-    """How many steps the fits take from one block mean to the next, shape (runs,).
+    """Number of steps of the fits from one block mean to the next, shape (runs,).
 
-    A fit may try a body that turns more than half a turn between block means. Such a body is not followed: the
-    steps are too long for it, and its motion decays at once or grows without bound.
+    A fit may try a body that turns more than half a turn between block means. The steps are too long to resolve
+    such a body, and its motion decays at once or diverges.
 
     Args:
         interval: between block means, s, shape (runs,).
@@ -82,7 +82,7 @@ def fit_substeps(runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
 
 
 def fit_stride(rig: Rig, runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
-    """How many block means one step of a fit covers, shape (runs,); the motion between its ends is cubic.
+    """Number of block means in one step of a fit, shape (runs,); the motion between its ends is cubic.
 
     The rods are rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
 
@@ -101,8 +101,8 @@ def compensated(law: Array, wind_speed: Array, step: Array) -> tuple[Array, Arra
     """The moment laws and the steps with which the method's leading errors in a linear oscillation vanish.
 
     Per step h the method turns a root λ by λh − (λh)⁵/120 + (λh)⁶/144. For an oscillation that decays slowly, at
-    the rate σ, this is ωh (1 − (ωh)⁴/120): the step is made longer by that share. The decay is then
-    σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper makes up for both. What is left is of the order (ωh)⁵.
+    the rate σ, this is ωh (1 − (ωh)⁴/120): the step is lengthened by that share. The decay is then
+    σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper compensates for both. The residual error is of the order (ωh)⁵.
 
     Args:
         law: shape (runs, parameters), in the law's order.
@@ -116,14 +116,14 @@ def compensated(law: Array, wind_speed: Array, step: Array) -> tuple[Array, Arra
     air = aerodynamic_stiffness(law[:, at["cn_beta"]], **flow)
     damping = loss - aerodynamic_damping(law[:, at["cn_r"]], **flow)
     rate = np.sqrt(np.maximum(0.0, law[:, at["spring_stiffness"]] - air) / inertia)
-    turn = np.minimum(rate * step, _FIT_BODY_TURN)  # a body too fast for the steps is not followed
+    turn = np.minimum(rate * step, _FIT_BODY_TURN)  # a body too fast for the steps is not compensated
     found = law.copy()
     found[:, at["mechanical_damping"]] += damping * turn**4 / 30.0 - inertia * rate * turn**5 / 72.0
     return found, step * (1.0 + turn**4 / 120.0)
 
 
 def report_substeps(run: RunSettings, interval: float) -> int:
-    """How many steps the prediction that is reported takes from one block mean to the next.
+    """Number of steps of the reported prediction from one block mean to the next.
 
     Args:
         interval: between block means, s.
@@ -141,10 +141,10 @@ def for_rod(run: RunSettings) -> RunSettings:
 
 
 def for_contact(run: RunSettings) -> RunSettings:
-    """The run with steps short enough for the contact that rubs.
+    """The run with steps short enough for a rubbing contact.
 
     The motion after a reversal covers at most half the presliding range, and friction that depends on the rate
-    changes the rate by at most half of what the friction itself changes over.
+    changes the rate by at most half of the friction's own range of rates.
     """
     reach, friction, peak = (
         run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
@@ -181,7 +181,7 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
 
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
-    """As `body_rates`, of one run, rad/s."""
+    """The rate of `body_rates` for one run, rad/s."""
     return float(body_rates(rig, SettingsTable.of([run]))[0])
 
 
@@ -190,7 +190,7 @@ def body_rates(rig: Rig, runs: SettingsTable) -> Array:
 
     In rad/s, shape (runs,).
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # a fit may try a law that grows without bound
+    with np.errstate(over="ignore", invalid="ignore"):  # a fit may try a diverging law
         return _body_rates(rig, runs)
 
 

@@ -19,7 +19,7 @@ class EnvError(TunnelError, ValueError):
 
 @contextmanager
 def env_errors(environment: str, argument: str) -> Iterator[None]:
-    """Convert errors of a lower layer within the block: they then name the environment and its argument."""
+    """Convert errors of a lower layer within the block, so that they name the environment and its argument."""
     try:
         yield
     except EnvError:
@@ -31,7 +31,7 @@ def env_errors(environment: str, argument: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Number:
-    """What a number may be.
+    """The allowed values of a number.
 
     Args:
         least, most: bounds, in the unit; infinite: none.
@@ -48,7 +48,7 @@ class Number:
 
     @property
     def words(self) -> str:
-        """Such as ``a number above 0``."""
+        """The range in words, such as ``a number above 0``."""
         noun = "a whole number" if self.whole else "a number"
         if self.most < inf:
             bounds = f"above {self.least:g} and at most {self.most:g}"
@@ -83,10 +83,10 @@ def checked_numbers(
     """The numbers of a list, each of a kind.
 
     Args:
-        length: how many there must be; None: one or more, none of them twice.
+        length: required number of values; None: one or more, without repetition.
 
     Raises:
-        EnvError: when it is not a list, or a number of it is refused.
+        EnvError: when it is not a list, or one of its numbers is refused.
     """
     example = "one number or more" if length is None else counted(length, "number")
     remedy = f"give {example} in a list or tuple{kind.unit and f', in {kind.unit}'}"

@@ -1,4 +1,4 @@
-"""Differences between the runs of a campaign: what is known of them, and what a simulation draws."""
+"""Differences between the runs of a campaign: statements on them, and their draws in a simulation."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 USUAL_SCATTER: Mapping[str, float] = {
-    "wind_speed": 0.003,  # a good tunnel holds its speed to some tenths of a per cent
-    "spring_stiffness": 0.0005,  # a spring that is clamped again comes back to some hundredths
-    "mechanical_damping": 0.01,  # bearings and cables come back to a per cent
+    "wind_speed": 0.003,  # a good tunnel keeps its speed to some tenths of a per cent
+    "spring_stiffness": 0.0005,  # a spring clamped again repeats to some hundredths of a per cent
+    "mechanical_damping": 0.01,  # bearings and cables repeat to a per cent
 }
 """What may differ between runs, and by how much it does in a usual rig: one standard deviation, relative."""
 
@@ -30,7 +30,7 @@ LARGEST_DRIFT = 0.5
 
 @dataclass(frozen=True)
 class Repeatability:
-    """What the experimenter knows of the scatter between runs, as one standard deviation; None where not stated.
+    """The experimenter's statement on the scatter between runs, as one standard deviation; None where not stated.
 
     Args:
         wind_speed: of the true speed about the stated one, a fraction of it.
@@ -54,19 +54,19 @@ class Repeatability:
 
     @property
     def stated(self) -> dict[str, float]:
-        """The numbers that are stated, by name, dimensionless."""
+        """The stated numbers, by name, dimensionless."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Differences between the runs of a simulated campaign, whose labels do not show them.
+    """Differences between the runs of a simulated campaign, which its labels do not show.
 
     Args:
         wind_speed, spring_stiffness, mechanical_damping: standard deviation between runs, a fraction of each.
         zero: standard deviation of the sensor's zero between runs, rad.
-        spring_stiffness_drift, wind_speed_drift_between_runs: change from the first to the last run, which is in
-            proportion to the number of the run, a fraction of each.
+        spring_stiffness_drift, wind_speed_drift_between_runs: change from the first to the last run, proportional
+            to the number of the run, a fraction of each.
     """
 
     wind_speed: float = 0.0
@@ -89,22 +89,22 @@ class Scatter:
 
     @property
     def _drifts(self) -> dict[str, str]:
-        """The drift of each number that has one."""
+        """The drift of each property that has one."""
         return {"spring_stiffness": "spring_stiffness_drift", "wind_speed": "wind_speed_drift_between_runs"}
 
     @property
     def stated(self) -> dict[str, float]:
-        """The numbers that are not zero, by name, dimensionless, and rad of ``zero``."""
+        """The nonzero numbers, by name, dimensionless, and rad for ``zero``."""
         return {name: float(value) for name, value in vars(self).items() if value != 0.0}
 
     def deviations(self, rng: np.random.Generator, share: Array) -> list[dict[str, float]]:
-        """Draw the deviations of runs; those of the first runs do not depend on how many there are.
+        """Draw the deviations of runs; those of the first runs do not depend on the number of runs.
 
         Args:
-            share: how far each run is from the first to the last, 0 to 1, shape (runs,), a fraction.
+            share: position of each run from the first to the last, 0 to 1, shape (runs,), a fraction.
 
         Returns:
-            By run, the deviation of every number that scatters or drifts: relative, and rad of ``zero``.
+            By run, the deviation of every property that scatters or drifts: relative, and rad for ``zero``.
         """
         found = []
         for along in share.tolist():
@@ -123,13 +123,13 @@ _APART = 2**32 - 1
 
 
 def between_runs(seed: np.random.SeedSequence) -> np.random.Generator:
-    """The generator of the scatter: apart from those spawned from the same seed, whose draws stay as they are."""
+    """The generator of the scatter, apart from those spawned from the same seed, whose draws do not change."""
     key = (*seed.spawn_key, _APART)
     return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
 
 
 def together(one: float, other: float) -> float:
-    """Two deviations at once; exact where one of them is zero.
+    """The sum of two deviations; exact where one of them is zero.
 
     Args:
         one: relative, dimensionless.
@@ -139,7 +139,7 @@ def together(one: float, other: float) -> float:
 
 
 def along(runs: int) -> Array:
-    """How far each run is from the first to the last, from 0 to 1, shape (runs,), a fraction; 0 of a single run.
+    """Position of each run from the first to the last, from 0 to 1, shape (runs,), a fraction; 0 for a single run.
 
     Args:
         runs: a count.

@@ -42,7 +42,7 @@ class RigProperties:
 
     @classmethod
     def of(cls, rig: Rig) -> RigProperties:
-        """What a campaign on a rig states; the inertia is the nominal one."""
+        """The statements of a campaign on a rig; the inertia is the nominal one."""
         body = rig.body
         return cls(rig.dynamics.yaw_inertia, body.frontal_area, body.length, body.width)
 
@@ -67,7 +67,7 @@ class SensorProperties:
 
     @classmethod
     def of(cls, sensor: SensorModel) -> SensorProperties:
-        """What a campaign with a sensor states; the zero is not known."""
+        """The statements of a campaign with a sensor; the zero is not known."""
         return cls(sensor.sample_rate, sensor.resolution or None, sensor.noise_std or None)
 
     @property
@@ -87,7 +87,7 @@ class Run:
 
     Args:
         wind_speed: V, m/s; 0 is wind-off.
-        spring_stiffness: Kr, N m/rad; of a run with a ``command_rad`` the servo's kp; None: the run is identified
+        spring_stiffness: Kr, N m/rad; for a run with a ``command_rad`` the servo's kp; None: the run is identified
             in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
@@ -108,19 +108,19 @@ class Run:
 
     @property
     def unrestrained(self) -> bool:
-        """Whether neither a spring nor the air holds the body, so that its stiffness is known to be 0."""
+        """Whether neither a spring nor the air restrains the body, so that its stiffness is known to be 0."""
         return self.spring_stiffness == 0.0 and not self.wind_on
 
     @property
     def input_gain(self) -> float | None:
-        """The moment on the body per unit of the input, N m; None where it is not known, and of a free decay."""
+        """The moment on the body per unit of the input, N m; None where it is not known, and for a free decay."""
         if self.drive is None:
             return None
         return self.drive.kind.gain(self.drive.gain, self.spring_stiffness)
 
     @property
     def known_gain(self) -> KnownGain | None:
-        """The gain of the input over the inertia, where the run's own motion gives it; None of a free decay too."""
+        """The gain of the input over the inertia, where the run's motion gives it; None for a free decay too."""
         return None if self.drive is None else self.drive.kind.known_gain(windy=self.wind_on)
 
     def to_xarray(self) -> Dataset:
@@ -158,7 +158,7 @@ class Campaign:
     Args:
         name: short name, also of the folder.
         runs: at least one run, with unique ids.
-        law: of the joint in a model of one's own; None: spring and damper.
+        law: of the joint in the user's model; None: spring and damper.
         repeatability: stated scatter between runs; None: nothing is stated.
     """
 
@@ -177,11 +177,11 @@ class Campaign:
 
     @property
     def unrestrained(self) -> bool:
-        """Whether nothing holds the body in any run (`Run.unrestrained`)."""
+        """Whether the body is unrestrained in every run (`Run.unrestrained`)."""
         return all(run.unrestrained for run in self.runs)
 
     def without(self, ids: Collection[str]) -> Campaign:
-        """The other runs; the campaign itself where none is named.
+        """The other runs; the campaign itself if no id is given.
 
         Args:
             ids: of the runs to leave out.
@@ -221,6 +221,6 @@ class Campaign:
 
 
 def _between(values: list[float]) -> str:
-    """Least and greatest, such as ``16.1 to 44.8``; one number where they are alike."""
+    """Least and greatest, such as ``16.1 to 44.8``; one number where they are equal."""
     low, high = (f"{end:.3g}" for end in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"

@@ -1,4 +1,4 @@
-"""The input of a driven run at the samples of its record, and what is refused of it."""
+"""The input of a driven run at the samples of its record, and the checks that refuse bad inputs."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ HOLDS: tuple[Hold, ...] = ("zero", "linear")
 DRIVE_KEYS = ("drive_hold", "drive_gain", "servo_kv")
 """The keys of a run that state its input."""
 
-_CONSTANT = 1e-9  # of the largest value, within which an input counts as constant
+_CONSTANT = 1e-9  # of the largest value, within which an input is constant
 _ITSELF = 1e-7  # share of the variance by which an input must differ from every multiple of the response
 _FLAT = 3  # equal extreme values in a row that a clipped input has
-_CLIPPED = 0.01  # share of the samples at an extreme, from which on it is clipped
+_CLIPPED = 0.01  # share of the samples at an extreme, from which an input is clipped
 _LEVELS = 0.6  # share of the samples at both extremes, above which they are the levels of a square wave
 _NEIGHBOURS = 5.0  # samples at the extreme for each one within a hundredth of the range of it
 
@@ -34,13 +34,13 @@ class Drive:
     """The input of a run at the samples of its record.
 
     Args:
-        column: of a run file, which says what kind of input it is (`INPUTS`).
+        column: of a run file, which determines the kind of input (`INPUTS`).
         values: at the times of the record, shape (n,), in the unit of the column.
-        hold: between the samples; None: not stated, and taken as linear.
-        gain: of an input that takes one, N m per unit: of a ``base_acceleration_m_s2`` mass times arm, kg m. None
+        hold: between the samples; None: not stated, and assumed linear.
+        gain: N m per unit, for kinds that take one; for ``base_acceleration_m_s2`` mass times arm, kg m. None
             where it is not stated.
-        servo_kv: of the servo of a ``command_rad``, which is a damper to the ground, N m s/rad; None where it is
-            not stated. The servo's kp is the stiffness of the run's spring.
+        servo_kv: for ``command_rad``, the servo's damping against the ground, N m s/rad; None where it is not
+            stated. The servo's kp is the stiffness of the run's spring.
     """
 
     column: InputColumn
@@ -55,7 +55,7 @@ class Drive:
 
     @property
     def stated(self) -> dict[str, float | str | None]:
-        """What is stated of it, by the key of the format (`DRIVE_KEYS`), in its units; None where it is not."""
+        """Its stated properties by the key of the format (`DRIVE_KEYS`), in its units; None where not stated."""
         return {"drive_hold": self.hold, "drive_gain": self.gain, "servo_kv": self.servo_kv}
 
     @property
@@ -65,7 +65,7 @@ class Drive:
 
     @property
     def kind(self) -> Input:
-        """What kind of input it is."""
+        """The kind of input."""
         return INPUTS[self.column]
 
     @property
@@ -75,12 +75,12 @@ class Drive:
 
     @property
     def gain_stated(self) -> bool:
-        """Whether its moment on the body follows from what the run states, without an inertia or a fitted gain."""
+        """Whether its moment on the body follows from the run's statements, without an inertia or a fitted gain."""
         return self.kind.gain(self.gain, 1.0) is not None
 
 
 def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
-    """Refuse an input that cannot be that of its record; where it is ``judged``, one that looks clipped too."""
+    """Refuse an input that cannot belong to its record; where ``judged``, also one that looks clipped."""
     values, name = drive.values, drive.column
     if values.shape != record.yaw_rad.shape:
         what = f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}"
@@ -105,9 +105,9 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         return
     if (
         np.mean((values[1:] == values[:-1])[between]) > 0.5
-    ):  # it stands at every level, not at the extremes alone
+    ):  # it stays at every level, not only at the extremes
         return
-    # It is clipped where it stands at an extreme for some samples again and again, and is seldom near it.
+    # A clipped input is often at an extreme for several samples, and seldom near it.
     for end in ends:
         there = values == end
         count = int(np.count_nonzero(there))
@@ -134,8 +134,8 @@ def refuse_untreated(
     """Refuse an input with which no driven run can be identified or diagnosed.
 
     Args:
-        spring_stiffness: as stated, N m/rad; None where it is not.
-        quantity: what the sensor reads.
+        spring_stiffness: as stated, N m/rad; None where it is not stated.
+        quantity: measured by the sensor.
         wind_on: whether the wind blows.
     """
     kind = drive.kind
@@ -152,7 +152,7 @@ def refuse_untreated(
     elif kind.of_base and wind_on:
         what = "the base is shaken and the wind blows, whose moment follows the motion in the room"
         remedy = "shake the base with the wind off, or leave the run out"
-    elif quantity == "acceleration":  # it jumps where a held input does
+    elif quantity == "acceleration":  # it jumps with a held input
         what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
     elif quantity == "rate" and spring_stiffness == 0.0:
         what = "the run is driven and has no spring, and the rate's zero looks like a constant moment"
@@ -175,10 +175,10 @@ def refuse_several_gains(drives: Iterable[Drive | None], where: str) -> None:
 
 
 def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:
-    """Refuse a run without a spring that nothing drives.
+    """Refuse a run with neither a spring nor an input.
 
     Args:
-        spring_stiffness: as stated, N m/rad; None where it is not.
+        spring_stiffness: as stated, N m/rad; None where it is not stated.
     """
     if spring_stiffness == 0.0 and drive is None:
         raise TunnelError(

@@ -1,4 +1,4 @@
-"""The error shown to users: what is wrong, where, and the remedy; packages that are missing, or add to this."""
+"""The error shown to users: fault, place and remedy; and packages that are missing, or extend this one."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class TunnelError(Exception):
     """Bad input, described in one line.
 
     Args:
-        what: what is wrong, as a short clause.
+        what: the fault, as a short clause.
         where: the file, run or option concerned; empty when there is none.
-        remedy: what to do about it.
+        remedy: how to correct it.
 
     The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
     status 2.
@@ -41,7 +41,7 @@ def one_line(value: object, limit: int = 120) -> str:
     """The text of a value without line breaks or control characters, cut to a number of characters."""
     try:
         whole = str(value)
-    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
+    except (RecursionError, ValueError):  # nested too deeply, or an integer of thousands of digits
         whole = f"a {type(value).__name__} too large to show"
     text = " ".join("".join(c if c.isprintable() else " " for c in whole).split())
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
@@ -60,7 +60,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """A number of things in words: "1 gap", "2 gaps"; the plural of the noun ends in s."""
+    """A count in words: "1 gap", "2 gaps"; the plural of the noun ends in s."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
@@ -83,12 +83,12 @@ EXTRAS = {
 
 
 def installing(extra: str) -> str:
-    """The command that installs an extra, one of `EXTRAS`, in a clone of the project: it is on no package index."""
+    """The command that installs an extra of `EXTRAS` in a clone of the project, which no package index has."""
     return f".venv/bin/pip install '.[{extra}]' in the clone of the project"
 
 
 def library(name: str, use: str, extra: str, where: str = "") -> Any:
-    """A library of an extra, by the name of its module and what needs it; one of `EXTRAS`."""
+    """A library of an extra of `EXTRAS`, by the name of its module and the feature that needs it."""
     try:
         return import_module(name)
     except ImportError:
@@ -98,14 +98,14 @@ def library(name: str, use: str, extra: str, where: str = "") -> Any:
 
 def added_to(group: str) -> dict[str, EntryPoint]:
     """The entry points of a group, such as ``tunnel.effects``, by name."""
-    from importlib.metadata import entry_points  # only here: every command would wait for it
+    from importlib.metadata import entry_points  # only here: it would slow every command
 
     return {point.name: point for point in entry_points(group=group)}
 
 
 @contextmanager
 def loading(where: str, remedy: str = "correct or uninstall its package") -> Iterator[None]:
-    """Say in one line whatever foreign code does wrong while it is loaded within the block."""
+    """Report in one line any fault of foreign code while it is loaded within the block."""
     try:
         yield
     except (Exception, SystemExit) as error:

@@ -1,6 +1,6 @@
-"""The kinds of input of a driven run: what each is, how it acts on the body, and what a run may state of it.
+"""The kinds of input of a driven run: their meaning, their effect on the body, and a run's statements on them.
 
-A kind is one type, and the columns of run files, imports, plans, fits and plots are those of its fields. The moment
+A kind is one type; the columns of run files, imports, plans, fits and plots come from its fields. The moment
 on the body is on the right-hand side of Izz β̈ + C β̇ + K β = M, with M and β positive in the same direction.
 """
 
@@ -28,14 +28,14 @@ _ANGLES: Mapping[str, float] = {
     "rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0, "turns": 2.0 * pi,
 }  # fmt: skip
 _TURNING: Mapping[str, float] = {"rad/s2": 1.0, "deg/s2": pi / 180.0}
-_G = 9.80665  # m/s², standard gravity, by which accelerometers are scaled
+_G = 9.80665  # m/s², standard gravity, the unit of accelerometers
 _ALONG: Mapping[str, float] = {"m/s2": 1.0, "mm/s2": 1e-3, "cm/s2": 1e-2, "g": _G, "mg": 1e-3 * _G}
 _PLAIN = str.maketrans({"²": "2", "^": None, "_": "/", " ": None})
 
 
 @dataclass(frozen=True)
 class KnownGain:
-    """The gain of an input over the inertia, where the motion alone gives it: per_stiffness · k + constant.
+    """The gain of an input over the inertia, where the motion alone determines it: per_stiffness · k + constant.
 
     Args:
         per_stiffness: rad/s² per unit of the input, for each 1/s² of stiffness over the inertia.
@@ -60,16 +60,16 @@ class Input:
     Traits, with defaults that a kind overrides:
 
     - ``column``: of a run file; ``unit``: of its values.
-    - ``meaning``: what it is, a clause of an import; ``noun``: the same in a word on an axis.
+    - ``meaning``: its description, a clause of an import; ``noun``: a word for it on an axis.
     - ``of_spring``: whether it acts through the spring, and its gain is the spring's stiffness.
-    - ``of_base``: whether the base is shaken: the reading is counted from it, and the forces of inertia act.
+    - ``of_base``: whether the base is shaken: the reading is relative to it, and inertial forces act.
     - ``by_inertia``: whether its gain is the body's inertia, with the sign of ``scale``.
-    - ``by_actuator``: whether it is what an actuator is asked for, whose lag and limits then change the moment.
+    - ``by_actuator``: whether it is the demand on an actuator, whose lag and limits then change the moment.
     - ``takes_gain``: whether a run may state ``drive_gain``; where it does not, the gain is fitted.
-    - ``keys``: those of ``drive_gain`` and ``servo_kv`` that a run may state.
-    - ``scale``: N m per unit; of an input that takes a gain the factor on the gain.
-    - ``amplitudes``: the key of a plan that gives its peaks; empty: no plan has it.
-    - ``units``: units in which a file may hold it, with their factors.
+    - ``keys``: which of ``drive_gain`` and ``servo_kv`` a run may state.
+    - ``scale``: N m per unit; for an input that takes a gain, the factor on the gain.
+    - ``amplitudes``: the key of a plan for its peaks; empty: no plan has it.
+    - ``units``: its possible units in a file, with their factors.
     """
 
     column: ClassVar[InputColumn]
@@ -100,7 +100,7 @@ class Input:
         """The moment on the body per unit in a simulated run, N m.
 
         Args:
-            gain: of an input whose gain the run does not state, N m per unit.
+            gain: for an input whose gain the run does not state, N m per unit.
             spring_stiffness: Kr, N m/rad.
             inertia: Izz, kg m².
         """
@@ -108,7 +108,7 @@ class Input:
         return self.scale
 
     def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The gain over the inertia where neither an inertia nor a stated gain is needed for it; None elsewhere.
+        """The gain over the inertia where it needs neither an inertia nor a stated gain; None elsewhere.
 
         Args:
             windy: whether the wind blows, which adds to the stiffness.
@@ -117,12 +117,12 @@ class Input:
         return None
 
     def holds(self, name: str, unit: str) -> bool:
-        """Whether a column of a name and a unit is an input of this kind."""
+        """Whether a column with this name and unit is an input of this kind."""
         heading = f"{name.strip()}_{unit}" if unit else name.strip()
         return heading.lower().replace("/", "_") == self.column
 
     def factor(self, unit: str) -> float:
-        """From a unit of a file to that of the column; 1 of one that is not known."""
+        """From a unit of a file to the column's unit; 1 for an unknown unit."""
         return self.units.get(unit, 1.0)
 
 
@@ -148,7 +148,7 @@ class _OfGain(Input):
     keys = ("drive_gain",)
 
     def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """As the run states it."""
+        """The gain stated by the run."""
         del spring_stiffness
         return None if stated is None else self.scale * stated
 
@@ -169,7 +169,7 @@ class Unscaled(_OfGain):
 
 
 class _OfSpring(Input):
-    """An angle of the spring's other end; moment = Kr · input, beside −Kr β."""
+    """An angle of the spring's other end; moment = Kr · input, in addition to −Kr β."""
 
     unit = "rad"
     of_spring = True
@@ -186,12 +186,12 @@ class _OfSpring(Input):
         return spring_stiffness
 
     def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The stiffness of the motion, which is that of the spring where the air adds none."""
+        """The stiffness of the motion, which is the spring's where the air adds none."""
         return None if windy else KnownGain(per_stiffness=1.0)
 
 
 class Root(_OfSpring):
-    """The angle of the spring's root, which moves while the sensor stands still."""
+    """The angle of the spring's root, which moves while the sensor is fixed."""
 
     column = "base_rad"
     meaning = "the angle of the spring's root"
@@ -204,7 +204,7 @@ class Root(_OfSpring):
 
 
 class Command(_OfSpring):
-    """The angle that a position servo is told to hold: a spring from there to the body, and a damper."""
+    """The angle command of a position servo: a spring from there to the body, and a damper."""
 
     column = "command_rad"
     meaning = "the command of a position servo"
@@ -229,7 +229,7 @@ class BaseRotation(Input):
     units = _TURNING
 
     def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """It is the inertia, which is to be found."""
+        """None: the gain is the unknown inertia."""
         del stated, spring_stiffness
         return None
 
@@ -239,7 +239,7 @@ class BaseRotation(Input):
         return self.scale * inertia
 
     def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """Over the inertia it is −1."""
+        """The gain over the inertia, −1."""
         del windy
         return KnownGain(constant=self.scale)
 
@@ -251,7 +251,7 @@ class BaseRotation(Input):
 class BaseTranslation(_OfGain):
     """The acceleration a of a base that moves across the body's arm; moment = −gain · a, with gain = mass · arm.
 
-    The arm, from the axis to the centre of mass, is taken as that at rest.
+    The arm, from the axis to the centre of mass, is assumed to be the one at rest.
     """
 
     column = "base_acceleration_m_s2"
@@ -263,7 +263,7 @@ class BaseTranslation(_OfGain):
     amplitudes = "amplitudes_m_s2"
 
     def holds(self, name: str, unit: str) -> bool:
-        """An acceleration of a base, also one without a unit, since the gain is fitted."""
+        """An acceleration of a base, with or without a unit, since the gain is fitted."""
         if super().holds(name, unit):
             return True
         accelerates = _plain(unit) in _ALONG or (not unit and _ACCELERATION.search(name) is not None)
@@ -275,7 +275,7 @@ class BaseTranslation(_OfGain):
 
 
 def _plain(unit: str) -> str:
-    """A unit that imports do not know, as a file has it, in the spelling of `_ALONG`."""
+    """A unit unknown to imports, in the spelling of `_ALONG`."""
     return unit.lower().translate(_PLAIN)
 
 

@@ -1,4 +1,4 @@
-"""What to simulate: aerodynamic derivatives, the plan of a campaign and its runs, and waveforms that drive them.
+"""The definition of a simulation: aerodynamic derivatives, the plan of a campaign, its runs and their waveforms.
 
 Sign convention: yaw angle β and yaw rate r = β̇ have the same positive direction about the rod's axis; the
 aerodynamic moment is N = Ka β + Ca r on the right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ
@@ -95,7 +95,7 @@ POTENTIOMETER_RESOLUTION = 2.0 * pi / 3.0 / 4096.0
 
 @dataclass(frozen=True)
 class Truth:
-    """The coefficients that the simulation uses, which the estimators are to recover.
+    """The coefficients of the simulation, which the estimators should recover.
 
     Args:
         cn_beta, cn_r: Cnβ and Cnr, 1/rad.
@@ -117,7 +117,7 @@ class Condition:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
-        release_angle: rad, nose-right positive; of a driven run 0, where it starts at rest.
+        release_angle: rad, nose-right positive; 0 for a driven run, where it starts at rest.
         duration: of the record, s.
         gain: true gain of an input that takes one, unknown to the estimators: N m per unit.
     """
@@ -163,13 +163,13 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """Everything a simulated campaign depends on, apart from the rig.
+    """All properties of a simulated campaign, apart from the rig.
 
     Args:
         conditions: the runs, at least one, with unique ids.
         effects: effects added to the nominal model.
         scatter: differences between the runs, which the campaign does not state.
-        repeatability: what the campaign states of them.
+        repeatability: the campaign's statement on them.
     """
 
     name: str
@@ -222,12 +222,12 @@ def square(time_s: Array, frequency_hz: float) -> Array:
         time_s: of the samples from 0 on, shape (n,), s.
         frequency_hz: Hz.
     """
-    half_cycles = np.floor(2.0 * frequency_hz * time_s + 1e-9)  # a sample that rounding puts before its edge
+    half_cycles = np.floor(2.0 * frequency_hz * time_s + 1e-9)  # a sample may be rounded to before its edge
     return 1.0 - 2.0 * (half_cycles % 2.0)
 
 
 def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> Array:
-    """Which multiples of one over the record's length lie in a band, below half the sample rate; shape (k,).
+    """The multiples of one over the record's length within a band, below half the sample rate; shape (k,).
 
     Args:
         size: number of samples n (a count).
@@ -244,8 +244,8 @@ def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Gener
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
-        rng: draws the phases; None: those of Schroeder, −π k (k − 1)/N of the k-th of N lines, which keep the peak
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line is in between.
+        rng: draws the phases; None: Schroeder's phases, −π k (k − 1)/N of the k-th of N lines, which keep the peak
             low (doi:10.1109/TIT.1970.1054411).
     """
     lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
@@ -259,7 +259,7 @@ def band_noise(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Gene
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line is in between.
     """
     lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
     return _of_lines(

@@ -1,4 +1,4 @@
-"""One run's reading of the yaw angle against time, and how many cycles it holds."""
+"""One run's reading of the yaw angle against time, and its number of cycles."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Record:
 
     @cached_property
     def uniform(self) -> bool:
-        """Whether all samples lie within `CLOCK_TOLERANCE` of a uniform clock from the first to the last."""
+        """Whether all samples are within `CLOCK_TOLERANCE` of a uniform clock from the first to the last."""
         away = self.time_s - np.linspace(self.time_s[0], self.time_s[-1], self.time_s.size)
         # Times far from zero have larger rounding errors, which are not a fault of the sampling.
         allowed = CLOCK_TOLERANCE * self.sample_interval + 4.0 * float(np.spacing(np.abs(self.time_s).max()))
@@ -82,7 +82,7 @@ class Record:
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Where samples are missing: steps of over four mean intervals between times, shape (n,); shape (n - 1,)."""
+    """Places of missing samples: steps of over four mean intervals between times, shape (n,); shape (n - 1,)."""
     steps = np.diff(time)
     return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
 
@@ -90,19 +90,19 @@ def gaps(time: Array) -> NDArray[np.bool_]:
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one: itself where it is uniform.
 
-    Else a smooth curve through it, which bridges gaps or leaves them at the mean; neither is a measurement.
+    Otherwise a smooth curve through it, which bridges gaps or keeps them at the mean; neither is a measurement.
     """
     if record.uniform:
         return record
     given, reading = record.time_s, record.yaw_rad
-    # Cubic pieces whose slopes are those of parabolas through three neighbours.
+    # Cubic pieces whose slopes come from parabolas through three neighbours.
     slope = np.gradient(reading, given)
     time = np.linspace(given[0], given[-1], given.size)
     at = np.clip(np.searchsorted(given, time, side="right") - 1, 0, given.size - 2)
     step = np.diff(given)[at]
     u = (time - given[at]) / step
     first, last = slope[at], slope[at + 1]
-    # Across a gap slopes may lead far off: up to three times the mean slope, a cubic stays between its ends.
+    # Across a gap slopes may extrapolate far: up to three times the mean slope, a cubic stays between its ends.
     steepest = 3.0 * np.abs(np.diff(reading)[at]) / step
     gap = gaps(given)[at]
     first, last = (np.where(gap, np.clip(end, -steepest, steepest), end) for end in (first, last))
@@ -129,7 +129,7 @@ def count_cycles(record: Record) -> float:
     """Number of cycles of the dominant oscillation within the record; 0 when nothing oscillates.
 
     The dominant spectral line gives the time scale; the period follows from the crossings of the centre, with
-    hysteresis. The part of a heavily damped run in which the swing is lost in noise counts as well.
+    hysteresis. The part of a heavily damped run in which the swing is below the noise also counts.
     """
     record = evenly_spaced(record, bridged=False)
     # Less a sinusoid at each mains frequency, fitted second by second, because that frequency varies by a few
@@ -144,7 +144,7 @@ def count_cycles(record: Record) -> float:
         # A level and a slope are fitted with the hum, so that slow motion is not mistaken for hum.
         hum_basis = np.column_stack([np.cos(phase), np.sin(phase)])
         basis = np.column_stack([hum_basis, np.ones(block), np.linspace(-1.0, 1.0, block)])
-        # The last block has full length too: it overlaps the one before and corrects only the rest.
+        # The last block also has full length: it overlaps the previous one and corrects only the rest.
         starts = [*range(0, reading.size - block, block), reading.size - block]
         pieces = np.stack([reading[start : start + block] for start in starts])
         hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
@@ -155,10 +155,10 @@ def count_cycles(record: Record) -> float:
     abscissa = np.linspace(-1.0, 1.0, reading.size)
     slope = float(np.sum(abscissa * reading) / np.sum(abscissa**2))
     level: Array = reading - float(reading.mean()) - slope * abscissa
-    # Only rounding errors remain of a constant, a linear drift or pure hum.
+    # Only rounding errors remain from a constant, a linear drift or pure hum.
     if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):
         return 0.0
-    # The strongest spectral line, which must stand out from the noise.
+    # The strongest spectral line, which must be clear of the noise.
     power = np.abs(np.fft.rfft(level))[1:] ** 2
     frequency = np.fft.rfftfreq(level.size, 1.0 / record.sample_rate)[1:]
     # Between power and power per octave, so that neither slow drift nor brief ringing hides the oscillation.
@@ -174,7 +174,7 @@ def count_cycles(record: Record) -> float:
 
 def _count(reading: Array, width: int) -> float:
     """The record's length over the period of its crossings; 0 with fewer than two of them."""
-    # Where the smoothed reading crosses its centre, in samples, with hysteresis.
+    # Crossings of the smoothed reading through its centre, in samples, with hysteresis.
     total = np.concatenate([[0.0], np.cumsum(reading)])
     smooth = (total[width:] - total[:-width]) / width
     smooth = smooth - np.median(smooth)

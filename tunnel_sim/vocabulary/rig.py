@@ -1,4 +1,4 @@
-"""The rig: its body, its reference sizes, and the law of a joint of one's own."""
+"""The rig: its body, its reference sizes, and the law of a joint of the user's model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-#: What of a joint's law may be fitted, and the name of the parameter in a fit.
+#: Properties of a joint's law that may be fitted, and the name of the parameter in a fit.
 FREE_PARAMETERS: Mapping[str, str] = {
     "inertia": "yaw_inertia",
     "damping": "mechanical_damping",
@@ -23,7 +23,7 @@ FREE_PARAMETERS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Term:
-    """A part of the moment that a linear spring and damper leave out: minus the coefficient times the expression.
+    """A part of the moment beyond a linear spring and damper: minus the coefficient times the expression.
 
     Args:
         coefficient: in the unit.
@@ -37,7 +37,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Actuator:
-    """An actuator of a joint, whose moment is in proportion to its control.
+    """An actuator of a joint, whose moment is proportional to its control.
 
     Args:
         name: as in the model, or its number.
@@ -45,7 +45,7 @@ class Actuator:
         gain: N m per unit of the control.
         control: least and greatest control that are not clipped.
         moment: least and greatest moment that are not clipped, N m.
-        servo: what it gives without control at position 0, N m, and per position, N m/rad; part of the joint's law.
+        servo: its moment without control at position 0, N m, and per position, N m/rad; part of the joint's law.
     """
 
     name: str
@@ -65,15 +65,15 @@ class JointLaw:
 
     Args:
         inertia: I, kg m².
-        stiffness: K, slope of the whole restoring moment at rest, N m/rad; 0: nothing holds the joint.
+        stiffness: K, slope of the whole restoring moment at rest, N m/rad; 0: without any restraint.
         damping: C, N m s/rad.
         friction: moment of dry friction, N m.
-        rest: the joint's position at rest, rad; where nothing holds it, the middle of its records.
-        free: which of `FREE_PARAMETERS` are fitted, the ``gain`` kp of a position servo among them; where
-            nothing holds the joint, ``rest`` is a constant moment.
-        actuator: whose control drives the runs; None: no run is driven by a control.
+        rest: the joint's position at rest, rad; without any restraint, the middle of its records.
+        free: which of `FREE_PARAMETERS` are fitted, the ``gain`` kp of a position servo among them; without any
+            restraint, ``rest`` is a constant moment.
+        actuator: its control drives the runs; None: no run is driven by a control.
         step: of the model, s.
-        lead: by which the motion leads its input, as it does in integrators of first order, s.
+        lead: time by which the motion leads its input in first-order integrators, s.
     """
 
     inertia: float
@@ -90,14 +90,14 @@ class JointLaw:
 
     @property
     def hangs(self) -> bool:
-        """Whether gravity alone restores the joint, so that its angle is one with the sensor's zero."""
+        """Whether gravity alone restores the joint, so that its angle is inseparable from the sensor's zero."""
         of_angle = {term.expression: term.coefficient for term in self.terms if "r" not in term.expression}
         sine = of_angle.pop("sin(b)-b", 0.0)
         return sine > 0.0 and not of_angle and abs(sine - self.stiffness) <= 1e-6 * sine
 
     @property
     def held(self) -> dict[str, float]:
-        """Value of every parameter that is not fitted, by its name in a fit."""
+        """Value of every fixed parameter, by its name in a fit."""
         known = {"inertia": self.inertia, "damping": self.damping, "stiffness": 0.0, "rest": self.rest}
         found = {FREE_PARAMETERS[name]: value for name, value in known.items() if name not in self.free}
         if self.stiffness == 0.0 and "zero" in found:
@@ -106,8 +106,8 @@ class JointLaw:
 
 
 _SLANT_DROP = 0.4  # height of the slant over that of the body: the paper gives its angle, not its length
-_NOSE_RADIUS = 0.30  # share of the height, drawn only
-_EDGE_RADIUS = 0.14  # of the long edges, share of the height, drawn only
+_NOSE_RADIUS = 0.30  # share of the height, for drawing only
+_EDGE_RADIUS = 0.14  # of the long edges, share of the height, for drawing only
 _STEPS = 8  # facets of a quarter round
 
 
@@ -157,7 +157,7 @@ class Body:
         width, height, ground_clearance: m.
         rear_slant_deg: angle of the rear slant below the roof, degrees.
         mass: of model and oscillating mechanism, kg.
-        frontal_area, side_area: A, and that of the side, m².
+        frontal_area, side_area: A, and the area of the side, m².
     """
 
     length: float

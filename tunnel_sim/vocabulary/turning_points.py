@@ -1,4 +1,4 @@
-"""Turning points of a swing, as a hand reads them: the times of its extremes and the angles there."""
+"""Turning points of a swing, as read by hand: the times and angles of its extremes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tunnel_sim.vocabulary.record import Array
 
 LEAST = 6
 """Turning points from which a period, a decrement and the scatter about both can be told."""
-_GROWS = 1.25  # of the swing before: the next one of a decay that a hand has read is no longer
-_SHRINKS = 0.4  # of the swing before: a decay from one side to the other is no faster where it oscillates
+_GROWS = 1.25  # of the previous swing: upper bound of the next one in a decay read by hand
+_SHRINKS = 0.4  # of the previous swing: an oscillating decay from one side to the other is no faster
 _MISSED = 0.35  # of half a period: times of turning points are as close to whole numbers of it
 
 
@@ -24,8 +24,8 @@ class TurningPoints:
         name: of the file or run.
         time_s: shape (n,), s, increasing.
         angle_rad: shape (n,), rad.
-        time_std: standard deviation of the times as stated, s, shape (n,); None where nothing is stated.
-        angle_std: of the angles, rad, shape (n,); likewise.
+        time_std: standard deviation of the times as stated, s, shape (n,); None where it is not stated.
+        angle_std: standard deviation of the angles as stated, rad, shape (n,); None where it is not stated.
         said: how they were read.
     """
 
@@ -45,7 +45,7 @@ class TurningPoints:
 
 
 def are_turning_points(time_s: Array, angle: Array) -> bool:
-    """Whether every reading of a table is on the other side of the one before, as its turning points are.
+    """Whether every reading of a table is on the opposite side of the previous one, as with turning points.
 
     Args:
         time_s: not decreasing, shape (n,), s.
@@ -57,7 +57,7 @@ def are_turning_points(time_s: Array, angle: Array) -> bool:
     sizes, step = np.abs(swings), np.median(steps)
     if not ((sizes > 0.0).all() and step > 0.0) or (np.sign(swings[1:]) == np.sign(swings[:-1])).any():
         return False
-    with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size, which a motion has not
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers may be larger than in any motion
         ratio, halves = sizes[1:] / sizes[:-1], steps / step
         whole = np.round(halves)  # a turning point may be missing on either side, two at a time
         even = (np.abs(halves - whole) <= _MISSED) & (whole % 2.0 == 1.0)
@@ -65,7 +65,7 @@ def are_turning_points(time_s: Array, angle: Array) -> bool:
 
 
 class HoldsTurningPoints(TunnelError):
-    """A table holds turning points, of which no campaign can be made."""
+    """The table contains turning points, from which no campaign can be made."""
 
     def __init__(self, points: TurningPoints, where: str) -> None:
         self.points = points

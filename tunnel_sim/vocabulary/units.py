@@ -30,7 +30,7 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
     """The dimension of one quantity times a power of another.
 
     Args:
-        power: of the other, dimensionless.
+        power: exponent of the other, dimensionless.
     """
     kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
     return kg, m, s
@@ -40,8 +40,8 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
 def dimension(unit: str) -> Dimension:
     """Powers of kg, m and s of a unit.
 
-    It has factors with spaces between them and digits for powers, the denominator after one slash; ``l/V``,
-    of a time as a multiple of length over speed, is a number.
+    It has factors separated by spaces with digits for powers, and the denominator after one slash; ``l/V``,
+    for a time as a multiple of length over speed, is a number.
     """
     if unit == "l/V":
         return NUMBER
@@ -57,7 +57,7 @@ def dimension(unit: str) -> Dimension:
 
 @functools.cache
 def angle_power(unit: str) -> float:
-    """The power in which a quantity grows with all angles and moments: 1 for either, 0 for a stiffness."""
+    """The exponent with which a quantity scales with all angles and moments: 1 for either, 0 for a stiffness."""
     above, _, below = unit.partition("/")
     return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
 
@@ -101,7 +101,7 @@ _USUAL = (
 
 
 def dimension_text(found: Dimension) -> str:
-    """A unit of a dimension of whole powers, as `dimension` reads it: a usual unit, or kg, m and s."""
+    """A unit of a dimension of whole powers, in the form of `dimension`: a usual unit, or kg, m and s."""
     for unit in _USUAL:
         if dimension(unit) == found:
             return unit

@@ -1,1 +1,1 @@
-"""Everyday slips: what is stated against what is recorded, before any fit. `table` lists them."""
+"""Everyday slips: statements against records, before any fit. `table` lists them."""

@@ -12,15 +12,15 @@ from identification.signal.noise import reading_noise
 from identification.status import Outcome, Remark
 
 _DEGREES = 180.0 / np.pi
-_SUSPICIOUS = 10.0  # amplitudes of other runs: only then is the noise compared
+_SUSPICIOUS = 10.0  # ratio to the amplitudes of other runs, from which the noise is compared
 
 
 @dataclass(frozen=True)
 class AngleInDegrees(StatementSlip):
-    """Amplitude and noise of some runs are larger than those of the others by 57.3: degrees. Refused."""
+    """Amplitude and noise of some runs are 57.3 times those of the others: degrees. Refused."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
-        """Compare amplitudes, and where they differ much the noise."""
+        """Compare amplitudes and, where they differ much, the noise."""
         if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:
             return ()
         amplitudes = np.array([swing.amplitude for swing in seen.swings])

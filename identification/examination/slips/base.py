@@ -1,4 +1,4 @@
-"""What every slip is: a type with a test, a sentence and a remedy."""
+"""The types of slips, each with a test, a sentence and a remedy."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 
 class RecordSlip(ABC):
-    """A fault of the records that is seen in them before anything is measured."""
+    """A fault of the records that they show before any measurement."""
 
     @abstractmethod
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """The campaign without the fault, and a remark for what was done or cannot be done."""
+        """The campaign without the fault, and a remark on each action, or on a fault that cannot be mended."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What is stated and what the records show.
+    """The statements of a campaign and the evidence of its records.
 
     Args:
-        campaign: its records as they are used, and its sensor's zeros as they are decided from them.
-        stated: the campaign as it came.
+        campaign: the records in use, with the sensor's zeros decided from them.
+        stated: the campaign as given.
         swings: of its free decays that oscillate, in their order.
     """
 
@@ -38,4 +38,4 @@ class StatementSlip(ABC):
 
     @abstractmethod
     def find(self, seen: Seen) -> tuple[Remark, ...]:
-        """A remark for each such statement; none where all may be right."""
+        """A remark for each contradicted statement; none where all may be right."""

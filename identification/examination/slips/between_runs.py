@@ -1,4 +1,4 @@
-"""Statements of several runs against one another: motion that grows, labels exchanged, springs and inertia."""
+"""Statements of several runs against one another: growing motion, exchanged labels, springs and inertia."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LabelsExchanged(StatementSlip):
 
 @dataclass(frozen=True)
 class SpringOffTheLine(StatementSlip):
-    """A spring that is not as stiff as stated, by the others. Noted."""
+    """A spring that, according to the others, is not as stiff as stated. Noted."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """As `springs_off_the_line`."""

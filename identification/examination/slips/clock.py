@@ -1,7 +1,7 @@
-"""A clock that drifts along the runs: all frequencies change with time by one share, whatever the amplitude.
+"""A clock that drifts along the runs: all frequencies change with time by the same share at any amplitude.
 
-An effect changes the frequency with the amplitude, which falls at another rate in runs of other damping. The phase
-of each run against its own mean frequency shows which of the two it is. Where all runs are damped alike, none can.
+An effect changes the frequency with the amplitude, which falls faster in runs of greater damping. The phase of
+each run relative to its own mean frequency shows which of the two applies, unless all runs are damped alike.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from tunnel_sim.vocabulary.record import Array
 
 _WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
 _FEWEST = 6  # phases of a run
-_PHASE = 1e-3  # rad: what the window leaves of zero and damping
-_LEAST_AMPLITUDE = 0.05  # of the first: later phases say little
+_PHASE = 1e-3  # rad: remainder of zero and damping after the window
+_LEAST_AMPLITUDE = 0.05  # of the first: later phases carry little information
 #: Powers of the amplitude by which effects change a frequency: free play, an asymmetric spring, a cubic one.
 _POWERS = (-1.0, 1.0, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class _Phase:
-    """The phase of a run against a constant frequency, at the middle of windows, and what may change it.
+    """The phase of a run relative to a constant frequency, at the middle of windows, and its possible changes.
 
     Args:
         phase: shape (n,), rad.
@@ -49,14 +49,14 @@ class _Phase:
 class DriftingClock(StatementSlip):
     """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused.
 
-    A single run whose phase may as well jump at an instant is not: it may have been disturbed.
+    A single run whose phase may as well jump at one instant is not refused: it may have been disturbed.
     """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
         phases = [phase for swing in seen.swings if (phase := _phase(swing)) is not None]
         still = {swing.run.id for swing in seen.swings if not swing.run.wind_on}
-        # one decay does not tell time from amplitude, and without still air the wind speed may drift
+        # one decay does not separate time from amplitude, and without wind-off runs the wind speed may drift
         if len(phases) < 2 or not any(phase.run in still for phase in phases):
             return ()
         whole = tuple(range(len(phases)))
@@ -84,11 +84,11 @@ class DriftingClock(StatementSlip):
 
 
 def _jumps(phases: list[_Phase], place: int, squares: float) -> bool:
-    """Whether a jump of a run's phase at one instant, as a blow makes, leaves no more than a drift does.
+    """Whether a jump of a run's phase at one instant, as from a blow, fits no worse than a drift.
 
     Args:
         place: of the run among the phases.
-        squares: sum of squares that the drift leaves, dimensionless.
+        squares: sum of squares of the residuals with the drift, dimensionless.
     """
     one = phases[place]
     after = np.arange(one.phase.size)

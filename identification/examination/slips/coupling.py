@@ -1,7 +1,7 @@
-"""A sensor that does not pass a constant: AC-coupled, with a high-pass filter before the logger.
+"""A sensor that does not pass constant values: AC-coupled, with a high-pass filter before the logger.
 
-Its reading of a release is an oscillation that leads by the angle arctan(1/ωτ), and a centre that decays as
-exp(-t/τ) to zero. Creep of a spring moves the centre too, without the lead; a drift does not end at zero.
+Its reading of a release is an oscillation with a phase lead of arctan(1/ωτ), about a centre that decays as
+exp(-t/τ) to zero. Creep of a spring also moves the centre, but without the lead; a drift does not end at zero.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
 _CONSTANTS = np.geomspace(0.25, 32.0, 22)  # of a cycle, τ tried
-_REFINED = 1.3  # τ about the best of these
+_REFINED = 1.3  # factor on τ about the best of these
 _SWEEPS = 2  # of the poles' linear corrections
-_SHARE_LEFT = 0.05  # of the centre's decay that may be left as a zero
-_LEAD = 0.2  # share by which the lead may differ from arctan(1/ωτ)
+_SHARE_LEFT = 0.05  # of the centre's decay that may remain as a zero
+_LEAD = 0.2  # relative tolerance of the lead about arctan(1/ωτ)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,8 @@ class _Decaying:
         constant: τ, s.
         centre: at the start, rad.
         zero, zero_std: at the end, rad.
-        lead: of the oscillation beyond that of a release from rest, rad.
-        expected: lead by τ, rad.
+        lead: phase lead of the oscillation beyond a release from rest, rad.
+        expected: lead from τ, rad.
     """
 
     run: str
@@ -47,7 +47,7 @@ class _Decaying:
 
     @property
     def coupled(self) -> bool:
-        """Whether centre and lead are those of one high-pass filter."""
+        """Whether one high-pass filter explains both centre and lead."""
         ends = abs(self.zero) < policy.MISFIT_DEVIATIONS * self.zero_std + _SHARE_LEFT * abs(self.centre)
         return ends and abs(self.lead - self.expected) < _LEAD * self.expected
 
@@ -82,7 +82,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
     freedom = 2.0 * length / period - 6.0  # the residual is correlated over half a cycle
     if freedom < 1.0 or constants.size == 0:
         return None
-    # by how much each constant reduces the sum of squares, to first order in the poles
+    # reduction of the sum of squares by each constant, to first order in the poles
     base = np.linalg.qr(response_rows(time, decay, constant=True).T)[0]
     centres = np.exp(-time[:, None] / constants)
     centres = centres - base @ (base.T @ centres)
@@ -99,7 +99,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
     quadrature = (rate + decay.rate * angle) / decay.omega_d
     lead = np.arctan2(-quadrature * np.sign(angle), abs(angle)) + np.arctan(decay.rate / decay.omega_d)
     if squares > policy.GROSS_MISFIT * float(np.sum((yaw - yaw.mean()) ** 2)):
-        return None  # a filter passes an oscillation as one; another motion leads and creeps by chance
+        return None  # a filter keeps an oscillation pure; another motion leads and creeps by chance
     std = np.sqrt(squares / freedom * inverse[-1, -1])
     expected = np.arctan(1.0 / (decay.omega_d * tau))
     return _Decaying(swing.run.id, tau, centre, zero, float(std), float(lead), float(expected))

@@ -15,9 +15,9 @@ from identification.status import Outcome, Remark
 
 @dataclass(frozen=True)
 class EqualStatementsDiffer(StatementSlip):
-    """Runs of equal spring, wind and swing differ in frequency or damping as one condition never does. Refused.
+    """Runs of equal spring, wind and swing differ in frequency or damping as never under one condition. Refused.
 
-    So do labels that were copied from run to run. What the runs would need to agree is not known.
+    This includes labels copied from run to run. The values on which the runs would agree are not known.
     """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
@@ -50,7 +50,7 @@ class EqualStatementsDiffer(StatementSlip):
 
 
 def _apart(low: Swing, high: Swing) -> tuple[float, float]:
-    """How far stiffness and damping of two runs differ at least, in logarithms; 0 where their swings are unlike."""
+    """Least differences of stiffness and damping of two runs, in logarithms; 0 where their swings are unlike."""
     sizes = sorted((low.amplitude, high.amplitude))
     if low is high or sizes[0] < policy.EQUAL_SWINGS * sizes[1]:
         return 0.0, 0.0

@@ -1,8 +1,9 @@
-"""The straight lines that runs with right labels obey, with wide tolerances for everything but a slip.
+"""The straight lines of runs with right labels, with tolerances that only a slip exceeds.
 
 Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by
-its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. It is told from
-an effect by tolerances that hold every effect, and by a value that agrees where the stated one is grossly off.
+its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. Two things
+separate it from an effect: tolerances that include every effect, and a value that agrees where the stated one is
+grossly off.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 4
-_MOST_AIR = 3.0  # air's stiffness over the whole, a standard deviation: more is less likely, and not excluded
-_LEAST = 1e-3  # of the usual g, where a fit to wrong labels gives less
+_MOST_AIR = 3.0  # air's stiffness over the total, a standard deviation: more is less likely, but not excluded
+_LEAST = 1e-3  # of the usual g: lower bound of a fit to wrong labels
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ class Statements:
     Args:
         spring: Kr, shape (n,), N m/rad.
         speed: V, shape (n,), m/s.
-        density: ρ, shape (n,), kg/m³; of runs that state none the median of the others, 1.2 where none states any.
+        density: ρ, shape (n,), kg/m³; the median of the others for runs that state none, 1.2 where none states any.
         clock: stamped times over true ones, shape (n,); 1 as stated.
         recorded: k = ωn² by the stamped times, shape (n,), 1/s².
         std: relative standard deviation of k, with its change along the run, shape (n,).
@@ -47,7 +48,7 @@ class Statements:
 
     @classmethod
     def of(cls, swings: Sequence[Swing]) -> Statements:
-        """Of the runs that state a spring; where none does, all are taken to have one spring of 1 N m/rad."""
+        """Statements of the runs with a stated spring; if there are none, all have one spring of 1 N m/rad."""
         known = [s for s in swings if s.run.spring_stiffness] or list(swings)
         runs = tuple(s.run for s in known)
         stated = [run.air_density for run in runs if run.air_density is not None]
@@ -81,7 +82,7 @@ class Agreement:
         squares: sum of squared residuals over tolerances, dimensionless.
         away: residual of each run in tolerances, shape (n,).
         inverse_inertia: g, 1/(kg m²).
-        air: n, of k, 1/(kg m²) per m³.
+        air: n, the air's part of k, 1/(kg m²) per m³.
         air_std: standard deviation of n, 1/(kg m²) per m³.
     """
 
@@ -99,7 +100,7 @@ class Agreement:
 
     @property
     def good(self) -> bool:
-        """Whether the statements agree well: the tolerances are so wide that right labels leave little of them."""
+        """Whether the statements agree well: right labels have small residuals in tolerances so wide."""
         return self.squares <= float(chdtri(max(self.freedom, 1), policy.SLIP_AGREES))
 
 
@@ -131,7 +132,7 @@ def agreement(
     columns[-1, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
     target = np.concatenate((seen, np.zeros(springs + 1)))
     inverse_inertia, air, stiffness = usual, 0.0, least
-    for _ in range(_PASSES):  # the tolerances scale with what is fitted
+    for _ in range(_PASSES):  # the tolerances scale with the fitted values
         of_runs = np.sqrt(
             (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2
             + (2.0 * of_speed * air * pressure) ** 2
@@ -166,7 +167,7 @@ def agreement(
 
 
 def _settings(values: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Values that differ by more than two springs must, and the place of each run's value among them."""
+    """Values that differ by more than two springs must, and the index among them of each run's value."""
     order = np.argsort(values)
     new = np.diff(values[order]) > policy.LEAST_SPRING_SPREAD * values[order][1:]
     group = np.concatenate(([0], np.cumsum(new)))

@@ -1,7 +1,7 @@
-"""Readings whose sign is inverted: by the zero they swing about, and by the side of the release.
+"""Readings of inverted sign, detected by the zero they swing about and by the side of the release.
 
-A mirrored decay is a decay. Only what is not symmetric shows it: a sensor's zero, which a mirrored run has on the
-other side, and the release angle, where it is stated.
+A mirrored decay is also a decay. Only asymmetries reveal it: the sensor's zero, which changes its sign in a
+mirrored run, and the release angle, where it is stated.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
-_FEWEST = 3  # runs: of two zeros neither is the odd one
-_NEAR = 0.25  # of the zero's size: how far the zeros may scatter with right signs, so that the two sides are apart
+_FEWEST = 3  # runs: of two different zeros, either may be right
+_NEAR = 0.25  # of the zero's size: greatest scatter of the zeros with right signs, so that the two sides are apart
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class MirroredRun(StatementSlip):
         zeros = np.array([swing.zero for swing in swings])
         std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
         size = float(np.median(np.abs(zeros)))
-        # the runs that differ; where they are as many as the others, those that begin on the less usual side
+        # the runs that differ; if half of all, those that begin on the less usual side
         minus = zeros < 0.0
         odd = minus if 2 * minus.sum() < zeros.size else ~minus
         if not odd.any() or odd.all():
@@ -75,9 +75,9 @@ def _signed(swings: tuple[Swing, ...], which: NDArray[np.bool_]) -> str:
 
 
 def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
-    """Whether the wind may have moved the centre: it is on in one kind of runs alone, and they have one condition.
+    """Whether the wind may have moved the centre: only one group has wind, and its runs share one condition.
 
-    A moment of the air moves the centre by another angle with another spring or speed.
+    A moment of the air moves the centre by a different angle with another spring or speed.
     """
     windy = np.array([swing.run.wind_on for swing in swings])
     conditions = {(s.run.spring_stiffness, s.run.wind_speed) for s in swings if s.run.wind_on}
@@ -86,7 +86,7 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
 
 @dataclass(frozen=True)
 class ReleaseOnTheOtherSide(StatementSlip):
-    """A stated release angle whose sign is not that of the record. Asked about: no answer depends on it."""
+    """A stated release angle of the opposite sign to the record. Asked about: no answer depends on it."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare sides where the record begins at its turning point, and the angle is stated."""

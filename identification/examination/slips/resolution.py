@@ -21,7 +21,7 @@ _MOST = 0.2  # share of the changes off the lattice: a filter or a few outliers 
 
 @dataclass(frozen=True)
 class ResolutionTooCoarse(RecordSlip):
-    """The readings are finer than their stated resolution by far. It is not used: as noise it would hide gaps."""
+    """The readings are far finer than their stated resolution. It is not used: as noise it would hide gaps."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Drop the resolution where the first records are off its lattice, and smooth or small beside it."""

@@ -1,6 +1,6 @@
-"""A wind speed or a spring of single runs that contradicts the other runs, and the value that would agree.
+"""A wind speed or spring of single runs that contradicts the other runs, and the value that would agree.
 
-What can go wrong with one label is a `Label`. The table `LABELS` lists them; a new one is a class and a line in it.
+Each possible slip of one label is a `Label`. The table `LABELS` lists them; a new slip is a class and a line in it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NAMES: Mapping[Key, str] = {
 _UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
 _FEWEST = 3  # runs: two determine g and n
 _MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
-_MOST_PAIRED = 40  # runs of which all pairs with a suspect are tried
+_MOST_PAIRED = 40  # runs, all of whose pairs with a suspect are tried
 _MOST_SAID = 3
 _TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
 _DECIMAL = {
@@ -37,11 +37,11 @@ _DECIMAL = {
 
 
 class Label(ABC):
-    """A slip in one label: which values may have been meant.
+    """A slip in one label, and the values that may have been meant.
 
     Attributes:
         key: which label.
-        repeats: whether the same slip may be in several runs at once, as that of a unit is.
+        repeats: whether several runs at once may have the slip, as with a wrong unit.
     """
 
     key: ClassVar[Key]
@@ -49,7 +49,7 @@ class Label(ABC):
 
     @abstractmethod
     def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
-        """Values that may have been meant by a stated one, each with words for how it came about.
+        """Values that may have been meant by a stated one, each with words for its origin.
 
         Args:
             value: as stated, in the unit of the label.
@@ -62,7 +62,7 @@ class InAnotherUnit(Label):
     """The value in another unit, or its decimal point elsewhere.
 
     Args:
-        factors: the stated value over the one meant, by words that follow "as".
+        factors: the stated value over the intended one, by words that follow "as".
     """
 
     factors: Mapping[str, float] = field(default_factory=dict)
@@ -122,7 +122,7 @@ class DensityDecimal(InAnotherUnit):
 
 @dataclass(frozen=True)
 class TimeInAnotherUnit(Label):
-    """Times in minutes or milliseconds, or of a run that was sampled at another rate than the others."""
+    """Times in minutes or milliseconds, or of a run sampled at another rate than the others."""
 
     key: ClassVar[Key] = "clock"
 
@@ -142,7 +142,7 @@ class OfAnotherRun(Label):
     repeats: ClassVar[bool] = False
 
     def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
-        """Each value of the others that differs clearly."""
+        """Each clearly different value of the other runs."""
         for other in dict.fromkeys(others):
             if other > 0.0 and abs(other - value) > policy.LEAST_SPRING_SPREAD * max(other, value):
                 yield other, "as in other runs"
@@ -164,7 +164,7 @@ class SpringOfAnotherRun(OfAnotherRun):
 
 @dataclass(frozen=True)
 class WindOff(Label):
-    """A speed stated, and the wind off."""
+    """A stated speed with the wind off."""
 
     key: ClassVar[Key] = "speed"
     repeats: ClassVar[bool] = False
@@ -193,7 +193,7 @@ class _Trial:
     """Other labels for some runs.
 
     Args:
-        familiar: whether the values are those of other runs, or no wind.
+        familiar: whether the values are values of other runs, or no wind.
         said: words for the change.
     """
 
@@ -275,7 +275,7 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     tried = (
         list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
     )
-    gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more label that is fitted
+    gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more fitted label
     mended = []
     for trial in tried:
         found = agreement(trial.labels)
@@ -286,9 +286,7 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     limit = min(squares for _, squares in mended) + _TIE
     mended = [(trial, squares) for trial, squares in mended if squares <= limit]
     best: dict[tuple[int, ...], _Trial] = {}
-    for trial, _ in sorted(
-        mended, key=lambda pair: not pair[0].familiar
-    ):  # of equals, the first in the table
+    for trial, _ in sorted(mended, key=lambda pair: not pair[0].familiar):  # the first of equals in the table
         if trial.familiar or trial.places not in best:
             best.setdefault(trial.places, trial)
     shown = sorted(best.values(), key=lambda trial: len(trial.places))[:_MOST_SAID]
@@ -300,7 +298,7 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
 
 
 def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
-    """The campaign with the values that may have been meant in some runs, by the same way of slipping in each."""
+    """The campaign with values that may have been meant in some runs, by the same slip in each."""
     values = getattr(statements, label.key)
     others = [float(value) for i, value in enumerate(values.tolist()) if i not in places]
     ids = ", ".join(statements.runs[i].id for i in places)

@@ -1,4 +1,4 @@
-"""Wind that is stated and not seen, and labels of wind and no wind that are exchanged throughout."""
+"""Wind that is stated but not detected, and labels of wind and no wind exchanged throughout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from identification.status import Outcome, Remark
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What the wind changes in a run against the wind-off runs of its spring, relative to these."""
+    """Changes by the wind in a run, relative to the wind-off runs of its spring."""
 
     swing: Swing
     stiffness: float
@@ -54,7 +54,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
 
 @dataclass(frozen=True)
 class WindNotSeen(StatementSlip):
-    """No wind-on run differs from the wind-off runs of its spring, which the records would show. Asked about."""
+    """No wind-on run differs from the wind-off runs of its spring, though records would show it. Asked about."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare frequency and decay rate with the wind on and off."""

@@ -1,4 +1,4 @@
-"""The slips that are looked for, in their order."""
+"""The slips that the examination looks for, in their order."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from identification.examination.slips.wraps import WrappedAngle
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
-#: Looked for in the records as they come.
+#: Sought in the records as given.
 RECORD_SLIPS: tuple[RecordSlip, ...] = (
     RepeatedRecord(),
     WrappedAngle(),
@@ -35,7 +35,7 @@ RECORD_SLIPS: tuple[RecordSlip, ...] = (
     StuckReading(),
 )
 
-#: Looked for in what is measured; after the first refusal no further one is looked for.
+#: Sought in the measured oscillations; the search ends at the first refusal.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
     MotionGrows(),
     WrongLabel(),
@@ -57,9 +57,9 @@ STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
 
 
 def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """A campaign without the faults of its records, and what was done; as far as the first refusal."""
+    """A campaign without the faults of its records, and the changes made; up to the first refusal."""
     remarks: tuple[Remark, ...] = ()
-    with np.errstate(all="ignore"):  # readings may have any size; the methods refuse what cannot be squared
+    with np.errstate(all="ignore"):  # readings may have any size; methods refuse values too large to square
         for slip in RECORD_SLIPS:
             campaign, said = slip.mend(campaign)
             remarks += said
@@ -69,13 +69,13 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 
 def found_in(seen: Seen) -> tuple[Remark, ...]:
-    """Remarks on the statements that the measured oscillations contradict; a refusal alone."""
+    """Remarks on the statements that the measured oscillations contradict; only the refusal where there is one."""
     remarks: tuple[Remark, ...] = ()
     with np.errstate(all="ignore"):
         for slip in STATEMENT_SLIPS:
             try:
                 said = slip.find(seen)
-            except np.linalg.LinAlgError:  # values so far apart that they cannot be compared
+            except np.linalg.LinAlgError:  # values too far apart to be compared
                 continue
             remarks += said
             if any(remark.outcome is Outcome.REFUSED for remark in said):

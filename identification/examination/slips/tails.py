@@ -1,4 +1,4 @@
-"""A reading that stands while the body must still move: a padded file, a stopped logger, a body held by hand."""
+"""A constant reading while the body must still move: a padded file, a stopped logger, a body held by hand."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from tunnel_sim.vocabulary.record import Record
 
 _STUCK = 0.6  # of a cycle
 _MOVING = 0.1  # of the record's range: the swings on both sides of a stuck stretch
-_STANDS = 0.01  # of the record's largest excursion: the reading stands while it stays as near its last value,
+_STANDS = 0.01  # of the record's largest excursion: a constant reading stays as near its last value,
 _NOISE = 5.0  # or within as many standard deviations of its last fiftieth
 _LEAST_CYCLES = (
     0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
 )
 _LEAST_KEPT = 2.0  # cycles of motion before it, whose last swings are compared
-#: Dry friction takes the same from every swing and stops the body from a swing of at most one such step; viscous
-#: damping takes a share. A swing of more than three steps does not stop by itself.
+#: Dry friction reduces every swing by the same step and stops the body from a swing of at most one such step;
+#: viscous damping reduces it by a share. A swing of more than three steps does not stop by itself.
 _STEPS = 3.0
-_CLEAR = 5.0  # bands of standing that the last swing must exceed
+_CLEAR = 5.0  # bands of the constant reading that the last swing must exceed
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
         begin, end = int(starts[place]), int(starts[place] + lengths[place])
         before, after = yaw[max(begin - cycle, 0) : begin], yaw[end : end + cycle]
         if before.size < cycle // 2 or after.size < cycle // 2:
-            continue  # at an end: a release or a rest
+            continue  # at an end: before the release, or at rest
         swings = min(float(np.ptp(before)), float(np.ptp(after)))
         if swings > _MOVING * float(np.ptp(yaw)):
             stuck[begin:end] = True
@@ -81,7 +81,7 @@ def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
 
 @dataclass(frozen=True)
 class ConstantTail(RecordSlip):
-    """The reading stands from one moment on, after swings that cannot have ended so soon. The tail is cut off."""
+    """The reading is constant from one moment on, after swings that cannot have ended so soon. The tail is cut."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Cut every free decay to the part before its tail."""
@@ -102,7 +102,7 @@ class ConstantTail(RecordSlip):
 
 
 def standing_from(record: Record) -> int | None:
-    """The first sample of a tail that stands after a large swing; None where there is none."""
+    """The first sample of a constant tail after a large swing; None where there is none."""
     yaw, time = record.yaw_rad, record.time_s
     end = yaw[-max(yaw.size // 50, 1) :]
     away = np.abs(yaw - float(np.median(end)))
@@ -111,7 +111,7 @@ def standing_from(record: Record) -> int | None:
     if moving.size < LEAST_SAMPLES or int(moving[-1]) >= yaw.size - LEAST_SAMPLES:
         return None
     at = int(moving[-1]) + 1
-    # a body that comes to rest stands for long after small swings: only what ends at once needs a closer look
+    # a body that comes to rest is still for long after small swings: only a sudden end needs a closer look
     frequency = starting_frequency(Record(time[:at], yaw[:at]))
     if frequency is None or (time[-1] - time[at]) * frequency < _LEAST_CYCLES:
         return None

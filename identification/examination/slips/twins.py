@@ -1,7 +1,8 @@
-"""Records that are the same measurement twice: equal, or changed a little on the way.
+"""Two records of one measurement: equal, or with small changes.
 
-Two honest runs have nearly the same motion and never the same noise. The sixth difference of a record holds its
-noise alone. Two records of one measurement have the same one, if less than it was added, rounded, cut or scaled.
+Two honest runs have nearly the same motion but never the same noise. The sixth difference of a record contains
+only its noise. Two records of one measurement share it, even after rounding, cutting or scaling, or with less noise
+added.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ from tunnel_sim.vocabulary.record import Array
 
 Spectrum = NDArray[np.complex128]
 _ORDER = 6  # of the difference: the motion of ten samples per cycle is reduced to a twentieth of its size
-_BLOCK = 50  # differences that are scaled to one size: ringing after the release must not outweigh the noise
-_LEAST = 500  # differences in common: noise alone correlates by 0.3 at the best of all shifts then
-#: Correlation from which two noises are one. Added noise of the same size leaves 0.7; rounding to two standard
-#: deviations of the noise leaves 0.87.
+_BLOCK = 50  # differences scaled to one size: ringing after the release must not outweigh the noise
+_LEAST = 500  # differences in common: the best correlation of pure noise over all shifts is then 0.3
+#: Correlation from which two noises are one. With added noise of the same size it is 0.7; with rounding to two
+#: standard deviations of the noise, 0.87.
 _SAME = 0.7
-_ALONE = 0.5  # of the correlation: none is as large at another shift, as it is for hum that two runs share
+_ALONE = 0.5  # of the correlation: greatest at any other shift; hum common to two runs exceeds it
 _NEAR = 12  # shifts about the best that the differencing itself correlates
 _THINNED = (2, 3, 4)  # samples of which one is kept
 _SAME_RATE = 1e-3
 _MOST_PAIRS = 1500  # half a second of comparisons
-_ROUNDING = 1e-9  # of the largest reading: differences as small are those of the numbers
+_ROUNDING = 1e-9  # of the largest reading: smaller differences are rounding errors
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def _conditions(run: Run) -> tuple[float | None, ...]:
 
 
 def _equal(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
-    """Runs that hold the samples of an earlier one."""
+    """Runs with the samples of an earlier run."""
     first: dict[bytes, Run] = {}
     for run in campaign.runs:
         earlier = first.setdefault(run.record.yaw_rad.tobytes(), run)
@@ -71,7 +72,7 @@ def _equal(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
 
 
 def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
-    """Free decays with the noise of an earlier one, of those nearest to one another in size and length."""
+    """Free decays with the noise of an earlier run, among those nearest in size and length."""
     free = [run for run in campaign.runs if run.drive is None and run.record.yaw_rad.size > _LEAST]
     order = sorted(free, key=lambda run: float(np.std(run.record.yaw_rad)))
     reach = max(1, _MOST_PAIRS // max(len(free), 1))
@@ -116,7 +117,7 @@ def _noise(yaw: Array) -> Array:
 
 
 def _correlation(one: Spectrum, other: Spectrum, samples: int, size: int) -> float:
-    """The correlation of two spectra's series at the best shift; 0 where it is as large elsewhere."""
+    """The correlation of two spectra's series at the best shift; 0 where another shift is as good."""
     series = irfft(one * np.conj(other), size) / max(samples, 1)
     best = int(np.argmax(np.abs(series)))
     found = float(series[best])

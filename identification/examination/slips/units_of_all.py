@@ -1,4 +1,4 @@
-"""Statements whose unit is wrong in all runs, known by the size of what would follow from them."""
+"""Statements whose unit is wrong in all runs, known by the size of their consequences."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from identification.status import Outcome, Remark
 _KEEP = "or state plausible = false under [sensor]"
 _SLENDER = 12.0  # Izz of a uniform rod of mass m and length l is m l²/12
 
-#: What the density is over the true one where a value is in another unit.
+#: Apparent density over the true one where a value is in another unit.
 _OF_DENSITY = {
     "spring_stiffness in N mm/rad": 1e3,
     "spring_stiffness in N cm/rad": 1e2,
@@ -30,7 +30,7 @@ _OF_DENSITY = {
 
 @dataclass(frozen=True)
 class YawMomentTooLarge(StatementSlip):
-    """|Cnβ| as no body has it: a stiffness, a speed or a size in a wrong unit. Asked about."""
+    """|Cnβ| too large for any body: a stiffness, a speed or a size in a wrong unit. Asked about."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare Cnβ of the runs with the greatest."""
@@ -42,7 +42,7 @@ class YawMomentTooLarge(StatementSlip):
         found = agreement(Statements.of(swings))
         if found.freedom < 0 or not found.inverse_inertia > 0.0:
             return ()
-        # where a stated inertia contradicts the springs, that is said by itself
+        # a stated inertia that contradicts the springs has its own remark
         inertia = min(seen.campaign.rig.yaw_inertia or np.inf, 1.0 / found.inverse_inertia)
         scale = area * length / inertia
         value, std = found.air / scale, found.air_std / scale
@@ -60,7 +60,7 @@ class YawMomentTooLarge(StatementSlip):
 class InertiaOfNoBody(StatementSlip):
     """An inertia, by the springs, that a body of the stated sizes cannot have. Asked about, with the likely slips.
 
-    Where an inertia is stated it is compared with that one, which is closer.
+    A stated inertia is compared instead where there is one: it is closer.
     """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
@@ -86,5 +86,5 @@ class InertiaOfNoBody(StatementSlip):
 
 
 def _judged(seen: Seen) -> bool:
-    """Whether sizes are judged: not where the campaign vouches for them, or the joint slides."""
+    """Whether sizes are judged: not where the campaign states that they are right, or the joint slides."""
     return seen.campaign.sensor.plausible is not False and seen.campaign.law is None

@@ -1,4 +1,4 @@
-"""An angle that jumps by a whole turn, as an encoder's does where its count begins again."""
+"""An angle that jumps by a whole turn, as an encoder's does where its count restarts."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
 _TURN = 2.0 * np.pi
-#: Of a turn: step between samples, less whole turns. With ten samples per cycle, the fewest that are read, a swing
-#: of a tenth of a turn steps by no more.
+#: Of a turn: step between samples, less whole turns. With ten samples per cycle, the fewest accepted, a swing of a
+#: tenth of a turn has no larger steps.
 _SMOOTH = 0.1
 
 
@@ -22,7 +22,7 @@ class WrappedAngle(RecordSlip):
     """The reading jumps by whole turns; unwrapped it is smooth. It is unwrapped."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Unwrap records in which all large steps are whole turns, and put them on the turn of the other runs.
+        """Unwrap records in which all large steps are whole turns, and shift them to the turn of the other runs.
 
         Rates and accelerations do not wrap.
         """
@@ -49,7 +49,7 @@ class WrappedAngle(RecordSlip):
 
 
 def _turns(record: Record) -> Array | None:
-    """The whole turns by which each sample is off the first; None where the record does not wrap."""
+    """The whole turns between each sample and the first; None where the record does not wrap."""
     steps = np.diff(record.yaw_rad)
     turns = np.round(steps / _TURN)
     if not turns.any() or not bool(np.all(np.abs(steps - _TURN * turns) < _SMOOTH * _TURN)):

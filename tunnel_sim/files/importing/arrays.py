@@ -1,4 +1,4 @@
-"""Tables of named arrays, as MAT, HDF5 and JSON files hold them."""
+"""Tables of named arrays, from MAT, HDF5 and JSON files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.errors import counted
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""
-_MOST_CHANNELS = 256  # rows of a matrix: it is turned so that they are fewer than its samples
+_MOST_CHANNELS = 256  # rows of a matrix: it is transposed so that they are fewer than its samples
 
 
 def tables_of_arrays(
@@ -26,10 +26,10 @@ def tables_of_arrays(
     units: Mapping[str, str] = MappingProxyType({}),
     runs: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Table]:
-    """Tables of arrays: those of the same group and length belong together.
+    """Tables of arrays: arrays of the same group and length belong together.
 
     Single numbers are facts of the tables of their group and below; those of a group without records describe
-    what is beside it.
+    the groups beside it.
 
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
@@ -76,18 +76,18 @@ def tables_of_arrays(
 def _of_described(
     facts: Mapping[str, Mapping[str, float]], records: Collection[str]
 ) -> dict[str, dict[str, float]]:
-    """Numbers by the group that they describe: their own, or the one above where their own has no records."""
+    """Numbers by the group that they describe: their own, or the one above if their own has no records."""
     found: dict[str, dict[str, float]] = {}
     for group, numbers in facts.items():
         own = group == "" or any(name == group or name.startswith(f"{group}/") for name in records)
         inside = any(group.startswith(f"{name}/") for name in records)
-        one_of_several = group.endswith("]")  # an element of a list of runs describes no other
+        one_of_several = group.endswith("]")  # an element of a list of runs does not describe another
         above = group if own or inside or one_of_several else group.rpartition("/")[0]
         found.setdefault(above, {}).update(numbers)
     return found
 
 
 def check_size(count: int, where: str) -> None:
-    """Refuse arrays whose number of values, as the file states it, is too large."""
+    """Refuse arrays whose number of values, as stated in the file, is too large."""
     most = limits.DATA_BYTES // 8
     check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")

@@ -24,7 +24,7 @@ _REMEDY = "write the file again, as Parquet or as text"
 
 
 def _read_run(content: bytes, where: str, most: int) -> FileTable:
-    """The columns of a run file that are used."""
+    """The used columns of a run file."""
     remedy = "write the file again, as Parquet or as CSV"
     schema = frame_schema(content, where, remedy, rows=most, counted="samples")
     used = [name for name in schema if name in USED_COLUMNS]
@@ -59,7 +59,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
-_COMPRESSED = 15  # data type of an element that zlib has packed
+_COMPRESSED = 15  # data type of an element compressed by zlib
 _HEADER = 128  # bytes before the first element of version 5
 
 
@@ -82,7 +82,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 datasets[path] = item
             group = isinstance(item, h5py.Group)
             for name in item.attrs:
-                held = item.attrs.get_id(name)  # others are not read: a text may lie in a damaged heap
+                held = item.attrs.get_id(name)  # others are not read: a text may be in a damaged heap
                 if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
                     folder = path if group else path.rpartition("/")[0]
                     attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
@@ -110,7 +110,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
 
 
 def _hdf5_unit(item: Any) -> str:
-    """The unit that an attribute of a dataset states."""
+    """The unit stated by an attribute of a dataset."""
     for name in ("unit", "units", "Unit", "Units"):
         text = item.attrs.get(name, "")
         if found := known_unit(text.decode(errors="replace") if isinstance(text, bytes) else str(text)):
@@ -137,7 +137,7 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
                 total += size
             at += 8 + size
         check_size(total // 8, where)
-        held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know paths only
+        held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know only paths
     arrays: dict[str, NDArray[np.generic]] = {}
     runs = {}
     for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
@@ -154,9 +154,9 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
 
 
 def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:
-    """The number that a text such as ``12 m/s`` states, by path; empty where it states none."""
+    """The number stated by a text such as ``12 m/s``, by path; empty if it states none."""
     found = facts_in([f"{name}: {text}"])
-    # A unit may hold the sign that separates the parts of a path.
+    # A unit may contain the character that separates the parts of a path.
     return {
         "/".join(filter(None, (group, one.replace("/", "∕")))): np.array(value)
         for one, value in found.items()

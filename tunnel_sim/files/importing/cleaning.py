@@ -1,4 +1,4 @@
-"""Clean-up of times and readings; every change is said."""
+"""Clean-up of times and readings; every change is reported."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from tunnel_sim.vocabulary.record import Array
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
 _TURNS = (2.0 * pi, 360.0)
 _NEAR_END = 4.0  # other steps: a jump leads from one end of the range to the other
-_MOST_JUMPS = 10  # samples per jump, at least
-_NEARLY = 0.75  # of a counter's range: a step between two samples as long as that is an overflow
+_MOST_JUMPS = 10  # least number of samples per jump
+_NEARLY = 0.75  # of a counter's range: a step this long between two samples is an overflow
 _SMALL = 0.25  # of the range: no other step is longer
-_COARSE = 0.1  # share of samples with the stamp of the one before, above which the stamps are too coarse
+_COARSE = 0.1  # share of samples with the stamp of the previous one, above which the stamps are too coarse
 _UNEVEN = 0.01  # of a step
 _FINEST = 1e-12  # s
-_RESTARTS = 0.01  # share of steps backwards, up to which the clock restarts and the rows are not out of order
-_LEVELS_OF = 200_000  # samples of each run are looked at
+_RESTARTS = 0.01  # share of backward steps, up to which the clock restarts and the rows are not out of order
+_LEVELS_OF = 200_000  # samples of each run that are inspected
 _MOST_LEVELS = 20_000
 _ON_LEVEL = 0.2  # of a level's height
 
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:
-    """Times and readings without what cannot be used.
+    """Times and readings without unusable samples.
 
     Args:
         time_s: shape (n,), s, increasing, from zero on.
@@ -44,12 +44,12 @@ class Cleaned:
 
     @property
     def file_time_s(self) -> Array:
-        """Times by the file's clock, shape (n,), s: that of ``--start``, of pictures, tables and notes."""
+        """Times by the file's clock, shape (n,), s: the clock of ``--start``, of pictures, tables and notes."""
         return self.time_s + self.first_s
 
 
 def without_overflow(values: Array, said: list[str]) -> Array:
-    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are said.
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are reported.
 
     Args:
         values: as recorded, shape (n,); NaN where there is no number.
@@ -77,24 +77,24 @@ def without_overflow(values: Array, said: list[str]) -> Array:
 
 
 def restarts(time: Array) -> list[int]:
-    """Where the times, shape (n,), begin anew because another run follows: its first samples; empty: nowhere."""
+    """Indices where the times, shape (n,), restart because another run follows; empty: nowhere."""
     with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
         back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if not back.size or back.size > max(1.0, _RESTARTS * time.size):
         return []
     starts = [0, *back.tolist(), time.size]
     parts = [time[a:b] for a, b in itertools.pairwise(starts)]
-    # Another run begins near the time at which the first one began, and not a little earlier than the row above.
+    # Another run begins near the time at which the first one began, and not slightly before the previous row.
     early = [part[0] - time[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:]]
     return back.tolist() if all(early) else []
 
 
 def cleaned(time: Array, reading: Array) -> Cleaned:
-    """Times and readings that a campaign can hold.
+    """Times and readings in the form of a campaign.
 
     Args:
         time: as recorded, shape (n,), s.
-        reading: shape (n,), in radians or what the sensor measures.
+        reading: shape (n,), in radians or the unit of the sensor.
     """
     said: list[str] = []
     good = np.isfinite(time) & np.isfinite(reading)
@@ -135,7 +135,7 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
     time = from_zero(time)
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size > 1 else 0.0
-    if usual > 0.0:  # else beyond the resolution of floating-point numbers; the run is refused later
+    if usual > 0.0:  # else below the resolution of floating-point numbers; the run is refused later
         gaps = steps > 1.75 * usual
         if gaps.any():
             missing = int(np.round(steps[gaps] / usual - 1.0).sum())
@@ -154,7 +154,7 @@ def clock_text(time: float) -> str:
 
 
 def from_zero(time: Array) -> Array:
-    """Times from the first sample on, shape (n,), s, without the digits that a subtraction adds."""
+    """Times from the first sample on, shape (n,), s, without the extra digits of a subtraction."""
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
@@ -183,7 +183,7 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
 
 
 def resolution(readings: Sequence[Array]) -> float | None:
-    """The step of a sensor whose readings, each of shape (n,), lie on evenly spaced levels; None: they do not."""
+    """The step of a sensor whose readings, each of shape (n,), are on evenly spaced levels; None: they are not."""
     some = np.concatenate([reading[:_LEVELS_OF] for reading in readings])
     levels = np.unique(some)
     if not 3 <= levels.size <= min(_MOST_LEVELS, some.size // 2):

@@ -1,4 +1,4 @@
-"""Which columns are times and angles, and their numbers in seconds and radians."""
+"""The columns of times and angles, and their numbers in seconds and radians."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ _JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _OTHER = re.compile(
     r"(?<![a-z])(index|idx|sample|samples|nr|no|row|#|frame|temperature|current|force)(?![a-z])", re.I
 )
-_HEAD = 20_000  # samples in which a column without a name is looked at
+_HEAD = 20_000  # samples of a column without a name that are inspected
 _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
 _HARDLY = 0.02  # of the span of another column in the same unit
-_DERIVATIVE = 0.9  # correlation with the derivative of another column, from which on a column is its rate
+_DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class ColumnPair:
 
 
 def named_kind(name: str) -> str:
-    """The kind of quantity, ``rate`` or ``acceleration``, that a column's name states; empty: neither."""
+    """The kind of quantity, ``rate`` or ``acceleration``, stated by a column's name; empty: neither."""
     words = _JOINED.sub("_", name)
     if _ACCELERATION.search(words):
         return "acceleration"
@@ -75,7 +75,7 @@ def stem(name: str) -> str:
 
 
 def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
-    """The columns of each run, one run at least."""
+    """The columns of each run, at least one run."""
     starts = [i for i, c in enumerate(table.channels) if _matches(c, choices.time or "") or is_time(c)]
     stems = {stem(table.channels[i].name) for i in starts}
     blocks = [table.channels]
@@ -122,7 +122,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
 
 
 def is_time(channel: Channel) -> bool:
-    """Whether a column holds times, by its unit or its name."""
+    """Whether a column contains times, by its unit or its name."""
     kind = kind_of(channel.unit)
     if condition_of(channel.name, channel.unit) is not None:
         return False
@@ -130,13 +130,13 @@ def is_time(channel: Channel) -> bool:
 
 
 def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel | None:
-    """The column that is stated to be the input, by name, with its unit or without, or by number; None: none is."""
+    """The column stated as the input, by name, with or without its unit, or by number; None: there is none."""
     found = [] if choices.input is None else _named(channels, choices.input)
     return found[0] if found else None
 
 
 def _named(channels: Sequence[Channel], wanted: str) -> list[Channel]:
-    """The columns of a name, as it is written in the file or without its unit, or of a number from 1 on."""
+    """The columns of a name, with or without its unit as written in the file, or of a number from 1 on."""
     found = [channel for channel in channels if _matches(channel, wanted)]
     if not found and wanted.isdigit() and 1 <= int(wanted) <= len(channels):
         found = [channels[int(wanted) - 1]]
@@ -174,7 +174,7 @@ def _readings(
             levels[0].append(c)
         elif c.unit == "" and named:
             levels[1].append(c)
-        elif c.unit and kind == "" and named:  # in a unit that is not known, which is asked for
+        elif c.unit and kind == "" and named:  # in an unknown unit, which the user is asked for
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
@@ -211,13 +211,13 @@ def _unconditional(block: Sequence[Channel], choices: ImportChoices) -> list[Cha
 
 
 def _span(channel: Channel) -> float:
-    """From the least to the greatest number."""
+    """Difference of the greatest and the least number."""
     numbers = channel.values[np.isfinite(channel.values)]
     return float(np.ptp(numbers)) if numbers.size else 0.0
 
 
 def _a_rate(channels: Sequence[Channel], time: Channel | None) -> Channel | None:
-    """A column that follows the derivative of another one; None where there is none."""
+    """A column that follows the derivative of another one; None if there is none."""
     if time is None:
         return None
     for angle in channels:
@@ -237,8 +237,8 @@ def _listed(channels: Sequence[Channel]) -> str:
     return ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
 
 
-_SLOWEST_STEP = 0.5  # s: a longer step between samples is one in milliseconds, or in microseconds
-_HALF_TURN = pi  # half the span of an angle: more is taken as degrees
+_SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
+_HALF_TURN = pi  # half the span of an angle: a greater one is in degrees
 _NUMBER = r"([+-]?\s*\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)"
 _FORMULA = re.compile(rf"^\s*(?:{_NUMBER}\s*(?=[+-]))?\s*{_NUMBER}?\s*\*?\s*[VvXx]\s*(?:{_NUMBER})?\s*$")
 _RATE_FACTS = re.compile(
@@ -255,7 +255,7 @@ Calibration = tuple[Array, Array] | tuple[float, float]
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
-    """The unit of certain kinds, keys of `UNITS`, that an option names; None where it is not given."""
+    """The unit of certain kinds, keys of `UNITS`, named by an option; None if the option is not given."""
     unit = known_unit(text) if text is not None else None
     if text is not None and (unit is None or kind_of(unit) not in kinds):
         names = ", ".join(name for kind in kinds for name in UNITS[kind])
@@ -264,7 +264,7 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
 
 
 def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
-    """The interval of samples that have no times, s, None where nothing states it; and what states it."""
+    """The interval of samples without times, s, None if it is not stated; and its source."""
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
     for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
@@ -276,14 +276,14 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
 
 
 def guessed_time_unit(values: Array) -> tuple[str, float]:
-    """The unit that times without one, shape (n,), are taken to have, and the usual step in it."""
+    """The assumed unit of times without one, shape (n,), and the usual step in it."""
     steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
 
 
 def guessed_angle_unit(values: Array) -> tuple[str, float]:
-    """The unit that angles without one, shape (n,), are taken to have, and half their range in it."""
+    """The assumed unit of angles without one, shape (n,), and half their range in it."""
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     return "deg" if swing > _HALF_TURN else "rad", swing
 
@@ -291,7 +291,7 @@ def guessed_angle_unit(values: Array) -> tuple[str, float]:
 def in_seconds(
     pair: ColumnPair, facts: Mapping[str, float], choices: ImportChoices, said: list[str], where: str
 ) -> Array:
-    """The times of a run, s, shape (n,): of their column, or at the stated rate; what is guessed is said."""
+    """The times of a run, s, shape (n,): from their column, or at the stated rate; guesses are reported."""
     if pair.time is None:
         interval, origin = sample_interval(facts, choices)
         if interval is None:
@@ -312,7 +312,7 @@ def in_seconds(
 
 
 def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
-    """Refuse to guess the unit of a column in whose name a unit may be written."""
+    """Refuse to guess the unit of a column whose name may contain a unit."""
     word = written_unit(channel.name, kinds)
     if word:
         what = f"'{word}' in the name of '{one_line(channel.name, 40)}' may be its unit"
@@ -321,9 +321,10 @@ def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: st
 
 
 def _refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
-    """Refuse columns that their names call rates or accelerations, of which nothing states the unit.
+    """Refuse columns named as rates or accelerations whose unit is not stated.
 
-    Their size does not tell rad/s from deg/s as that of an angle tells rad from deg: a rate has no largest value.
+    Their size does not separate rad/s from deg/s, as an angle's separates rad from deg: a rate has no greatest
+    value.
     """
     kinds = {channel: named_kind(channel.name) for channel in channels if not channel.unit}
     first = next(filter(None, kinds.values()), "")
@@ -345,7 +346,7 @@ def _refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
 def in_radians(
     reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
 ) -> tuple[Array, Quantity, str]:
-    """Readings in rad, rad/s or rad/s², shape (n,), what they are, and the unit they were taken to have."""
+    """Readings in rad, rad/s or rad/s², shape (n,), their quantity, and their assumed unit."""
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
@@ -398,7 +399,7 @@ def in_radians(
 
 
 def read_calibration(text: str | None) -> Calibration | None:
-    """The calibration: a formula such as ``0.1 + 20*V``, or that of a text file of volts and angle."""
+    """The calibration: a formula such as ``0.1 + 20*V``, or from a text file of volts and angle."""
     if text is None:
         return None
     formula = _FORMULA.match(text)

@@ -1,4 +1,4 @@
-"""Conditions of runs and sizes of a rig: their keys, names and units in files, and what only looks like one."""
+"""Conditions of runs and sizes of a rig: their keys, names and units in files, and names that resemble them."""
 
 from __future__ import annotations
 
@@ -71,19 +71,19 @@ _SIZES = {
 
 
 def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
-    """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
+    """The condition or size, a key of `Conditions`, stated by a column, or by a number ``alone``."""
     if name in OF_CAMPAIGN and (unit == "" or name != "width"):
         return name
-    name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
+    name = re.sub(r"\s*[(\[{<].*", "", name)  # an unknown unit remains in the name
     plain = re.sub(r"[\s_.-]+", " ", name).strip()
     found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
-    # No unit of time measures what is named so.
+    # A unit of time does not fit such a name.
     symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
     return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
 
 
 def resembles(name: str, unit: str) -> str | None:
-    """The condition that a name without a unit, or a unit alone, suggests and does not state; None: none."""
+    """The condition that a name without a unit, or a unit alone, suggests without stating it; None: none."""
     if unit:
         return next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)
     return next((key for key, pattern in _LIKE.items() if pattern.fullmatch(name.strip())), None)

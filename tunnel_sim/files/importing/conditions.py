@@ -1,4 +1,4 @@
-"""What a user states about files, and the conditions of runs: from tables, names of files, or the files."""
+"""A user's statements about files, and the conditions of runs: from tables, names of files, or the files."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
 
 
 class Unstated(TunnelError):
-    """A condition of a run that only the user can state, whatever else is read beside it."""
+    """A condition of a run that only the user can state, even beside other sources."""
 
 
 class StatedBy(StrictModel):
@@ -49,7 +49,7 @@ class StatedBy(StrictModel):
 
 
 class Stretch(StrictModel):
-    """``[[choices.stretches]]``: where a run lies in its record, and its reading at rest; None: as found."""
+    """``[[choices.stretches]]``: start and end of a run in its record, and its reading at rest; None: as found."""
 
     file: OneLine = Field(description="the name of the file")
     run: OneLine = Field(description="the name of the run")
@@ -59,7 +59,7 @@ class Stretch(StrictModel):
 
 
 class ImportChoices(StrictModel):
-    """How files are to be read; what is None is found from the files."""
+    """How files are read; None: found from the files."""
 
     time: OneLine | None = optional("the name or number of the column of times")
     angle: tuple[OneLine, ...] = Field(
@@ -94,9 +94,9 @@ class ImportChoices(StrictModel):
     stated_by: StatedBy = Field(default=StatedBy(), description="a [choices.stated_by] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:
-        """What is stated about where a run lies in its file and rests."""
+        """The statement on start, end and rest of a run in its file."""
         found = (one for one in self.stretches if (one.file, one.run) == (file, run))
-        # A file may have a name that no recipe can hold: nothing is stated about it.
+        # A file may have a name that a recipe cannot express: there is then no statement about it.
         return next(found, Stretch.model_construct(file=file, run=run))
 
 
@@ -117,7 +117,7 @@ class Recipe(StrictModel):
 
 
 def read_recipe(path: Path) -> ImportChoices:
-    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder that holds it."""
+    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder with it."""
     path = path / IMPORT_RECIPE if path.is_dir() else path
     missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
     return read_document(Recipe, path, missing=missing).choices
@@ -181,7 +181,7 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
 
 
 def _same(name: str) -> str:
-    """A name for comparison: some systems take the accents of file names apart."""
+    """A name for comparison: some systems decompose the accents of file names."""
     return unicodedata.normalize("NFC", name).lower()
 
 
@@ -233,7 +233,7 @@ class ConditionTable:
             self._rows[_same(name)] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
-        """Conditions of a run, by its name or that of the file that holds it."""
+        """Conditions of a run, by its name or the name of its file."""
         for name in (run, path.name, path.stem):
             if _same(name) in self._rows:
                 return self._rows[_same(name)]

@@ -24,19 +24,19 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import INPUTS
 from tunnel_sim.vocabulary.record import Array, Record
 
-_JUDGED = 500_000  # samples in which the cycles of a long record are counted
+_JUDGED = 500_000  # samples for counting the cycles of a long record
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedRun:
-    """A run, or what was taken for one.
+    """A run, or a stretch mistaken for one.
 
     Args:
-        rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
+        rest: the stated reading at rest, which is subtracted, rad (rad/s or rad/s²); None: not stated.
         sizes: of the rig, and scatter between runs, as the file states them.
-        held: conditions that a campaign takes only beside an air density, which is still to be stated.
-        without_density: whether it is.
+        held: conditions that a campaign uses only with an air density, which is not yet stated.
+        without_density: whether the air density is not yet stated.
     """
 
     id: str
@@ -51,7 +51,7 @@ class ImportedRun:
 
     @property
     def reading(self) -> Array:
-        """Of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
+        """Reading of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
         return self.raw.cleaned.reading[self.piece.first : self.piece.last]
 
 
@@ -68,9 +68,9 @@ def imported_run(
     """A run of a record.
 
     Args:
-        piece: of the record, that is the run.
-        named: what the name of its file seems to state.
-        later: whether an air density that is missing may be stated later (`ImportedRun.held`).
+        piece: the part of the record that is the run.
+        named: conditions that the name of its file seems to state.
+        later: whether a missing air density may be stated later (`ImportedRun.held`).
 
     Raises:
         Unstated: where a condition is open that only the user can state.
@@ -118,7 +118,7 @@ def imported_run(
         record, stride = None, time.size // _JUDGED
         release = None if drive is not None else stated.get("release_angle")
         if drive is None and stride > 1:
-            # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+            # A long record that passes when thinned also passes as a whole, which would take seconds to check.
             with suppress(TunnelError):
                 checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
                 record = Record(time, reading)
@@ -138,10 +138,10 @@ def _stated(
     table: ConditionTable | None,
     said: list[str],
 ) -> tuple[dict[str, float], list[Hint]]:
-    """Conditions and sizes of a run, by key, and what the file holds that looks like one and is not used.
+    """Conditions and sizes of a run, by key, and unused content of the file that resembles them.
 
     Args:
-        rows: which rows of the record are the run's, shape (n,).
+        rows: which rows of the record belong to the run, shape (n,).
     """
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     in_table = {} if table is None else table.of(raw.source, run)
@@ -158,7 +158,7 @@ def _check_wind(
     said: list[str],
     where: str,
 ) -> None:
-    """Say what looks like a condition and is not used; refuse to assume wind-off beside a hint of a wind."""
+    """Report unused content that resembles a condition; refuse to assume wind-off where a wind is suggested."""
     open_ones = [hint for hint in hints if hint.key not in stated]
     said += [hint.words for hint in open_ones]
     if "wind_speed" in stated:
@@ -178,7 +178,7 @@ def _check_wind(
 
 
 def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:
-    """The input of a run; None of a free decay."""
+    """The input of a run; None for a free decay."""
     if raw.input is None:
         return None
     column, values = raw.input

@@ -1,4 +1,4 @@
-"""The input of a driven run: which column it is, found by name, unit and correlation with the motion."""
+"""The input of a driven run: its column, found by name, unit and correlation with the motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RunInput:
     """The input of a run.
 
     Args:
-        channel: that holds it.
+        channel: its column.
         values: in the unit of ``column``, shape (n,).
     """
 
@@ -38,7 +38,7 @@ _NAMES = re.compile(
     r"tau|effort|u|base|root)(?![a-z])",
     re.IGNORECASE,
 )
-_CORRELATED = 0.3  # greatest correlation at any lag, from which on a column drives the motion
+_CORRELATED = 0.3  # greatest correlation at any lag, from which a column drives the motion
 
 
 def find_input(
@@ -49,7 +49,7 @@ def find_input(
     said: list[str],
     where: str,
 ) -> RunInput | None:
-    """The input of a run; None of a free decay.
+    """The input of a run; None for a free decay.
 
     Args:
         beside: the columns of times and reading.
@@ -83,7 +83,7 @@ def find_input(
         if conditional or not plausible or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
-        with suppress(TunnelError):  # it correlates with the motion, and is not the motion itself
+        with suppress(TunnelError):  # it correlates with the motion, but is not the motion itself
             checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
             if correlation(channel.values, reading)[0] >= _CORRELATED:
                 found.append(channel)
@@ -106,14 +106,14 @@ def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: li
 
 
 def _claimed(channel: Channel) -> InputColumn | None:
-    """The kind of input that name and unit of a column show; None where they show none."""
+    """The kind of input shown by name and unit of a column; None if they do not show it."""
     return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
 
 
 def correlation(values: Array, reading: Array) -> tuple[float, int]:
     """The greatest correlation of an input with a later reading, from 0 to 1, and its lag in samples.
 
-    The lag is a quarter of the record at most.
+    The lag is at most a quarter of the record.
 
     Args:
         values: of the input, any unit, shape (n,).
@@ -131,7 +131,7 @@ def correlation(values: Array, reading: Array) -> tuple[float, int]:
 
 
 def at_times(values: Array, time: Array, reading: Array, kept: Array) -> Array:
-    """The input at the times that the clean-up of a record has kept: that of the nearest row, shape (n,).
+    """The input at the times kept by the clean-up of a record: its value in the nearest row, shape (n,).
 
     Args:
         values: of the input at every row, shape (m,).

@@ -27,7 +27,7 @@ _NAMES = ("columns", "names", "fields", "channels", "header", "spalten")
 
 @dataclass(frozen=True)
 class _Found:
-    """What a document holds so far, by path with ``/`` between members."""
+    """The content of a document so far, by path with ``/`` between members."""
 
     arrays: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -44,7 +44,7 @@ def _read(content: bytes, where: str) -> list[Table]:
 
 
 def _read_lines(content: bytes, where: str) -> list[Table]:
-    """The tables of a file that holds a JSON record on each line."""
+    """The tables of a file with a JSON record on each line."""
     with faults("a file of JSON lines", where):
         return _tables(
             [json.loads(line) for line in content.decode("utf-8-sig").splitlines() if line.strip()], where
@@ -150,7 +150,7 @@ def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) 
 
 
 def _in_stated_unit(table: Table, found: _Found) -> Table:
-    """A table whose one reading without a unit is in the unit that its group, or the document, states."""
+    """A table whose one reading without a unit has the unit stated by its group, or the document."""
     unit = found.stated.get(table.part) or found.stated.get("", "")
     bare = [c for c in table.channels if not c.unit and not names_a_time(c.name) and not names_runs(c.name)]
     if kind_of(unit) in ("", "time") or len(bare) != 1:
@@ -169,7 +169,7 @@ def _labelled(table: Table, found: _Found) -> list[Table]:
 
 
 def _indexed(value: Mapping[str, Any]) -> list[Any] | None:
-    """The values of a mapping from row numbers, as some programs write a column; None of any other."""
+    """The values of a mapping from row numbers, as some programs write a column; None for any other."""
     numbered = len(value) >= LEAST_ROWS and all(key.isdigit() for key in value)
     return list(value.values()) if numbered else None
 

@@ -43,10 +43,10 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
-        stated: the conditions that the file states, in numbers and in the rows of the record.
+        stated: the conditions stated in the file, in numbers and in the rows of the record.
         clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
-        whole: whether the file itself says that it is one run.
-        input: of a driven record: what it is, and its values at the cleaned times, shape (n,); None of free decays.
+        whole: whether the file itself states that it is one run.
+        input: of a driven record: its kind, and its values at the cleaned times, shape (n,); None for free decays.
         input_facts: the order of its hold (0 or 1) and its gain in N m per unit, by key of the format.
     """
 
@@ -65,7 +65,7 @@ class RawRecord:
     input_facts: Mapping[str, float] = field(default_factory=dict)
 
     def rows(self, first: float, last: float) -> NDArray[np.bool_]:
-        """Which rows of the record are those of a run, shape (n,).
+        """Which rows of the record belong to a run, shape (n,).
 
         Args:
             first: time of its first sample, s.
@@ -83,7 +83,7 @@ def raw_records(
     several: bool,
 ) -> list[RawRecord]:
     """The records of a file; ``several``: ids must name the file, because there are others."""
-    # A short table beside longer ones holds conditions or sizes.
+    # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
@@ -165,10 +165,10 @@ def _turning_points(
     said: Sequence[str],
     choices: ImportChoices,
 ) -> TurningPoints:
-    """The turning points that a table holds, with the standard deviations that its columns state.
+    """The turning points in a table, with the standard deviations in its columns.
 
     Args:
-        unit: of the angle, for a column of uncertainties that names none that is known.
+        unit: of the angle, for a column of uncertainties without a known unit.
     """
     time, said = clean.time_s, [*table.said, *said]
     if pair.time is not None and not pair.time.unit and choices.time_unit is None:

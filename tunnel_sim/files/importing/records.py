@@ -1,4 +1,4 @@
-"""From files to the runs of a campaign, and to its folder, with what is not known as comments."""
+"""From files to the runs of a campaign, and to its folder, with unknown properties as comments."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What was read from files.
+    """The result of reading files.
 
     Args:
         sizes: of the rig and the scatter between runs, by key of `Conditions`.
@@ -68,14 +68,14 @@ class Imported:
 
     @property
     def held(self) -> dict[str, dict[str, float]]:
-        """Conditions by run, and sizes under the empty name, that are taken once the air density is stated."""
+        """Conditions by run, and sizes under the empty name, that are used once the air density is stated."""
         if not any(part.without_density for part in self.parts):
             return {}
         rig = {key: value for key, value in self.sizes.items() if key in _WITH_DENSITY}
         return {"": rig, **{part.id: dict(part.held) for part in self.parts if part.held}}
 
     def remarks(self, path: Path | None = None) -> list[str]:
-        """How all files or one were read and what was changed, each once with the runs that it concerns."""
+        """Remarks on the reading of all files or one, and on changes, each once with its runs."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
@@ -99,12 +99,12 @@ def read_records(
     name: str = "",
     later: bool = False,
 ) -> Imported:
-    """Read files as instruments write them; nothing is written, and what ``choices`` leave open is found.
+    """Read files as instruments write them; nothing is written, and open ``choices`` are found from the files.
 
     Args:
         conditions: a table of conditions; None: none.
-        name: of the campaign; empty: that of the first file.
-        later: whether air densities that are missing may be stated later (`Imported.held`).
+        name: of the campaign; empty: the name of the first file.
+        later: whether missing air densities may be stated later (`Imported.held`).
     """
     calibration = read_calibration(choices.calibration)
     pattern = None if choices.name is None else name_pattern(choices.name)
@@ -142,7 +142,7 @@ def read_records(
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     sizes = _sizes(parts, choices)
     campaign = _campaign(parts, sizes, name or one_line(files[0].stem), raws[0].quantity)
-    # For the recipe: what was found, where all records share it.
+    # For the recipe: properties found in the files, where all records share them.
     known: dict[str, Any] = {**sources[0].known}
     units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))
     if len(units) == 1 and choices.counts_per_turn is None and choices.calibration is None:
@@ -202,10 +202,10 @@ def _campaign(
         name,
         RigProperties(**rig),
         SensorProperties(
-            # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
+            # From the readings in the files: the subtracted value need not be a whole number of steps.
             resolution=resolution([part.reading for part in used]),
             quantity=None if quantity == "angle" else quantity,
-            # What was subtracted is as uncertain as a line drawn by hand, in each run by itself.
+            # The subtracted value is as uncertain as a line drawn by hand, independently in each run.
             zero="per_run" if len({part.rest for part in used}) > 1 else None,
         ),
         runs,
@@ -254,11 +254,11 @@ def import_records(
     overwrite: bool = False,
     picture: Callable[[Imported], bytes] | None = None,
 ) -> Imported:
-    """Read files as instruments write them, and write them as a campaign: whole, or not at all.
+    """Read files as instruments write them, and write them as a campaign: completely, or not at all.
 
     Args:
         files: one or more, of any known format.
-        picture: draws what was read, as PNG; None: no picture.
+        picture: draws the records, as PNG; None: no picture.
     """
     name = one_line(Path(folder).resolve().name)
     imported = read_records([Path(path) for path in files], choices, conditions=conditions, name=name)
@@ -273,7 +273,7 @@ def write_imported(
     overwrite: bool = False,
     picture: Callable[[Imported], bytes] | None = None,
 ) -> None:
-    """Write what was read as a campaign, with its recipe; arguments as in `import_records`."""
+    """Write the imported runs as a campaign, with its recipe; arguments as in `import_records`."""
     samples = sum(run.record.time_s.size for run in imported.campaign.runs)
     driven = {run.id for run in imported.campaign.runs if run.drive is not None}
     recipe = {
@@ -304,7 +304,7 @@ def originals(imported: Imported) -> list[str]:
 
 
 def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven: Collection[str]) -> str:
-    """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too.
+    """``campaign.toml`` after comments on its originals; keys that are not stated are also comments.
 
     Args:
         driven: ids of the driven runs.

@@ -1,8 +1,8 @@
-"""Where runs begin and end in a record.
+"""The start and end of runs in a record.
 
-A free decay crosses its centre every half cycle and never grows much from one half cycle to the next. Where a
-crossing takes longer and the excursions after it are larger than before, a hand has moved the body or held
-it. Any other record is one run.
+A free decay crosses its centre every half cycle and never grows much from one half cycle to the next. If a
+crossing takes longer and the excursions after it are larger than before, a hand has moved or held the body. Any
+other record is one run.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from tunnel_sim.vocabulary.record import Array
 
 _BAND = 0.05  # of the largest excursion: a smaller one counts as rest
 _NOISES = 5.0  # standard deviations: smaller excursions are noise
-_NOISE_OF = 200_000  # samples in which the noise is looked for
-_CENTRED = 2  # times the centre is estimated
+_NOISE_OF = 200_000  # samples for the estimate of the noise
+_CENTRED = 2  # estimates of the centre
 _LONGER = 1.8  # usual half cycles: no free motion takes as long from crossing to crossing
 _SLOWER = 1.25  # times the way back: a pull at the start of a record takes longer
-_GROWN = 1.5  # times the excursion before: no free decay grows as much within half a cycle
-_STILL_GROWING = 1.1  # times the excursion before: the hand has not let go
+_GROWN = 1.5  # times the previous excursion: no free decay grows as much within half a cycle
+_STILL_GROWING = 1.1  # times the previous excursion: the hand has not let go
 _LEAST_HALVES = 6  # half cycles: a shorter motion is not a run
 _AT_TURN = 0.005  # of an excursion: the reading stays as near the turning point while the body is held
 _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
@@ -32,19 +32,19 @@ _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 
 @dataclass(frozen=True)
 class RecordPiece:
-    """A run in a record: the index of its first sample, and that behind its last one."""
+    """A run in a record: the index of its first sample, and the index after its last one."""
 
     first: int
     last: int
 
 
 def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordPiece]:
-    """The runs of a record: one for each release; the whole record where no hand is seen in it.
+    """The runs of a record: one for each release; the whole record if no hand is detected in it.
 
     Args:
         time_s: increasing, shape (n,), s.
         reading: shape (n,).
-        drift: up to which its centre may wander, in the unit of the reading.
+        drift: greatest drift of its centre, in the unit of the reading.
     """
     whole = [RecordPiece(0, reading.size)]
     noise = max(_noise_of(reading), drift)
@@ -104,7 +104,7 @@ def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordP
 
 
 def find_runs_of_rate(time_s: Array, rate: Array) -> list[RecordPiece]:
-    """The runs of a record of rates: from the largest rate after each release, which no hand can have caused.
+    """The runs of a record of rates: from the largest rate after each release, which cannot be due to a hand.
 
     Args:
         time_s: increasing, shape (n,), s.
@@ -139,7 +139,7 @@ def find_runs_of_rate(time_s: Array, rate: Array) -> list[RecordPiece]:
 
 
 def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
-    """A run with the start and the end that are stated; refused where fewer than two samples lie between.
+    """A run with stated start and end; refused if fewer than two samples are in between.
 
     Args:
         time_s: of the record, shape (n,), s.
@@ -158,16 +158,16 @@ def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str)
 
 
 def _without_drift(time_s: Array, angle: Array, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """An angle summed from rates without the drift that a bias of the sensor adds to it, shape (n,).
+    """An angle integrated from rates without the drift due to the sensor's bias, shape (n,).
 
     Args:
-        starts: of the excursions of the rate, between which the body turns; ``ends`` behind their last samples.
+        starts: of the excursions of the rate, between which the body turns; ``ends`` are after their last samples.
     """
     at = (ends[:-1] + starts[1:]) // 2
     if at.size < _LEAST_HALVES:
         return angle
     turns = angle[at]
-    # Of three turning points in turn, so that a decay cancels.
+    # From three consecutive turning points, so that a decay cancels.
     centres, times = 0.25 * (turns[:-2] + 2.0 * turns[1:-1] + turns[2:]), time_s[at[1:-1]]
     half = times.size // 2
     slopes = (centres[half:] - centres[: times.size - half]) / (times[half:] - times[: times.size - half])
@@ -176,19 +176,19 @@ def _without_drift(time_s: Array, angle: Array, starts: NDArray[np.intp], ends: 
 
 
 def _noise_of(reading: Array) -> float:
-    """A size that noise hardly exceeds, by fourth differences, in which a swing hardly shows."""
+    """A bound of the noise, by fourth differences, which hardly contain a swing."""
     some = np.abs(np.diff(reading[:_NOISE_OF], 4))
     return _NOISES * (float(np.median(some)) / (0.6745 * sqrt(70.0))) if some.size else 0.0
 
 
 def _centred(reading: Array, noise: float) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]] | None:
-    """A reading from its centre on, shape (n,), and its excursions; None where it has too few."""
+    """A reading relative to its centre, shape (n,), and its excursions; None if it has too few."""
     away: Array = reading - np.median(reading)
     for _ in range(_CENTRED):
         starts, ends = _excursions(away, noise)
         if starts.size < _LEAST_HALVES:
             return None
-        # A hold or a pull draws the median aside; most swings have their centre between two turning points.
+        # A hold or a pull shifts the median; most swings have their centre between two turning points.
         swings = (away[a:b] for a, b in zip(starts, ends, strict=True))
         turns = np.array([swing[int(np.argmax(np.abs(swing)))] for swing in swings])
         away = away - np.median(0.5 * (turns[1:] + turns[:-1]))
@@ -197,7 +197,7 @@ def _centred(reading: Array, noise: float) -> tuple[Array, NDArray[np.intp], NDA
 
 
 def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The stretches of one sign outside the band around the centre: first samples, and those behind the last."""
+    """The stretches of one sign outside the band around the centre: first samples, and indices after the last."""
     outside = np.flatnonzero(np.abs(away) > max(_BAND * float(np.abs(away).max()), noise))
     change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
     if not outside.size:
@@ -206,7 +206,7 @@ def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:
-    """Where a record ends that rests for longer than it moves: as much rest as motion is kept."""
-    if not clear:  # the motion goes on in the noise
+    """The end of a record that rests for longer than it moves: as much rest as motion is kept."""
+    if not clear:  # the motion continues in the noise
         return time_s.size
     return int(np.searchsorted(time_s, 2.0 * time_s[end - 1] - time_s[first], side="right"))

@@ -1,7 +1,7 @@
 """From a file to its tables: its reader is chosen, and runs in a process with limits.
 
-A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process
-serves one file after another; where it exceeds a limit another one takes its place.
+A damaged file may block a parser for ever, make it request all memory, or end the process. One process
+serves one file after another; if it exceeds a limit, another one replaces it.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
         try:
             return _kept[0].read(reader, content, where)
         except BaseException as error:
-            # What is left of an answer that nobody waits for would be taken for the next one.
+            # An unread reply would be mistaken for the next one.
             if not isinstance(error, TunnelError) or not _kept[0].usable():
                 _kept.pop().end()
             raise
 
 
 class _Server:
-    """The process, seen from the one that asks."""
+    """The process, seen by its client."""
 
     def __init__(self) -> None:
         from multiprocessing.spawn import get_executable  # a program that embeds Python may have set it
@@ -81,7 +81,7 @@ class _Server:
         atexit.register(self.end)
 
     def usable(self) -> bool:
-        """Whether the process runs and belongs to this one: a fork must not talk on its parent's pipes."""
+        """Whether the process runs and belongs to this one: a fork must not use its parent's pipes."""
         return self._owner == os.getpid() and self._process.poll() is None
 
     def end(self) -> None:
@@ -91,11 +91,11 @@ class _Server:
             self._process.kill()
             self._process.wait()
         for stream in (self._asked, self._answers):
-            with suppress(OSError):  # what was left to be sent cannot be
+            with suppress(OSError):  # unsent data cannot be sent
                 stream.close()
 
     def read(self, reader: str, content: bytes, where: str) -> list[Table]:
-        """The tables of a file, as `read_guarded`."""
+        """The tables of a file, as in `read_guarded`."""
         allowed = limits.READER_SECONDS + len(content) / limits.READER_PACE
         late = threading.Event()
 
@@ -133,13 +133,13 @@ class _Server:
 def serve() -> None:
     """Read files for another process, until it closes the pipe."""
     asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whatever a library prints is not an answer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the asking process ends this one
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the output of a library is not an answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the client ends this process
     _limit("RLIMIT_AS", limits.READER_MEMORY)
     with suppress(EOFError):
         while True:
             request, content = _received(asked)
-            # The asking process ends this one earlier, unless it has been killed itself.
+            # The client ends this process earlier, unless it has been killed itself.
             # The limit counts whole seconds.
             _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
             try:
@@ -160,7 +160,7 @@ def serve() -> None:
                 what = f"needs more than {limits.READER_MEMORY / 2**30:g} GiB of memory to be read"
                 remedy = f"split it; if it is damaged, {_DAMAGED}"
                 _send(answers, {"error": what, "remedy": remedy, "sizes": [], "last": True}, [])
-                return  # the next file gets a process that holds nothing
+                return  # the next file gets a fresh process
 
 
 def _limit(name: str, most: int) -> None:
@@ -174,7 +174,7 @@ def _limit(name: str, most: int) -> None:
 
 
 def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memoryview]) -> None:
-    """Send a line of JSON, and the parts whose sizes it holds."""
+    """Send a line of JSON, and the parts whose sizes it states."""
     stream.write(json.dumps(head).encode() + b"\n")
     for part in parts:
         stream.write(part)
@@ -182,7 +182,7 @@ def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memory
 
 
 def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """What `_send` has sent; EOFError where the other process has ended."""
+    """The data sent by `_send`; EOFError where the other process has ended."""
     line = stream.readline()
     if not line.endswith(b"\n"):
         raise EOFError

@@ -1,4 +1,4 @@
-"""The conditions that files state: in numbers, columns and names, and what looks like one without stating it."""
+"""The conditions stated in files: in numbers, columns and names, and content that only resembles one."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 @dataclass(frozen=True)
 class Hint:
-    """What looks like a condition and is not used as one.
+    """Content that resembles a condition and is not used as one.
 
     Args:
         key: of `Conditions`.
-        value: in SI units if it is that condition; NaN where its unit is not known.
-        what: in the file or its name, for a message.
-        why: it is not used.
+        value: in SI units if it is that condition; NaN if its unit is not known.
+        what: its description in the file or its name, for a message.
+        why: the reason for not using it.
         use: the option that uses or states it.
-        symbol: whether a column's letter alone suggests it, which in a robot's log is a command or a velocity.
+        symbol: whether only a column's letter suggests it, which in a robot's log is a command or a velocity.
     """
 
     key: str
@@ -42,19 +42,19 @@ class Hint:
 
     @property
     def words(self) -> str:
-        """The whole in a line."""
+        """The whole hint in a line."""
         return f"{self.what} is left out: {self.why}; {self.use}"
 
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """Of the table of a record.
+    """The statements of the table of a record.
 
     Args:
         numbers: conditions and sizes by key of `Conditions`, in its units.
-        columns: those of conditions by key, with the rows of the record.
-        hints: numbers of the file that are not used.
-        like: columns that look like conditions and are not used, with their hints.
+        columns: columns of conditions by key, with the rows of the record.
+        hints: unused numbers of the file.
+        like: unused columns that resemble conditions, with their hints.
     """
 
     numbers: Mapping[str, float]
@@ -63,7 +63,7 @@ class Stated:
     like: tuple[tuple[Channel, Hint], ...] = ()
 
     def of_rows(self, first: int, last: int) -> Stated:
-        """Of the rows from one to before another."""
+        """The statements from one row to before another."""
         return replace(
             self,
             columns={key: _rows(c, slice(first, last)) for key, c in self.columns.items()},
@@ -71,7 +71,7 @@ class Stated:
         )
 
     def measured(self, rows: NDArray[np.bool_], said: list[str]) -> dict[str, float]:
-        """Conditions that columns state in some rows, shape (n,)."""
+        """Conditions stated by columns in some rows, shape (n,)."""
         found = {
             key: value
             for key, column in self.columns.items()
@@ -86,7 +86,7 @@ class Stated:
         return found
 
     def unused(self, rows: NDArray[np.bool_]) -> list[Hint]:
-        """What looks like a condition in some rows, shape (n,), and is not used; a column about zero does not."""
+        """Unused content that resembles a condition in some rows, shape (n,); a column about zero does not."""
         found = [*self.hints]
         for column, hint in self.like:
             value = from_column(hint.key, replace(column, unit=""), rows, [])
@@ -103,11 +103,11 @@ def stated_in(
     said: list[str],
     where: str,
 ) -> Stated:
-    """What a table states of the conditions of a record.
+    """The statements of a table on the conditions of a record.
 
     Args:
         beside: the columns of times, reading and input.
-        kept: which rows of the table are those of the record, shape (n,).
+        kept: which rows of the table belong to the record, shape (n,).
     """
     claimed = choices.stated_by.model_dump(exclude_none=True)
     numbers, hints = from_facts(table.facts, claimed, said, where)
@@ -119,7 +119,7 @@ def stated_in(
         key = next((key for key, text in claimed.items() if claims(text, channel.name, channel.unit)), None)
         key = key or condition_of(channel.name, channel.unit)
         if key is not None and in_si(key, channel.unit) is not None:
-            columns.setdefault(key, _rows(channel, kept))  # of several that state the same, the first
+            columns.setdefault(key, _rows(channel, kept))  # the first of several that state the same
         elif hint := _hint(channel.name, channel.unit, key, float("nan")):
             like.append((_rows(channel, kept), hint))
     known = {**table.facts, **{channel.name: 0.0 for channel in table.channels}}
@@ -133,10 +133,10 @@ def stated_in(
 def from_facts(
     facts: Mapping[str, float], claimed: Mapping[str, str], said: list[str], where: str
 ) -> tuple[dict[str, float], list[Hint]]:
-    """Conditions and sizes that numbers of a file state, each of which is said, and what only looks like one.
+    """Conditions and sizes stated by numbers of a file, each reported, and numbers that only resemble one.
 
     Args:
-        claimed: by key, the names of numbers that state a condition by the user's word.
+        claimed: by key, the names of numbers that the user has declared to state a condition.
 
     Returns:
         Values by key of `Conditions`, in its units, and hints.
@@ -158,7 +158,7 @@ def from_facts(
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
-    # A density is stated for the wind alone: the one symbol of a speed beside it is that of the wind.
+    # A density is stated for the wind alone: the only symbol of a speed beside it means the wind.
     if "air_density" in found and "wind_speed" not in found and len(symbols) == 1:
         found["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
         hints.remove(symbols[0])
@@ -169,7 +169,7 @@ def from_facts(
 
 
 def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
-    """The hint of a column or a number that is not used; ``key``: the condition that its name states."""
+    """The hint of an unused column or number; ``key``: the condition stated by its name."""
     shown_name = one_line(name, 60)
     number = "" if np.isnan(value) else f" = {value:g}"
     if key is not None:
@@ -201,7 +201,7 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
 
 
 def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
-    """The condition of a run that a column states, in the unit of `Conditions`; None where it says nothing."""
+    """The condition of a run stated by a column, in the unit of `Conditions`; None if it does not state one."""
     values = column.values[rows]
     values = values[np.isfinite(values)]
     if not values.size:
@@ -219,7 +219,7 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
 
 
 def of_short_table(table: Table) -> list[Hint]:
-    """What a table that is too short for a record seems to state about the runs."""
+    """Apparent statements on the runs in a table too short for a record."""
     found = []
     for channel in table.channels:
         key = condition_of(channel.name, channel.unit) or resembles(channel.name, channel.unit)
@@ -266,9 +266,9 @@ class NamePart:
 
     Args:
         value: in SI units.
-        before: what stands before the number, as in the name.
-        behind: what stands behind it.
-        written: whether the number is that value, so that a pattern of names can take it.
+        before: text before the number, as in the name.
+        behind: text after it.
+        written: whether the number is that value, so that a pattern of names can read it.
     """
 
     key: str
@@ -311,7 +311,7 @@ def _parts(stem: str) -> Iterator[NamePart]:
 
 
 def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
-    """What the names of files seem to state, with a pattern that takes it where all names have the same parts."""
+    """Apparent statements in the names of files, with a pattern for them where all names have the same parts."""
     pattern = _pattern(files)
     found = {}
     for path in files:
@@ -331,7 +331,7 @@ def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
 
 
 def _pattern(files: Sequence[Path]) -> str:
-    """A pattern for `name_pattern` from the first name; empty where it does not fit all of them."""
+    """A pattern for `name_pattern` from the first name; empty if it does not fit all of them."""
     stem = files[0].stem
     text, at = "", 0
     parts = [part for part in name_parts(stem) if part.written]

@@ -1,4 +1,4 @@
-"""Tables of a file: columns of numbers by name and unit, before anybody knows what they mean."""
+"""Tables of a file: columns of numbers by name and unit, before their meaning is known."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class Channel:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        """Make every NaN quiet: a damaged file may hold signalling ones, and a minimum that meets one is NaN.
+        """Make every NaN quiet: a damaged file may contain signalling ones, which turn a minimum into NaN.
 
-        A name that is too long is cut: what looks for units and numbers in it takes time with its length squared.
+        A name that is too long is cut: the search for units and numbers in it takes time with its length squared.
         """
         object.__setattr__(self, "name", self.name[: limits.NAME_CHARACTERS])
         object.__setattr__(self, "values", np.where(np.isnan(self.values), np.nan, self.values))
@@ -59,11 +59,11 @@ class Table:
     """Columns of the same length.
 
     Args:
-        part: sheet, group, structure or run in the file; empty where the file holds one table.
+        part: sheet, group, structure or run in the file; empty where the file contains one table.
         facts: single numbers beside the columns, by name.
-        said: how the table was read, and what was left out.
+        said: how the table was read, and what was omitted.
         headed: whether the columns are named in the file.
-        named: whether the part is the name that the file gives to a run, which the table then holds whole.
+        named: whether the part is the file's name for a run, which the table then contains completely.
     """
 
     channels: tuple[Channel, ...]
@@ -75,12 +75,12 @@ class Table:
 
 
 def names_runs(heading: str) -> bool:
-    """Whether a column of that name says to which run each row belongs."""
+    """Whether a column of that name gives the run of each row."""
     return _RUN_NAMES.fullmatch(heading.strip()) is not None
 
 
 def by_run(table: Table) -> list[Table]:
-    """A table with a column of the numbers of its runs as one table for each run; any other as it is."""
+    """Split a table by a column of the numbers of its runs; a table without one is unchanged."""
     channel = next((c for c in table.channels if not table.named and names_runs(c.name) and not c.unit), None)
     if channel is None:
         return [table]
@@ -92,7 +92,7 @@ def by_run(table: Table) -> list[Table]:
 
 
 def is_input(channel: Channel) -> bool:
-    """Whether a column is named as the format names an input, so that it is not the reading."""
+    """Whether a column has the format's name for an input, so that it is not the reading."""
     return heading(channel) in INPUT_COLUMNS
 
 
@@ -111,12 +111,12 @@ def with_input_facts(table: Table) -> Table:
 
 
 def hold_order(text: str) -> float:
-    """The order of a hold that a file states as a text: 0 of ``zero``, 1 of ``linear``, NaN of any other text."""
+    """The order of a hold from its text in a file: 0 for ``zero``, 1 for ``linear``, NaN for any other text."""
     return float(HOLDS.index(text)) if text in HOLDS else float("nan")
 
 
 def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
-    """A table as one for each run that a column of texts names; as it is where the column names none."""
+    """Split a table by the runs named in a column of texts; it is unchanged if the column names none."""
     texts = texts.cast(str).fill_null("").str.strip_chars(" \t\r")
     changes = (texts != texts.shift()).fill_null(value=False).arg_true().to_numpy()
     names = texts.gather([0, *changes]).to_list() if texts.len() else []
@@ -124,7 +124,7 @@ def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
 
 
 def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
-    """A table as one for each run that its column names; as it is where the column cannot name runs."""
+    """Split a table by the runs named in its column; it is unchanged if the column cannot name runs."""
     runs = [name for name in names if name]
     rows = table.channels[0].values.size if table.channels else 0
     if not 0 < len(names) <= rows / _LEAST_EACH or len(set(runs)) < len(runs):

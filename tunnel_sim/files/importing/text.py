@@ -1,4 +1,4 @@
-"""Tables as text in any dialect: its delimiter, decimal sign, encoding and head are found from the content."""
+"""Tables as text in any dialect: delimiter, decimal sign, encoding and head are found from the content."""
 
 from __future__ import annotations
 
@@ -61,22 +61,22 @@ class Layout:
 
     @property
     def runs(self) -> int | None:
-        """Index of the column that says to which run a row belongs."""
+        """Index of the column that gives the run of a row."""
         columns = enumerate(zip(self.names, self.units, strict=True))
         return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
 
 
 def facts_in(lines: Sequence[str]) -> dict[str, float]:
-    """Numbers that lines state, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
+    """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
 
     Returns:
-        Values in SI units where the unit is known, which the name then ends with in brackets.
+        Values in SI units where the unit is known; the name then ends with it in brackets.
     """
     facts = {}
     for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
         for name, before, number, behind in _FACT.findall(line):
             name = name.strip()
-            if before and known_unit(before) is None:  # a cell that is the name, behind a heading
+            if before and known_unit(before) is None:  # a cell with the name, after a heading
                 name, before = before, ""
             text = (before or behind.lstrip(";,\t ")).strip("()[] ")
             unit, value = known_unit(text), float(number.replace(",", "."))
@@ -145,10 +145,10 @@ TEXT = Reader("a table of text", limits.CSV_BYTES)
 """Any file without a reader of its own; `read_text_tables` takes what is known of its dialect."""
 _CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
-_HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
-_LOOKED_AT = 1000  # texts of a column that tell whether they are times of day
+_HEAD, _MIDDLE = 2**18, 2**14  # bytes that are inspected
+_LOOKED_AT = 1000  # texts of a column that show whether they are times of day
 _PART = 2**20  # texts that are converted at once
-_LONG_LINE = 1000  # characters: a longer line above a table states no number
+_LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
 _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -156,7 +156,7 @@ _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blan
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a line is split and a number is written; a blank stands for any number of blanks and tabs."""
+    """The separation of a line and the form of a number; a blank matches any number of blanks and tabs."""
 
     delimiter: str
     decimal: str
@@ -214,7 +214,7 @@ def read_text_tables(
         "decimal": dialect.decimal,
     }
     if dialect.delimiter == " ":
-        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is looked at twice
+        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is scanned twice
         content = re.sub(rb"(?m)^ | $", b"", content)
     options: dict[str, Any] = {
         "separator": dialect.delimiter,
@@ -226,7 +226,7 @@ def read_text_tables(
     missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
     try:
         labels = None
-        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
+        if (at := layout.runs) is not None:  # the name of a run is kept, even if it is "nan"
             schema = dict.fromkeys(names, pl.String)
             labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
         try:
@@ -235,7 +235,7 @@ def read_text_tables(
                 name: pl.String if i in text_at or i == at else pl.Float64 for i, name in enumerate(names)
             }
             numbers = {**options, "decimal_comma": dialect.decimal == ","}
-            if not text_at:  # a text may hold delimiters in quotes
+            if not text_at:  # a text may contain delimiters in quotes
                 numbers["quote_char"] = None
             frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
@@ -249,7 +249,7 @@ def read_text_tables(
 
 
 def _cells(line: str, dialect: Dialect) -> list[str]:
-    """The cells of a line of the head, which may have names between other delimiters than the numbers below."""
+    """The cells of a line of the head, whose names may have other delimiters than the numbers below."""
     own = dialect.split(line)
     if len(own) != 1 or dialect.width < 2:
         return own
@@ -260,7 +260,7 @@ def _cells(line: str, dialect: Dialect) -> list[str]:
 
 
 def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bool:
-    """Whether a column holds a text in some rows of a table; it is then read as texts from the first row on."""
+    """Whether a column contains a text in some rows of a table; it is then read as texts from the first row on."""
     cells = (row[column] for row in rows if column < len(row))
     return any(not is_number(cell, decimal) and not is_missing(cell) for cell in cells)
 
@@ -338,7 +338,7 @@ def tables_of(
 
 
 def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
-    """Numbers of a column of texts, part by part: what a conversion holds in between takes ten times the memory."""
+    """Numbers of a column of texts, part by part: a conversion temporarily takes ten times the memory."""
     parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
     return pl.concat(parts)
 
@@ -350,7 +350,7 @@ def _as_numbers(column: pl.Series, decimal: str) -> pl.Series:
 
 
 def _seconds(column: pl.Series) -> pl.Series:
-    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null where there is none."""
+    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null if there is none."""
     text = column.str.strip_chars(' \t\r"')
     parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
     hours, minutes, rest = (part.cast(pl.Float64) for part in parts)

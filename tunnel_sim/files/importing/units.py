@@ -1,4 +1,4 @@
-"""Units of columns: their factors and spellings, and where a heading states one."""
+"""Units of columns: their factors and spellings, and their place in a heading."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ _LONGEST = 10  # characters: a longer word is not a unit
 
 
 def known_unit(text: str) -> str | None:
-    """The unit that a text names; None where it names none that is known."""
+    """The unit named by a text; None if it does not name a known unit."""
     word = text.strip().strip("()[]{}<>").strip()
     word = re.sub(r"\bGrad\b", "altgrad", word)  # a German degree; "grad" is the gon in English
     word = squeezed(word)
@@ -89,24 +89,24 @@ def known_unit(text: str) -> str | None:
 
 
 def squeezed(text: str) -> str:
-    """A unit in small letters, without blanks and dots, and with plain digits for raised ones."""
+    """A unit in lower case, without blanks and dots, and with plain digits for raised ones."""
     return text.lower().translate(_ALIKE)
 
 
 def kind_of(unit: str) -> str:
-    """The kind of quantity that a unit measures, a key of `UNITS`; empty where the unit is not known."""
+    """The kind of quantity that a unit measures, a key of `UNITS`; empty if the unit is not known."""
     return next((kind for kind, factors in UNITS.items() if unit in factors), "")
 
 
 def names_a_time(name: str) -> bool:
-    """Whether a name is that of a time."""
+    """Whether a name names a time."""
     return _TIMES.search(name) is not None
 
 
 def split_unit(heading: str) -> tuple[str, str]:
     """A heading such as ``Angle (deg) Run #1``, ``t / s`` or ``Zeit in ms`` as name and unit, which may be empty.
 
-    A unit that is written but not known is given as it is written.
+    An unknown unit is returned as written.
     """
     heading = " ".join(heading[: limits.NAME_CHARACTERS].split())
     run = _OF_RUN.search(heading)
@@ -126,17 +126,17 @@ def claims(text: str, name: str, unit: str) -> bool:
 
 
 def _bare(name: str) -> str:
-    """A name without a unit that is not known, which `split_unit` leaves in it; the number of a channel stays."""
+    """A name without the unknown unit that `split_unit` leaves in it; the number of a channel remains."""
     return re.sub(r"\s*[(\[{<](?!\d+[)\]}>]).*", "", name)
 
 
 def unit_beside(name: str, text: str) -> str:
-    """The unit that a cell below a name states; as it is written where it is not known."""
+    """The unit stated by a cell below a name; as written if it is not known."""
     return known_unit(_in_german(name, text)) or text.strip("()[]{} -")
 
 
 def written_unit(name: str, kinds: Sequence[str]) -> str:
-    """A word of a name that may be a unit of certain kinds, keys of `UNITS`; empty where there is none."""
+    """A word of a name that may be a unit of certain kinds, keys of `UNITS`; empty if there is none."""
     words = re.split(r"[\s_/,;:.()\[\]{}<>-]+", name)
     return next(
         (
@@ -166,7 +166,7 @@ def _split(heading: str) -> tuple[str, str]:
         if unit is not None and name:
             return name, unit
     bracket = _BRACKETS.search(heading)
-    if bracket is not None:  # what ends in one, such as "[kN/s]", does not end in a unit
+    if bracket is not None:  # a heading that ends in a bracket, such as "[kN/s]", does not end in a unit
         return heading, "" if bracket.start() == 0 or bracket[1].isdigit() else bracket[1]
     for split in (_after_in, _after_separator, _after_slash):
         parts = split(heading)
@@ -176,7 +176,7 @@ def _split(heading: str) -> tuple[str, str]:
 
 
 def _after_in(heading: str) -> tuple[str, str] | None:
-    """``Zeit in ms``, also where further words follow; an unknown unit is one short word at the end."""
+    """``Zeit in ms``, also before further words; an unknown unit is one short word at the end."""
     found = _IN.search(heading)
     if found is None:
         return None
@@ -188,7 +188,7 @@ def _after_in(heading: str) -> tuple[str, str] | None:
 
 
 def _after_separator(heading: str) -> tuple[str, str] | None:
-    """``t/s``, ``yaw_deg`` or ``time, min``: a known unit behind a separator, of which the first counts."""
+    """``t/s``, ``yaw_deg`` or ``time, min``: a known unit after a separator, of which the first counts."""
     text = _PER.sub("/", heading)
     for place, found in enumerate(_SEPARATOR.finditer(text)):
         name, word = text[: found.start()], text[found.end() :]
@@ -208,12 +208,12 @@ def _after_separator(heading: str) -> tuple[str, str] | None:
 
 
 def _after_slash(heading: str) -> tuple[str, str] | None:
-    """``Winkel/Foo`` or ``Weg mm/s``: what follows a slash is a unit, or belongs to one, though it is not known."""
+    """``Winkel/Foo`` or ``Weg mm/s``: the text after a slash is a unit, or part of one, even if unknown."""
     name, slash, rest = heading.partition("/")
     name, rest = name.rstrip(), rest.strip()
     if not (slash and name and 0 < len(rest) <= _LONGEST and _LIKE_A_UNIT.fullmatch(rest)):
         return None
     before, blank, last = name.rpartition(" ")
     if blank and not heading[: len(name) + 1].endswith(" /") and heading[len(name)] == "/":
-        return before.rstrip(), f"{last}/{rest}"  # glued to the word before: "mm/s"
+        return before.rstrip(), f"{last}/{rest}"  # joined to the previous word: "mm/s"
     return name, rest

@@ -15,7 +15,7 @@ from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library
 
-_HEAD = 400  # rows of a sheet that are looked at
+_HEAD = 400  # rows of a sheet that are inspected
 _TEXTS = (
     "run",
     "drive_hold",
@@ -24,7 +24,7 @@ _TEXTS = (
 
 @dataclass(frozen=True)
 class _Sheet:
-    """The first rows of a sheet as texts, and its layout; None where it has no column of numbers."""
+    """The first rows of a sheet as texts, and its layout; None if it has no column of numbers."""
 
     name: str
     rows: Sequence[Sequence[str]]
@@ -59,9 +59,9 @@ def _read(content: bytes, where: str) -> list[Table]:
                 described |= rows
             else:
                 covers |= facts_in(["\t".join(filter(None, row)) for row in sheet.rows]) | _one_row(sheet)
-            # Of what no run was found for, the import says that it is not used.
+            # The import reports that conditions without a run are not used.
             if not rows or len(rows) < len(found):
-                # texts of a cover are read above, and are no columns of a record
+                # the texts of a cover are read above, and are not columns of a record
                 short += [
                     replace(table, part=sheet.name, said=table.said[:1]) for table in _tables(book, sheet)
                 ]
@@ -93,7 +93,7 @@ def _sheet(book: Any, name: str, where: str) -> _Sheet:
 
 
 def _tables(book: Any, sheet: _Sheet) -> list[Table]:
-    """The tables of a sheet of numbers, whose parts name their runs; none where it has no numbers."""
+    """The tables of a sheet of numbers, whose parts name their runs; none if it has no numbers."""
     layout = sheet.layout
     if layout is None:
         return []
@@ -109,10 +109,10 @@ def _tables(book: Any, sheet: _Sheet) -> list[Table]:
 
 
 def _described(book: Any, sheet: _Sheet, names: set[str]) -> dict[str, dict[str, Any]]:
-    """What a sheet states about others, or about their runs, by the name that each row gives; empty: nothing.
+    """Statements of a sheet on others, or on their runs, by the name in each row; empty: none.
 
     Args:
-        names: of the sheets and runs that hold records, in small letters.
+        names: of the sheets and runs with records, in lower case.
     """
     for column in range(sheet.width):
         cells = [_same(row[column]) for row in sheet.rows]
@@ -127,7 +127,7 @@ def _described(book: Any, sheet: _Sheet, names: set[str]) -> dict[str, dict[str,
     numbers = {i for i in range(sheet.width) if all(is_number(row[i]) or not row[i] for row in below)}
     numbers -= {i for i, key in enumerate(heading) if key.lower() in _TEXTS}
     kinds = {i: "float" if i in numbers else "string" for i in range(sheet.width)}
-    # Loaded once more, as numbers: texts would lose digits.
+    # Loaded again, as numbers: texts would lose digits.
     body = book.load_sheet(sheet.name, header_row=None, skip_rows=first, dtypes=kinds).to_polars()
     rows = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
     found = {}
@@ -158,7 +158,7 @@ def _with(
     covers: Mapping[str, float],
     several: bool,
 ) -> Table:
-    """A table with what other sheets state about it, named as they name it."""
+    """A table with the statements of other sheets on it, under its name there."""
     stated = described.get(_same(table.part)) or described.get(_same(sheet.name)) or {}
     facts: dict[str, float] = {}
     run = ""
