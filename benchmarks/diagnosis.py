@@ -1,7 +1,7 @@
 """Seconds and memory of a diagnosis, and the same candidates fitted with `mujoco.sysid`.
 
 Run as ``python -m benchmarks.diagnosis``; see README.md beside it. The campaigns come from the MuJoCo model. Each
-diagnosis runs in a process of its own, whose peak memory is the operating system's figure.
+diagnosis runs in a separate process; its peak memory is the operating system's figure.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ CAUSES = {
 }
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
 UNBOUNDED = 1e3  # bounds for sysid where a parameter has none
-STEP = 4e-3  # s, of both sides of the comparison
+STEP = 4e-3  # s, on both sides of the comparison
 
 
 def make_campaign(
@@ -80,7 +80,7 @@ def _diagnosed(campaign: Campaign) -> tuple[tuple[str, ...], float, dict[str, fl
 
 
 def full_size(console: Console) -> None:
-    """The campaign of the time limit: 12 runs of 10 s at 1 kHz."""
+    """Measure the campaign of the time limit: 12 runs of 10 s at 1 kHz."""
     table = Table(title="One diagnosis, 12 runs of 10 s at 1 kHz (targets: 30 s on two cores, 2 GiB)")
     for head in ("campaign", "answer", "seconds", "peak MiB", "seconds by step"):
         table.add_column(head, justify="right" if head in ("seconds", "peak MiB") else "left")
@@ -99,8 +99,8 @@ class SysidFit:
     """One candidate as a problem of `mujoco.sysid`: its parameters, residual and optimiser, with our MuJoCo model.
 
     sysid takes releases as fixed and measures at a model's sensors. Here releases are parameters, written by a
-    custom rollout, and what the sensor adds (zero, effects on the reading) is a modified residual; both are
-    extension points of sysid. Each run uses one compiled model, which saves sysid compilations.
+    custom rollout, and the sensor's zero and effects on the reading modify the residual; both are extension points
+    of sysid. Each run uses one compiled model, which saves sysid compilations.
     """
 
     def __init__(self, lead: StartingPoint) -> None:
@@ -178,7 +178,7 @@ class SysidFit:
         found = []
         for k, model in enumerate(models):
             state = np.vstack([states[k], moved[k]])
-            # a step leaves its sensors as they were at its start; the state is that of its end
+            # after a step the sensors have the values of its start, and the state those of its end
             data = np.zeros((count, model.nsensordata))
             data[:, 0] = state[:, angle_at]
             times = STEP * np.arange(count)
@@ -205,7 +205,7 @@ class SysidFit:
         return left[:, None], predicted, record
 
     def optimise(self) -> tuple[float, float]:
-        """Seconds and χ² reached, from the same start as the diagnosis's own fit."""
+        """Seconds and final χ², from the same start as the diagnosis's own fit."""
         begin = time.perf_counter()
         _, result = sysid.optimize(
             self.params, self.residual, verbose=False, max_iters=30, x_scale="jac", xtol=1e-5,
@@ -217,7 +217,7 @@ class SysidFit:
 
 
 def against_sysid(console: Console, wanted: int) -> None:
-    """A smaller campaign: a whole diagnosis, and every candidate fitted with sysid from the same starts."""
+    """On a smaller campaign, compare a whole diagnosis with sysid's fits of all candidates from the same starts."""
     data = make_campaign(CAUSES["dry friction"], springs=(16.12, 44.84), duration=4.0, rate=250.0)
     causes, whole, _, _ = measured(data)
     prepared = prepare(data, campaign_noise(data, Settings().noise).variance)

@@ -1,9 +1,9 @@
-"""How often a disturbed run is named, and the causes beside it are exactly right.
+"""The share of campaigns in which a disturbed run is named and the causes are exactly right.
 
-Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have none,
-one or two causes, and in one run each of them there is a blow, a push or a bump of the reading. With
-``--undisturbed`` there is none, and only the runs accused are counted, without a search for causes. Every answer is
-appended to ``answers.jsonl`` in the folder; a second call goes on.
+Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have up to
+two causes, and one run of each has a blow, a push or a bump of the reading. With ``--undisturbed`` there is no
+disturbance; only the falsely named runs are counted, without a search for causes. Every answer is appended to
+``answers.jsonl`` in the folder; a second call continues.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def simulated(count: int, seed: int, variety: float, *, disturbed: bool) -> list
 
 
 def answered(one: Simulated, name: str) -> dict[str, Any]:
-    """The truth of a campaign beside its answer."""
+    """The truth and the answer of a campaign."""
     hit = next((e for e in one.draw.effects if e.form.family == DISTURBANCE), None)
     scale = one.draw.conditions.time_scale
     truth = {
@@ -77,7 +77,7 @@ def answered(one: Simulated, name: str) -> dict[str, Any]:
 
 
 def named(one: Mapping[str, Any]) -> bool:
-    """Whether the disturbed run, and no other, is named; of a campaign without one, that none is."""
+    """Whether exactly the disturbed run is named; without a disturbance, whether no run is named."""
     return [d["run"] for d in one.get("disturbed", ())] == (
         [one["truth"]["run"]] if one["truth"]["run"] else []
     )

@@ -26,11 +26,11 @@ from tunnel_sim.envs.conditions import FreeDecayConfig, plan_run
 from tunnel_sim.files.rig_file import load_rig
 
 NAME = "tunnel_sim/FreeDecay-v0"
-DURATION = 60.0  # s, so that no run ends while it is timed
+DURATION = 60.0  # s, too long for a run to end during the timing
 
 
 def bare(count: int, periods: int, substeps: int) -> Callable[[], float]:
-    """A repetition of ``mujoco.batch`` alone: elapsed time, s. Nothing is read, drawn or recorded."""
+    """A repetition of ``mujoco.batch`` alone, without reading, drawing or recording: elapsed time, s."""
     rig = load_rig()
     plan = plan_run({}, FreeDecayConfig(), rig, np.random.default_rng(0))
     batch = mujoco_batch.Batch(build_model(rig, plan.stated()).mj, nsim=count)

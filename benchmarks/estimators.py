@@ -1,7 +1,7 @@
 """Estimators side by side with other packages: RMSE over the Cramér–Rao bound and time, on the same records.
 
-Run as ``python -m benchmarks.estimators``; see README.md beside it. Every record goes through all methods in
-turn, so that other load on the machine affects all of them.
+Run as ``python -m benchmarks.estimators``; see README.md beside it. All methods process each record in turn, so
+other load on the machine affects all methods.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def bound_of(cell: tuple[float, ...], campaign: Campaign) -> SinusoidBound:
 
 
 def own(name: str) -> Method:
-    """One of ours as a method of one record; output error also without windows, which the others do not have."""
+    """Our estimator as a method for one record. Output error also runs without windows, like the other packages."""
     plain = name.endswith(", no windows")
     estimator = OutputError(cycles_per_window=NO_WINDOWS) if plain else make_estimator(name)
 
@@ -81,7 +81,7 @@ def own(name: str) -> Method:
 
 
 def other(method: Method) -> Method:
-    """A peer as a method of one record."""
+    """Another package as a method for one record."""
 
     def adapted(campaign: Campaign) -> tuple[float, float, float | None]:
         record = campaign.runs[0].record
@@ -94,7 +94,7 @@ def other(method: Method) -> Method:
 
 
 def measure(methods: dict[str, Method], count: int, seed: int) -> dict[str, Tally]:
-    """Run everything on everything."""
+    """Run all methods on all records."""
     tallies = {name: Tally() for name in methods}
     for place, (cell, number, campaign) in enumerate(records(count, seed)):
         zeta, frequency, *_ = cell
@@ -126,7 +126,7 @@ def rms(values: Iterable[float]) -> float:
 
 
 def beats(mine: Tally, peer: Tally) -> bool:
-    """Whether one has no larger RMSE of ζ on the records of the other, no more failures, and is faster."""
+    """Whether ours is faster, without a larger RMSE of ζ on the peer's records or more failures."""
     shared = [mine.zeta[place] for place in peer.zeta if place in mine.zeta]
     return bool(
         len(shared) == len(peer.zeta)
@@ -136,7 +136,7 @@ def beats(mine: Tally, peer: Tally) -> bool:
 
 
 def show(console: Console, tallies: dict[str, Tally], ours: list[str]) -> None:
-    """The table, and which methods are better."""
+    """Print the table, and the better methods."""
     table = numbers(
         "RMSE over the Cramér–Rao bound; 20 s at 1 kHz, ζ 0.002–0.05, 0.8–4 Hz, S/A 0.1–1 %",
         "method", "ζ", "ωn", "ζ, worst cell", "95 % held", "failed", "ms per record", "records",
@@ -177,7 +177,7 @@ def main() -> None:
         ours = [name for name in ours if name in methods]
     console = Console(width=130)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the peers' own
+        warnings.simplefilter("ignore")  # of the other packages
         show(console, measure(methods, options.records, options.seed), ours)
     for name, line in absent.items():
         console.print(f"Absent: {name} ({line})")

@@ -1,7 +1,7 @@
-"""How often the examination questions campaigns that have no slip, by slip, and the processor's time it takes.
+"""False questions of the examination on campaigns without a slip, by slip, and its processor time.
 
-Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns without a slip, as blind sets are.
-What is noted of a spring or an inertia that does not fit counts separately: these may be effects.
+Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns without a slip, such as blind
+sets. Notes on a spring or an inertia that does not fit count separately: these may be effects.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NOT_SLIPS = {SpringOffTheLine.__name__, InertiaOffTheSprings.__name__}
 
 @dataclass
 class Count:
-    """Campaigns, those questioned by name of the slip, and seconds."""
+    """Number of campaigns, questioned campaigns by name of the slip, and seconds."""
 
     campaigns: int = 0
     questioned: dict[str, list[str]] = field(default_factory=dict)

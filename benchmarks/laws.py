@@ -1,4 +1,4 @@
-"""What could be closed and the proposed law, on a blind set with the whole vocabulary withheld.
+"""The explainable part of the gap and the proposed law, on a blind set with the whole vocabulary withheld.
 
 Run as ``python -m benchmarks.laws SET`` from the root; see README.md beside it.
 """
@@ -25,7 +25,7 @@ from tunnel_sim.files.writing import as_json
 
 STATE = ("angle", "rate", "state")
 TIME = ("time", "event")
-#: Kinds that are right, by form of the truth; written before the first answer to the set that is reported.
+#: Correct kinds, by form of the truth; written before the first answer to the reported set.
 RIGHT: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("magnetic_detent", "scraping", "stops", "one_stop", "cogging", "centre_damper",
                      "widening_damping", "one_way_damper", "hysteresis_loop"), STATE),
@@ -43,7 +43,7 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """What is said of one campaign with no effect to answer with."""
+    """The answer to one campaign without any effect in the vocabulary."""
     begun = time.process_time()
     study = investigate(read_campaign(folder), ())
     found = closable(study, significant=study.gap.test.detected) if study.gap.test.detected else None
@@ -55,7 +55,7 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def _closes(found: Mapping[str, Any]) -> float:
-    """Share of what is closable that the law closes; 0 without a law."""
+    """Share of the explainable gap that the law explains; 0 without a law."""
     if found["law"] is None:
         return 0.0
     ceiling = next(one["closed"] for one in found["ceilings"] if one["kind"] == found["kind"])

@@ -1,7 +1,7 @@
 """The neural posterior against output error: clean records, and blind sets of campaigns with known truth.
 
 Run as ``python -m benchmarks.neural_posterior``; see README.md beside it. ``clean`` needs nothing else; ``blind``
-reads folders written by ``tunnel blind`` with their keys. Both write a table; ``show`` prints what tables say.
+reads folders written by ``tunnel blind`` with their keys. Both write a table; ``show`` prints summaries of tables.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 
 NAMES = ("cn_beta", "cn_r")
-MODERATE = (1.0, 10.0)  # excess over the noise power
+MODERATE = (1.0, 10.0)  # excess in noise variances
 METHODS = ("output_error", "neural_posterior")
 BAND = 1.358  # of Kolmogorov's statistic times the root of the number
-FAR = 3.0  # stated standard deviations beyond which an estimate should have been refused
+FAR = 3.0  # error in stated standard deviations above which an estimate should be refused
 Row = dict[str, Any]
 
 
 def unrefusing() -> NeuralPosterior:
-    """The estimator with its refusals switched off, to see what it would have said."""
+    """The estimator with its refusals switched off, to see the refused estimates."""
     bold = NeuralPosterior()
     networks = {kind: replace(one, threshold=np.inf) for kind, one in bold.networks.items()}
     vars(bold)["networks"] = networks
@@ -46,7 +46,7 @@ def unrefusing() -> NeuralPosterior:
 
 
 def clean_rows(count: int, seed: int) -> Iterator[Row]:
-    """Damped sinusoids in white noise: errors over the bound, and whether the interval holds the truth."""
+    """Damped sinusoids in white noise: errors over the bound, and whether the interval contains the truth."""
     estimator = NeuralPosterior()
     for cell, number, campaign in records(count, seed):
         zeta, frequency, share, _ = cell
@@ -75,7 +75,7 @@ def blind_rows(folder: Path, kinds: Sequence[str]) -> Iterator[Row]:
         if truth["kind"] not in kinds:
             continue
         campaign = read_campaign(folder / name)
-        # The key knows the density to more digits than the campaign states, and the coefficients multiply it.
+        # The key has more digits of the density than the campaign, and the coefficients scale with it.
         exact = truth["air_density"] / next(run.air_density for run in campaign.runs if run.wind_on)
         truth |= {quantity: truth[quantity] * exact for quantity in NAMES}
         row: Row = {
@@ -116,7 +116,7 @@ def calibration_rows(folder: Path) -> Iterator[Row]:
 
 
 def curve_rows(folder: Path, steps: int) -> Iterator[Row]:
-    """The loss on tuning samples of networks of a campaign, fitted to more and more shards."""
+    """The loss on tuning samples of campaign networks fitted to increasing numbers of shards."""
     shards = len(list(folder.glob("training-*")))
     apart = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), "c")
     spec = FitSpec(steps=steps)
@@ -249,7 +249,7 @@ def _off(row: Row) -> bool:
 
 
 def kept(rows: Iterable[Row], path: Path) -> list[Row]:
-    """Write rows as they come; those of an earlier table of the same name are replaced."""
+    """Write rows immediately, replacing an earlier table of the same name."""
     found = []
     with path.open("w") as file:
         for row in rows:

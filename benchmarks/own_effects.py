@@ -34,7 +34,7 @@ RUN = RunSettings(
 
 @dataclass(frozen=True)
 class OwnCubic(CubicStiffness):
-    """The same law as a class of one's own."""
+    """The same law as a user's class."""
 
     name = "own_cubic"
 
@@ -73,7 +73,7 @@ def speeds(repetitions: int) -> Table:
 
 
 def answers() -> Table:
-    """The same campaign diagnosed with each form in the vocabulary, beside three other effects."""
+    """The same campaign diagnosed with each form in a vocabulary with three other effects."""
     conditions = tuple(
         Condition(f"s{spring:g}-v{speed:g}", spring, speed, 1.204, np.radians(20.0), 10.0)
         for spring in (16.12, 44.84)

@@ -1,7 +1,7 @@
 """Estimates of ωn and ζ of one record by other packages, each given only the record and its sample rate.
 
-Every function takes times (s), reading (rad) and sample rate (Hz), and returns (ωn in rad/s, ζ). Those that
-cannot process twenty thousand samples get block means of sixteen to the cycle, like our matrix pencil.
+Every function takes times (s), reading (rad) and sample rate (Hz), and returns (ωn in rad/s, ζ). Functions that
+cannot process twenty thousand samples get sixteen block means per cycle, like our matrix pencil.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SSI_ROWS = 50  # the best of 20, 50 and 100 over the benchmark's cells
 
 
 def spectral_frequency(yaw: np.ndarray, rate: float) -> float:
-    """Hz; the highest bin of the spectrum."""
+    """Frequency of the highest bin of the spectrum, Hz."""
     power = np.abs(np.fft.rfft(yaw - yaw.mean()))
     return float(np.argmax(power) * rate / yaw.size)
 
@@ -68,7 +68,7 @@ def by_pyoma2(_: np.ndarray, yaw: np.ndarray, rate: float, *, method: str) -> tu
     logging.disable(logging.CRITICAL)
     means, slow = thinned(yaw, rate)
     limits = {"xi_max": 0.9, "mpc_lim": None, "mpd_lim": None, "CoV_max": None}
-    with redirect_stderr(io.StringIO()):  # its progress bars
+    with redirect_stderr(io.StringIO()):  # hides its progress bars
         setup = SingleSetup(means[:, None], slow)
         setup.add_algorithms(SSI(name="ssi", method=method, br=SSI_ROWS, ordmax=4, hc=limits))
         setup.run_by_name("ssi")

@@ -1,6 +1,6 @@
 """Neural posterior estimation by sbi on the simulations of our own training: clean records, errors over the bound.
 
-sbi is not a dependency. Run ``python -m benchmarks.sbi_posterior`` in an environment of its own, made by
+sbi is not a dependency. Run ``python -m benchmarks.sbi_posterior`` in a separate environment, made by
 ``python -m venv beside && beside/bin/pip install . sbi``; see README.md beside it. ``record`` gives sbi forty
 periods of the reading, sixteen block means in each, and its convolutional embedding. ``windows`` gives it envelope
 and phase of our windows and no embedding. The first call simulates the records.
@@ -40,13 +40,13 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 NAMES = ("zeta", "omega_n")
 PERIODS, BLOCKS = 40, 16
-UNIT = 1e-3  # of ζ and of the relative frequency, for a record as it is
+UNIT = 1e-3  # of ζ and of the relative frequency, for a whole record
 DRAWS = 1000  # samples of each posterior
 BATCH = 100
 
 
 class Seen(NamedTuple):
-    """Features, and the values and units that the targets are relative to: ζ and ωn in rad/s."""
+    """Features, and the reference values and units of the targets: ζ and ωn in rad/s."""
 
     features: Array
     values: Array
@@ -76,7 +76,7 @@ def as_record(record: Record) -> Seen | None:
 def as_windows(record: Record) -> Seen | None:
     """Envelope and phase of each window in standard deviations, its information, and the record's length.
 
-    The targets are relative to the nominal fit, in its standard deviations, as those of our network.
+    The targets are relative to the nominal fit, in its standard deviations, as for our network.
     """
     run = demodulate(record)
     found = record_features([run])[0] if isinstance(run, Demodulated) else None
@@ -93,7 +93,7 @@ VARIANTS = {"record": as_record, "windows": as_windows}
 
 
 def simulated(seed: int, shards: int) -> Iterator[dict[str, Array]]:
-    """Features and targets of both variants for two records of every reading, chosen as for our training."""
+    """Features and targets of both variants for two records of every reading, selected as for our training."""
     sizes = tuple(sorted(sizes_at_unit_excess(seed).items()))
     for shard in range(shards):
         for campaign, conditions, families, number in readings_of(ShardSpec(seed, "training", shard, sizes)):
@@ -110,7 +110,7 @@ def simulated(seed: int, shards: int) -> Iterator[dict[str, Array]]:
 
 
 def trained(variant: str, x: Array, theta: Array, minutes: float, seed: int) -> tuple[Any, str]:
-    """sbi's posterior with a neural spline flow at its defaults; it trains until it has converged or time is up."""
+    """sbi's posterior with a neural spline flow at its defaults, trained until convergence or the time limit."""
     import torch
     from sbi.inference import NPE
     from sbi.neural_nets import posterior_nn
@@ -127,11 +127,11 @@ def trained(variant: str, x: Array, theta: Array, minutes: float, seed: int) -> 
     data = [torch.from_numpy(values.astype(np.float32)) for values in (theta, x)]
     prior = BoxUniform(data[0].amin(0), data[0].amax(0))
     with tempfile.TemporaryDirectory() as folder:
-        tracker = TensorBoardTracker(SummaryWriter(folder))  # else it writes beside the project
+        tracker = TensorBoardTracker(SummaryWriter(folder))  # otherwise it writes into the working directory
         inference = NPE(prior, posterior_nn("nsf", **given), tracker=tracker, show_progress_bars=False)
         inference.append_simulations(*data)
         begun = time.process_time()
-        inference.train(max_num_epochs=1)  # two epochs, for their time
+        inference.train(max_num_epochs=1)  # two epochs, for timing
         each = (time.process_time() - begun) / 2.0
         inference.train(max_num_epochs=int(60.0 * minutes / each), resume_training=True)
     said = f"{inference.epoch} epochs in {(time.process_time() - begun) / 60.0:.1f} min of processor time"
@@ -139,7 +139,7 @@ def trained(variant: str, x: Array, theta: Array, minutes: float, seed: int) -> 
 
 
 def judged(posterior: Any, variant: str, box: Array, cells: Sequence[Any]) -> Iterator[Row]:
-    """Errors over the bound, as `neural_posterior.clean_rows`; a record without a sample in the prior fails."""
+    """Errors over the bound, as in `neural_posterior.clean_rows`; a record without a sample in the prior fails."""
     import torch
 
     begun = time.process_time()
@@ -166,7 +166,7 @@ def judged(posterior: Any, variant: str, box: Array, cells: Sequence[Any]) -> It
 
 
 def main() -> None:
-    """Simulate unless the samples are there, train, measure and print."""
+    """Simulate missing samples, train, measure and print."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.sbi_posterior", description=__doc__.splitlines()[0]
     )
@@ -190,7 +190,7 @@ def main() -> None:
     samples = np.load(options.samples)
     x, theta = samples[f"{options.variant}.x"], samples[f"{options.variant}.theta"]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # sbi's own
+        warnings.simplefilter("ignore")  # of sbi
         posterior, said = trained(options.variant, x, theta, options.minutes, options.seed)
         cells, box = list(records(options.records, options.seed)), np.array((theta.min(0), theta.max(0)))
         parts = (cells[first : first + BATCH] for first in range(0, len(cells), BATCH))

@@ -1,7 +1,7 @@
 """Processor seconds of a diagnosis before and after a change, in turn.
 
-Run as ``python -m benchmarks.speed OLD NEW``; see README.md beside it. Each diagnosis runs in a process of its own,
-in the tree that is measured, with the environment of that tree where it has one. Imports are not counted.
+Run as ``python -m benchmarks.speed OLD NEW``; see README.md beside it. Each diagnosis runs in a separate process in
+the measured tree, with the tree's own environment if it has one. Imports are not counted.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ JOBS: dict[str, tuple[EffectSetting, ...]] = {
     "12 runs, three causes": (FRICTION, CUBIC, DAMPING),
     "12 runs, four causes": (FRICTION, CUBIC, DAMPING, LAG),
 }
-#: What a process does: it diagnoses a folder, and prints processor seconds, MiB at most, and the causes.
+#: The code of a process: it diagnoses a folder, and prints processor seconds, peak MiB, and the causes.
 TIMED = """
 import json, os, resource, sys
 sys.path.insert(0, os.getcwd())
@@ -113,7 +113,7 @@ def main() -> None:
         for name, folder in folders.items():
             row = compared(name, folder, trees, asked.turns)
             table.add_row(*row)
-            print("  ".join(row), file=sys.stderr, flush=True)  # of a long table, as it grows
+            print("  ".join(row), file=sys.stderr, flush=True)  # progress of a long table
     Console().print(table)
 
 

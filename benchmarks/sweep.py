@@ -1,7 +1,7 @@
 """A sweep from end to end against the bare simulation of its runs, processes against threads, and memory.
 
-Run as ``python -m benchmarks.sweep``; see README.md beside it. Every sweep is done in a separate process, including
-its start. The bare rate is that of ``mujoco.batch`` stepping the same runs, nothing recorded, on as many threads.
+Run as ``python -m benchmarks.sweep``; see README.md beside it. Every sweep runs in a separate process, including
+its start. The bare rate is for ``mujoco.batch`` stepping the same runs without recording, on as many threads.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ BARE_RUNS = 100
 
 
 def bare(file: Path, threads: int) -> dict[str, float]:
-    """Seconds per run of `mujoco.batch` on runs of the sweep, all of its conditions and effects."""
+    """Seconds per run of `mujoco.batch` on runs of the sweep with all its conditions and effects."""
     import numpy as np
     from mujoco import batch as mujoco_batch
 
@@ -92,7 +92,7 @@ def bare(file: Path, threads: int) -> dict[str, float]:
 
 
 def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]:
-    """Seconds per run and peak memory of a sweep: by processes, or by one whose simulation has threads."""
+    """Seconds per run and peak memory of a sweep, with several processes or with simulation threads in one."""
     wall, cpu = time.perf_counter(), time.process_time()
     from tunnel_lab.experiments.runner import processes
     from tunnel_lab.experiments.sweep import run_sweep
@@ -138,7 +138,7 @@ def write(folder: Path, runs: int, estimators: str) -> Path:
 def between(
     file: Path, out: Path, options: argparse.Namespace, workers: int, threads: int
 ) -> tuple[dict[str, float], float, float]:
-    """A sweep between two bare simulations, and its rate over theirs: elapsed and CPU."""
+    """A sweep between two bare simulations, and the ratio of the rates: elapsed and CPU."""
     before = apart("--bare", file, "--workers", options.workers)
     took = apart("--sweep", file, out, "--workers", workers, "--threads", threads)
     after = apart("--bare", file, "--workers", options.workers)

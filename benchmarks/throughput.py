@@ -1,7 +1,7 @@
 """Throughput of the rig's model: with the plugin against without, and batches on two threads against one.
 
 Run as ``python -m benchmarks.throughput``; see README.md beside it. Every repetition measures both sides one
-after the other, so that other load on the machine affects both, and the ratio is taken within the repetition.
+after the other, so other load on the machine affects both; ratios are taken within repetitions.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def batching(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], fl
 
 
 def plain_threads(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[], float]:
-    """The same work without mujoco.batch, on Python threads: elapsed time, s. It shows what the machine can do."""
+    """The same work on Python threads without mujoco.batch, as a measure of the machine: elapsed time, s."""
     data = [mujoco.MjData(model) for _ in range(threads)]
 
     def share(one: mujoco.MjData) -> None:

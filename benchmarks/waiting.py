@@ -1,7 +1,7 @@
-"""How long one waits for an answer, before and after a change: every job of the time limits, in turn.
+"""Waiting times before and after a change: every job of the time limits, in turn.
 
-Run as ``python -m benchmarks.waiting OLD NEW``; see README.md beside it. Each measurement runs in a process of its
-own, in the tree that is measured, with the environment of that tree where it has one.
+Run as ``python -m benchmarks.waiting OLD NEW``; see README.md beside it. Each measurement runs in a separate
+process in the measured tree, with the tree's own environment if it has one.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from tunnel_sim.files.campaign_folder import write_campaign
 
 GROWTH = (12, 48, 144)  # runs
 FRICTION = 0.004  # N m
-#: The start of what a process of a tree does.
+#: The beginning of the code of a process.
 HERE = "import json, os, sys, time; sys.path.insert(0, os.getcwd())\n"
-#: It prints the modules that a diagnosis of a folder without a gap has imported.
+#: Prints the modules imported by a diagnosis of a folder without a gap.
 MODULES = (
     HERE
     + """
@@ -45,7 +45,7 @@ ours = ("diagnosis", "tunnel_sim", "tunnel_lab", "identification", "numpy", "sci
 print(json.dumps([name for name in list(sys.modules) if name.partition(".")[0] in ours]))
 """
 )
-#: It imports modules named in a list.
+#: Imports modules named in a list.
 IMPORTS = (
     HERE
     + """
@@ -57,8 +57,8 @@ for name in json.loads(sys.argv[1]):
         pass
 """
 )
-#: It repeats linearisations of a diagnosis, and as many predictions. It prints how many predictions a step of
-#: Gauss and Newton takes, by number of parameters, and counts of the diagnosis.
+#: Repeats linearisations of a diagnosis, and as many predictions. Prints the cost of a Gauss–Newton step in
+#: predictions, by number of parameters, and counts of the diagnosis.
 STEPS = (
     HERE
     + """
@@ -101,7 +101,7 @@ for problem, point, prediction in calls[::2]:
 print(json.dumps({"counts": counts, "ratios": {p: statistics.median(r) for p, r in sorted(ratios.items())}}))
 """
 )
-#: It prints the nanoseconds that the bare integrator takes for a step of one of eight smooth runs side by side.
+#: Prints the nanoseconds of the bare integrator for a step of one of eight smooth runs side by side.
 RATE = (
     HERE
     + """
@@ -138,7 +138,7 @@ def python_of(tree: Path) -> str:
 
 
 def printed(tree: Path, code: str, *arguments: str) -> str:
-    """The last line that some code prints in a tree."""
+    """The last line of output of some code in a tree."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [python_of(tree), "-c", code, *arguments],
@@ -148,7 +148,7 @@ def printed(tree: Path, code: str, *arguments: str) -> str:
 
 
 def elapsed(command: list[str], tree: Path) -> float:
-    """Seconds that a command takes in a tree by the clock; one of status 1 has answered, too."""
+    """Wall time of a command in a tree, s; status 1 also counts as an answer."""
     begun = time.perf_counter()
     done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
     if done.returncode > 1:
@@ -157,7 +157,7 @@ def elapsed(command: list[str], tree: Path) -> float:
 
 
 def friction(runs: int, folder: Path) -> Path:
-    """A campaign of dry friction, of so many runs, drawn by the reference simulator."""
+    """A campaign with dry friction, drawn by the reference simulator."""
     once = draw_conditions(np.random.default_rng(1))
     places = np.arange(runs) % once.runs
     fields = {
@@ -186,7 +186,7 @@ def diagnosed(name: str, folder: Path) -> Iterator[Measurement]:
 
 
 def waited(folder: Path) -> Iterator[Measurement]:
-    """What `tunnel diagnose` takes by the clock, and the imports' part."""
+    """Wall time of `tunnel diagnose`, and the part of the imports."""
 
     def command(tree: Path) -> float:
         return elapsed([python_of(tree), "-m", "tunnel_lab", "diagnose", str(folder)], tree)
@@ -200,7 +200,7 @@ def waited(folder: Path) -> Iterator[Measurement]:
 
 
 def demo() -> Iterator[Measurement]:
-    """The demo's run, without the installation."""
+    """The run of the demo, without the installation."""
 
     def command(tree: Path) -> float:
         with tempfile.TemporaryDirectory() as out:
@@ -228,10 +228,10 @@ def compared(measurement: Measurement, trees: list[Path], turns: int) -> list[st
 
 
 def on_paper(tree: Path, folder: Path, rate: float) -> list[str]:
-    """What a diagnosis must integrate at least, one pass through all runs for each step of its fits.
+    """The least integration of a diagnosis, one pass through all runs for each step of its fits.
 
     Args:
-        rate: of the bare integrator, ns a step.
+        rate: of the bare integrator, ns per step.
     """
     found: Mapping[str, Mapping[str, float]] = json.loads(printed(tree, STEPS, str(folder)))
     counts = found["counts"]

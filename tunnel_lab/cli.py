@@ -1,4 +1,4 @@
-"""The command ``tunnel``: what it is called with, and how it ends.
+"""The command ``tunnel``: its arguments and exit statuses.
 
 Exit status: 0 success; 1 a check or an estimate failed; 2 bad input, with one line on standard error;
 130 interrupted. Nothing heavy is imported here: every command imports its own needs when it runs.
@@ -141,7 +141,7 @@ _MARKUP = re.compile(r"\[(?=[a-z#/@])(?!/?bold\])")
 
 
 def _with_plain_brackets(command: Any) -> None:
-    """Show brackets in the help of a command, its options and its own commands as they are, such as ``[drive]``."""
+    """Show brackets such as ``[drive]`` unchanged in the help of a command, its options and its subcommands."""
     for text in (command, *command.params):
         for name in ("help", "short_help"):
             if said := getattr(text, name, None):
@@ -150,7 +150,7 @@ def _with_plain_brackets(command: Any) -> None:
         _with_plain_brackets(own)
 
 
-@cache  # built once however often a process calls `main`
+@cache  # built once, even if a process calls `main` repeatedly
 def _whole() -> Any:
     command = typer.main.get_command(app)
     _with_plain_brackets(command)
@@ -158,7 +158,7 @@ def _whole() -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``tunnel`` and turn whatever ends it into an exit status.
+    """Run ``tunnel`` and turn its end or exception into an exit status.
 
     Args:
         arguments: the words after ``tunnel``; those of the process when None.
@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     replace_what_cannot_be_encoded()
     if arguments is None and not sys.warnoptions:
-        # Of this process and of those that it starts: an overflow in a trial far off means nothing to a user.
+        # Also in child processes: an overflow at a remote trial point of a fit means nothing to a user.
         warnings.simplefilter("ignore", RuntimeWarning)
         os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
@@ -203,7 +203,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _by_library(error: SystemExit) -> bool:
-    """Whether Typer or Rich itself ends the process, as they do at closed pipes and after completing a word."""
+    """Whether Typer or Rich ended the process, as they do at closed pipes and after completing a word."""
     frame = error.__traceback__
     while frame is not None and frame.tb_next is not None:
         frame = frame.tb_next
@@ -212,7 +212,7 @@ def _by_library(error: SystemExit) -> bool:
 
 
 def _left(error: SystemExit) -> int:
-    """Say that code of the user's own has ended the command."""
+    """Say that the user's code has ended the command."""
     from tunnel_sim.vocabulary.errors import raised_line
 
     print(f"tunnel: the command was ended by its own code ({raised_line(error)})", file=sys.stderr)
@@ -226,7 +226,7 @@ def _flush() -> None:
 
 
 def _settle_output() -> None:
-    """Discard what cannot be printed, so that Python's own flush at the end does not fail again.
+    """Discard output that cannot be printed; otherwise Python's flush at exit would fail again.
 
     The reader of a pipe may have gone away (``tunnel springs | head -1``), which is not an error.
     """

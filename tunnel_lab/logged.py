@@ -1,7 +1,7 @@
-"""``python -m tunnel_lab.logged LOG WORDS…``: a command of ``tunnel`` with everything it prints in a log.
+"""``python -m tunnel_lab.logged LOG WORDS…``: a command of ``tunnel`` with its output in a log.
 
-The bench starts its commands this way and follows them by the log (`tunnel_lab.bench.work`), on which the process
-holds a lock.
+The bench starts its commands this way and follows them by the log (`tunnel_lab.bench.work`). The process locks the
+log while it runs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _SETS_EVERY_S = 0.5
 
 
 def run_logged(log: Path, words: Sequence[str]) -> int:
-    """Run a command: the command and the process in the first line of its log, its exit status in the last.
+    """Run a command; the first line of its log has the command and the process, the last line the exit status.
 
     Args:
         log: an existing file.

@@ -19,7 +19,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def _folder(given: argparse.Namespace) -> Path:
-    """The folder of the set, where none is named that of its version."""
+    """The folder of the set; by default that of its version."""
     folder: Path | None = given.folder
     return Path("tunnel-output") / f"causes-v{given.version}" if folder is None else folder
 

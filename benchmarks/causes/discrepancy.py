@@ -1,4 +1,4 @@
-"""Errors of a model as a basis of changes of the readings, and the log evidence of a fit beside them.
+"""Errors of a model as a basis of changes of the readings, and the log evidence of a fit under these errors.
 
 r = J δ + B a + e: residuals of a fit, its sensitivities, and a basis with coefficients a of standard deviation η.
 B has moments of the angle and the rate, the same in the wind, moments that change in time, errors of the reading,
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 ETA: Array = np.geomspace(1e-3, 3.0, 36)
 """Grid of η, the rms of the model's error over the rms of the gap."""
-_DIRECTIONS = 260  # of the basis that are kept, those of the greatest power beside the nominal model
+_DIRECTIONS = 260  # retained directions of the basis, of the greatest power beside the nominal model
 _WIDE, _SETTLED = 33.0, 0.02
 _NUISANCE = 100.0  # prior power of a nominal parameter, gaps
 
@@ -36,8 +36,8 @@ class Linear:
     Args:
         residual: in standard deviations of the noise, shape (rows,).
         slopes: derivatives of the prediction to its parameters, shape (rows, p).
-        nominal: which of the parameters are those of the nominal model, shape (p,).
-        own: the number of the runs that share the power of a parameter, shape (p,): 1 for a common one.
+        nominal: whether each parameter belongs to the nominal model, shape (p,).
+        own: number of runs that share the power of each parameter, shape (p,); 1 for common parameters.
     """
 
     residual: Array
@@ -47,11 +47,11 @@ class Linear:
 
 
 def linear(fit: Any, along: Sequence[Path]) -> Linear:
-    """Rows of a fit: its common parameters first, then those of every run.
+    """Rows of a fit: its common parameters first, then the parameters of every run.
 
     Args:
         fit: of the diagnosis, to the runs of ``along``.
-        along: paths of the nominal fit, which say how residuals are averaged.
+        along: paths of the nominal fit, which define the averaging of residuals.
     """
     residuals, slopes, problem = fit.residuals, fit.jacobian, fit.problem
     common = np.concatenate([p.rows(c) for p, (c, _) in zip(along, slopes, strict=True)])
@@ -68,12 +68,12 @@ def linear(fit: Any, along: Sequence[Path]) -> Linear:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a fit says beside an error of the model of each size.
+    """The evidence of a fit for each size of the model's error.
 
     Args:
         log: log evidence for every ``ETA``, shape (36,).
         left: expected power of the model's error beside the parameters, over the gap, shape (36,).
-        alone: χ² that the parameters leave without any error of the model.
+        alone: residual χ² of the parameters without any error of the model.
         occam: log of the posterior's volume over the prior's.
     """
 
@@ -85,11 +85,11 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """The error of a nominal model in one campaign.
+    """The error of the nominal model in one campaign.
 
     Args:
-        along: paths of the nominal fit, which say how residuals are averaged.
-        gap: χ² of the nominal fit beyond that of noise.
+        along: paths of the nominal fit, which define the averaging of residuals.
+        gap: χ² of the nominal fit in excess of noise.
         nominal_std: prior standard deviations of the nominal parameters, as in `Linear`.
         basis: B, of the power of the gap beside the nominal parameters, shape (rows, k).
     """
@@ -101,7 +101,7 @@ class Discrepancy:
 
     @classmethod
     def of(cls, nominal: Any) -> Discrepancy:
-        """The error of a nominal model, by its fit of the diagnosis."""
+        """The error of a nominal model, from its fit in the diagnosis."""
         along = paths(nominal)
         base = linear(nominal, along)
         gap = max(nominal.total - nominal.count, 1e-3 * nominal.count)
@@ -123,7 +123,7 @@ class Discrepancy:
         return np.asarray(self.basis.T @ self.basis)
 
     def evidence(self, given: Linear) -> Evidence:
-        """Log evidence of a fit, a further parameter's prior power being the gap's.
+        """Log evidence of a fit; the prior power of further parameters equals the gap's.
 
         Args:
             given: from `linear`, with the nominal parameters in the order of the nominal fit.
@@ -208,7 +208,7 @@ def _modulation(at: Path) -> Array:
 
 
 def _splines(values: Array, low: float, high: float, count: int) -> Array:
-    """Cubic B-splines on even knots, shape (n, count); values outside the range are taken at its end."""
+    """Cubic B-splines on even knots, shape (n, count); values outside the range are clipped."""
     knots = np.concatenate([[low] * 3, np.linspace(low, high, count - 2), [high] * 3])
     return np.asarray(BSpline.design_matrix(np.clip(values, low, high), knots, 3).toarray())
 

@@ -1,6 +1,6 @@
-"""An entry's side: what an answer is, and how a program of this folder answers all campaigns of a set.
+"""An entry's side: the format of an answer, and the programs of this folder that answer all campaigns of a set.
 
-An entry is any program that writes one JSON file for each campaign; ``answer.schema.json`` says what is in it.
+An entry is any program that writes one JSON file for each campaign; ``answer.schema.json`` defines its content.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 SCHEMA = Path(__file__).parent / "answer.schema.json"
 UNKNOWN = "unknown"
-_LAST_PLACE = 32  # in the vocabulary when the sets were drawn: a later effect is in none of them
+_LAST_PLACE = 32  # in the vocabulary when the sets were drawn: they do not have later effects
 KINDS = tuple(kind for kind in ALL_EFFECTS if kind.place <= _LAST_PLACE)
 """The vocabulary of the sets."""
 NAMES: tuple[str, ...] = tuple(sorted(kind.name for kind in KINDS if not (kind.driven or kind.scatters)))
@@ -32,13 +32,13 @@ Answer = Callable[[Path], dict[str, Any]]
 
 @dataclass(frozen=True)
 class About:
-    """What a method is, for the table.
+    """The description of a method, for the table.
 
     Args:
         title: its name in the table.
-        setting: the documented setting that was used, in a sentence.
-        names: causes that it can name, `unknown` among them where it can say so.
-        not_seen: tracks that it cannot see, which have "–" in the table.
+        setting: the documented setting, in a sentence.
+        names: causes that it can name, including `unknown` where applicable.
+        not_seen: tracks that it cannot process, marked "–" in the table.
     """
 
     title: str
@@ -56,8 +56,8 @@ def answer_of(
     """An answer as a document.
 
     Args:
-        causes: names; empty for none, ``["unknown"]`` where a gap has no cause of the vocabulary.
-        probability: that each cause acts, by name; those left out have 0.
+        causes: names; empty without a gap, ``["unknown"]`` where a gap has no cause in the vocabulary.
+        probability: that each cause acts, by name; 0 for missing names.
         sets: sets of causes with their probabilities; empty: causes count as independent.
         coefficients: ``before`` and ``after`` the causes are added, each ``cn_beta`` and ``cn_r`` (1/rad) with
             ``value`` and ``std``; None: not estimated.
@@ -77,18 +77,17 @@ def answer_of(
 def answer_all(
     answer: Answer, campaigns: Path, answers: Path, *, jobs: int = 1, first: int | None = None
 ) -> int:
-    """Answer the campaigns that have no answer yet, one file each.
+    """Answer the unanswered campaigns, one file each.
 
     Args:
-        answer: of one campaign's folder.
+        answer: function of one campaign's folder.
         campaigns: folder of the campaigns.
         answers: folder of the answers; an interrupted run is continued.
         jobs: number of processes.
-        first: only so many campaigns, a count, by name; None: all.
+        first: number of campaigns to answer, the first by name; None: all.
 
     Returns:
-        The number of answers that were written. A campaign on which the method fails gets ``causes`` null and the
-        error, which counts as wrong.
+        The number of new answers. Where the method fails, ``causes`` is null with the error, which counts as wrong.
     """
     answers.mkdir(parents=True, exist_ok=True)
     todo = [f for f in campaign_folders(campaigns)[:first] if not (answers / f"{f.name}.json").exists()]
@@ -114,7 +113,7 @@ def main(answer: Answer, arguments: Sequence[str] | None = None) -> None:
     """Run a method as a program: ``CAMPAIGNS ANSWERS [--jobs N] [--first N]``.
 
     Args:
-        answer: of one campaign's folder.
+        answer: function of one campaign's folder.
         arguments: of the command line; None: the process's own.
     """
     parser = argparse.ArgumentParser(description="Answer campaigns, one JSON file each.")

@@ -1,5 +1,5 @@
-"""The project's own fits, for methods that choose causes otherwise: the only file here that knows how
-they are made.
+"""The project's own fits, for methods that select causes in another way; no other file here depends on their
+implementation.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class Fitted:
     """A set of causes fitted to a campaign.
 
     Args:
-        names: of the causes, in the order they were added.
+        names: of the causes, in the order of their addition.
         chi2: sum of the squared residuals in noise variances.
         rows: number of residuals.
-        numbers: number of parameters of the causes, those of every run included.
+        numbers: number of parameters of the causes, including the parameters of single runs.
         fit: of the diagnosis.
     """
 
@@ -40,12 +40,12 @@ class Fitted:
 
     @property
     def coefficients(self) -> dict[str, dict[str, float]]:
-        """``cn_beta`` and ``cn_r`` with their standard deviations, 1/rad, where they are fitted."""
+        """``cn_beta`` and ``cn_r`` with their standard deviations, 1/rad, where fitted."""
         have = [n for n in ("cn_beta", "cn_r") if n in self.fit.problem.names and self.fit.std(n) > 0.0]
         return {n: {"value": self.fit.value(n), "std": self.fit.std(n)} for n in have}
 
     def with_one_more(self, name: str) -> Fitted | None:
-        """The fit with another cause, in its textbook form; None where it cannot be fitted.
+        """The fit with a further cause, in its textbook form; None where it cannot be fitted.
 
         Args:
             name: of the cause.
@@ -62,8 +62,8 @@ def nominal(folder: Path) -> tuple[Fitted, tuple[str, ...], bool]:
         folder: of the campaign.
 
     Returns:
-        The fit; causes that are read off the records before any fit (hum and a coarse step); and whether the
-        test of the gap finds one.
+        The fit; causes detected in the records before any fit (hum and a coarse step); and whether a gap is
+        detected.
 
     Raises:
         TunnelError: when the records are refused.
@@ -78,10 +78,10 @@ class Grown:
 
     Args:
         nominal: the nominal model fitted to the same readings.
-        sets: fitted sets with names sorted; of two with the same names the better one.
-        random: causes with a random moment among them: names, those beside it, and the fall of −2 ln L by it.
-        read_off: causes that are read off the records before any fit.
-        settled: the answer where no set is weighed: there is no gap, or the noise explains it; else None.
+        sets: fitted sets with sorted names; the better fit where names are equal.
+        random: sets with a random moment: names, the other causes, and the decrease of −2 ln L by the moment.
+        read_off: causes detected in the records before any fit.
+        settled: the answer where no set is weighed (there is no gap, or the noise explains it); else None.
     """
 
     nominal: Fitted
@@ -125,7 +125,7 @@ def grown(folder: Path) -> Grown:
 
 
 def _most_common(given: Sequence[Data]) -> Data | None:
-    """The readings to which most of the sets are fitted."""
+    """The readings used for the fits of most sets."""
     return max(given, key=lambda one: sum(other is one for other in given), default=None)
 
 

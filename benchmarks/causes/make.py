@@ -1,7 +1,7 @@
-"""Makes the set: campaigns by the reference simulator and the packaged records, a key apart, and the hashes
-of both.
+"""Makes the set: campaigns by the reference simulator and the packaged records, a separate key, and the hashes of
+both.
 
-A set is a folder: ``campaigns/NAME`` (all that an entry may read), ``seal.json`` (hashes of campaigns and key) and
+A set is a folder: ``campaigns/NAME`` (the only input of entries), ``seal.json`` (hashes of campaigns and key) and
 ``key/key.json`` (the truth). The hash of a campaign is over its numbers, not over the files of a Parquet library.
 """
 
@@ -26,7 +26,7 @@ from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
 SEAL, KEY, CAMPAIGNS = "seal.json", "key/key.json", "campaigns"
-CHUNK = 10  # campaigns simulated together; larger chunks are hardly quicker
+CHUNK = 10  # campaigns simulated together; larger chunks are hardly faster
 
 
 def published(version: int = VERSION) -> Path:
@@ -49,12 +49,12 @@ def make(
     Args:
         out: its folder.
         version: of the set, of ``EDITIONS``.
-        seed: of everything drawn; the same arguments give the same numbers. None: that of the version.
-        counts: number of campaigns by track; None: those of the version.
+        seed: of all random numbers; the same arguments give the same numbers. None: the seed of the version.
+        counts: number of campaigns by track; None: the numbers of the version.
         jobs: number of processes.
-        salt: random text of the key, so that its hash cannot be found by trying truths; None: made from the
-            seed, as for the published set, whose key everyone can make.
-        real: whether the packaged measured records are in it; None: as the version says.
+        salt: random text in the key, to prevent finding its hash by trial of truths; None: derived from the seed,
+            as in the published set, whose key everyone can make.
+        real: whether the set includes the packaged measured records; None: as in the version.
 
     Returns:
         The seal's file.
@@ -91,7 +91,7 @@ def make(
 
 def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
     """Simulate and write some campaigns; their number."""
-    from diagnosis.blind.sets import written  # what the reader refuses is drawn again, as in blind sets
+    from diagnosis.blind.sets import written  # refused campaigns are redrawn, as in blind sets
     from tunnel_reference.make import simulate_set, truth_of
 
     first, seed, counts = task
@@ -124,7 +124,7 @@ def _copy_records(target: Path) -> dict[str, Any]:
 
 
 def data_hash(folder: Path) -> str:
-    """SHA-256 over what a campaign says and the numbers of its runs, in hexadecimal.
+    """SHA-256 over the statements of a campaign and the numbers of its runs, in hexadecimal.
 
     Args:
         folder: of one campaign.
@@ -154,7 +154,7 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
         The key's document.
 
     Raises:
-        TunnelError: when a campaign or the key is not the one that was sealed.
+        TunnelError: when a campaign or the key does not match the seal.
     """
     seal = read_json(folder / SEAL, remedy="make the set first: python -m benchmarks.causes make")
     if published is not None and read_json(published, remedy="restore it") != seal:
@@ -168,7 +168,7 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
 
 
 def differs(seal: Mapping[str, Any], published: Path) -> str:
-    """How a seal differs from the published one, in words."""
+    """Differences of a seal from the published one, in words."""
     other = json.loads(published.read_text(encoding="utf-8"))["campaigns_sha256"]
     names = [name for name, known in seal["campaigns_sha256"].items() if other.get(name) != known]
     return f"{len(names)} campaigns differ ({', '.join(names[:3])}); another version of NumPy may round otherwise"

@@ -2,7 +2,7 @@
 
 Each run is a model with the stated spring and wind. Parameters of the rig are common to all runs; each run has
 its own release, which enters through the toolbox's `custom_rollout`. The tendon is the spring. The joint's own
-stiffness and damping are those of air and bearing. Two actuators, with a constant and a growing control, are the
+stiffness and damping represent air and bearing. Two actuators, with a constant and a growing control, represent the
 wind's constant moment and its drift.
 """
 
@@ -22,7 +22,7 @@ from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Run
 
 ROWS, SUBSTEPS, FINER, ITERATIONS = 16, 2, 4, 8
-_STEP = 1e-5  # of the finite differences: well above the tolerance of the solver of dry friction
+_STEP = 1e-5  # step of the finite differences: well above the tolerance of the solver for dry friction
 NOMINAL = ("inertia", "damping", "cn_beta", "cn_r", "zero")
 BOUNDS = {
     "coulomb_friction": (0.0, 50.0), "quadratic_damping": (-50.0, 50.0), "structural_damping": (-50.0, 50.0),
@@ -126,11 +126,11 @@ class Rig:
 
     @cached_property
     def residuals(self) -> dict[int, list[Any]]:
-        """The toolbox's residual functions of the runs, by how many times as many steps they take."""
+        """The toolbox's residual functions of the runs, by the factor on their number of steps."""
         return {n: [self._residual(i, n) for i in range(len(self.trials))] for n in (1, FINER)}
 
     def candidates(self, causes: Sequence[str]) -> list[tuple[str, tuple[str, ...]]]:
-        """Causes that are not in a set yet, each with its parameters."""
+        """Causes outside a set, each with its parameters."""
         found = [(n, (n,)) for n in BOUNDS if n not in causes and (self.fastest or n not in _WINDY)]
         if "gravity_stiffness" not in causes:
             found.append(("gravity_stiffness", ("gravity x", "gravity y")))
@@ -171,7 +171,7 @@ class Rig:
         return spec.compile()
 
     def _residual(self, number: int, finer: int) -> Any:
-        """The toolbox's residual function of one run, with so many times as many steps."""
+        """The toolbox's residual function of one run, with ``finer`` times as many steps."""
         import mujoco
         from mujoco import sysid
 
@@ -194,7 +194,7 @@ class Rig:
 
         def compare(params: Any, predicted: Any, seen: Any, *_: Any, **__: Any) -> Any:
             zero = self.rest + 0.01 * self.swing * params["rig"].value[NOMINAL.index("zero")]
-            # a sensor is read before the step it comes with, so that its first row is the initial state's
+            # a sensor is read before its step: its first row is the initial state's
             shown = sysid.TimeSeries(seen.times, predicted.data[::every] + zero, seen.signal_mapping)
             return (shown.data - seen.data)[:, 0] / trial.noise, shown, seen
 
@@ -205,7 +205,7 @@ class Rig:
         )  # fmt: skip
 
     def params(self, names: Sequence[str], x: Array) -> Any:
-        """Parameters of the rig and of the releases as the toolbox has them."""
+        """Parameters of the rig and of the releases in the toolbox's form."""
         from mujoco import sysid
 
         low, high = np.array([BOUNDS.get(n, (-500.0, 500.0)) for n in names]).T
@@ -240,7 +240,7 @@ class Rig:
         Args:
             causes: names of the causes.
             names: of the parameters of the rig.
-            x: where to start: those parameters and two of each release.
+            x: starting values: these parameters and two of each release.
         """
         from mujoco import sysid
 

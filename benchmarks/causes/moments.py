@@ -1,9 +1,9 @@
 """The residual moment of a campaign and the moments of its causes, for methods of regression.
 
 Nothing here comes from the project's fits. The equation of motion is used in its weak form: with L = D² +
-2σD + ω² of a run's own frequency and decay, L β = (ω² − Kr/Izz) β + (2σ − Cr/Izz) β̇ + moments / Izz. Both
-sides pass through L⁻¹, so that the noise of the rows is that of the reading and small moments add up over
-the swings, and all unknowns are linear. The right-hand side is taken along the motion smoothed by a polynomial of a
+2σD + ω² of a run's own frequency and decay, L β = (ω² − Kr/Izz) β + (2σ − Cr/Izz) β̇ + moments / Izz. L⁻¹ is
+applied to both sides. The noise of the rows is then the noise of the reading, small moments add up over the swings,
+and all unknowns are linear. The right-hand side is evaluated along the motion, smoothed by polynomials over a
 quarter of a cycle.
 """
 
@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 Array = NDArray[np.float64]
 
-_CYCLE, _ROWS = 0.25, 16  # of a cycle that the polynomial covers; rows per cycle
+_CYCLE, _ROWS = 0.25, 16  # length of the polynomial, cycles; rows per cycle
 _PLAY = 0.01  # share of the largest swing at which a dead zone is evaluated
 NAMES: tuple[str, ...] = (
     "coulomb_friction", "quadratic_damping", "structural_damping", "cubic_stiffness", "asymmetric_stiffness",
@@ -40,7 +40,7 @@ class Equations:
     """Rows of the weak equation of motion of all runs, in standard deviations of the reading's noise.
 
     Args:
-        target: reading less the response to its own restoring and damping moments, shape (rows,).
+        target: reading minus the response to its own restoring and damping moments, shape (rows,).
         nominal: columns of the nominal model and of the releases, shape (rows, p).
         causes: columns by name of the cause, each of shape (rows, k).
         run: the run of every row, shape (rows,).
@@ -58,10 +58,10 @@ class Equations:
     time: Array
 
     def residuals(self) -> tuple[Array, dict[str, Array]]:
-        """Target and causes without what the nominal model explains of them.
+        """Target and causes without the parts that the nominal model explains.
 
         Returns:
-            The residual moment, shape (rows,), and each cause's, shape (rows, k).
+            The residual moment, shape (rows,), and the residual moments of each cause, shape (rows, k).
         """
         basis = np.linalg.qr(self.nominal / np.maximum(np.linalg.norm(self.nominal, axis=0), 1e-300))[0]
 
@@ -144,7 +144,7 @@ def _rows(
     swing: float,
     springs: Sequence[float],
 ) -> tuple[Array, Array, dict[str, Array], tuple[Array, ...]]:
-    """Target, nominal columns, causes, and where the rows are, of one run."""
+    """Target, nominal columns, causes, and positions of the rows of one run."""
     run, (omega, sigma) = campaign.runs[number], decay
     record = run.record
     dt = record.sample_interval
@@ -193,7 +193,7 @@ def _rows(
 def moments_of(
     run: Run, b: Array, r: Array, swing: float, springs: Sequence[float]
 ) -> dict[str, list[Array]]:
-    """The moments of the causes along a motion, each up to its unknown size."""
+    """The moments of the causes along a motion, each up to an unknown factor."""
     v, q, k = run.wind_speed, (run.air_density or 0.0) * run.wind_speed**2, stiffness(run)
     share, windy = np.arange(b.size) / b.size, float(run.wind_speed > 0.0)
     dead, rate = _PLAY * swing, float(np.max(np.abs(r)))
@@ -217,13 +217,13 @@ def moments_of(
     }
 
 
-DETECTED = 1.15  # mean square of the rows from which there is a gap; without one it is 1.00 ± 0.05
-CLOSED = 0.5  # share of the gap that named causes close at least: most of it
+DETECTED = 1.15  # mean square of the rows above which there is a gap; 1.00 ± 0.05 without a gap
+CLOSED = 0.5  # least share of the gap that named causes explain: most of it
 
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """What is left of the equations when the nominal model is projected out, ready for regressions.
+    """The residual equations after projecting out the nominal model, for regressions.
 
     Args:
         target: the residual, shape (rows,).
@@ -241,7 +241,7 @@ class Regression:
         for name, columns in causes.items():
             left, size, _ = np.linalg.svd(columns, full_matrices=False)
             raw = np.linalg.norm(found.causes[name])
-            # a cause of which the nominal model imitates all but a thousandth cannot be told from it
+            # a cause is indistinguishable if the nominal model imitates all but a thousandth of it
             rank = int(np.sum(size > 1e-3 * raw)) if raw > 0.0 else 0
             if rank:
                 kept[name] = left[:, :rank]
@@ -253,7 +253,7 @@ class Regression:
         return float(self.target @ self.target) / self.target.size
 
     def left(self, names: Sequence[str]) -> float:
-        """Mean square that causes leave.
+        """Residual mean square with causes.
 
         Args:
             names: of the causes.
@@ -265,7 +265,7 @@ class Regression:
         return float(rest @ rest) / rest.size
 
     def verdict(self, named: Sequence[str]) -> list[str]:
-        """The answer that a regression's causes make: none without a gap, `unknown` where they leave most of one.
+        """The answer from a regression's causes: none without a gap, `unknown` where most of it is unexplained.
 
         Args:
             named: causes that the regression selects.

@@ -1,5 +1,5 @@
-"""The neural classifier: the runs of a campaign through one network each, pooled, and with the statistics of all
-runs together to a probability for every cause and for `unknown`. Several networks are averaged.
+"""The neural classifier: a network encodes each run of a campaign; the pooled codes and the statistics of all runs
+together give a probability for every cause and for `unknown`. Several networks are averaged.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Classifier:
     """Trained networks.
 
     Args:
-        networks: of each its weights by ``LAYERS``, shape (inputs + 1, outputs), the last row the bias.
+        networks: weights of each by ``LAYERS``, shape (inputs + 1, outputs), the last row the bias.
         scaling: mean and standard deviation of the statistics of a run, shape (2, k), and of all runs, (2, m).
-        temperature: by which the logits are divided.
+        temperature: divisor of the logits.
         facts: of the training: campaigns, simulation_s, training_s, held_out (nats), width, decay, dropout.
     """
 
@@ -70,7 +70,7 @@ def read_classifier(path: Path = WEIGHTS) -> Classifier:
         path: of the file.
 
     Raises:
-        TunnelError: when the file is missing or is not one.
+        TunnelError: when the file is missing or is not a classifier.
     """
     remedy = "train it: python -m benchmarks.causes.neural_training FOLDER"
     from safetensors import SafetensorError
@@ -87,7 +87,7 @@ def read_classifier(path: Path = WEIGHTS) -> Classifier:
 
 
 def scaled(values: Array, mean: Array, std: Array) -> Array:
-    """Statistics in standard deviations of the training campaigns, within ±6: what lies beyond was not seen."""
+    """Statistics in standard deviations of the training campaigns, clipped to ±6: larger values were not seen."""
     return np.asarray(np.clip((values - mean) / std, -6.0, 6.0))
 
 

@@ -1,8 +1,8 @@
 """Campaigns for the neural classifier, and its training: ``python -m benchmarks.causes.neural_training FOLDER``.
 
-The campaigns are drawn as the benchmark's are, by the same tracks in the same proportions, from another seed.
-Effects are scaled as there; motions are integrated in one step per sample, which is within 0.004 noise standard
-deviations of the benchmark's ten. FOLDER keeps the campaigns, so that an interrupted run continues.
+The campaigns are drawn as for the benchmark, from the same tracks in the same proportions with another seed.
+Effects are scaled as for the benchmark. Motions are integrated in one step per sample, within 0.004 noise standard
+deviations of the benchmark's ten steps. FOLDER keeps the campaigns; an interrupted run continues.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from diagnosis.blind.sets import write_document
 from tunnel_sim.vocabulary.errors import TunnelError
 
 TRAINING_SEED = 20290417
-TIMES = 8  # as many campaigns of each track as the benchmark has are drawn; the first are made
+TIMES = 8  # campaigns drawn per campaign of the benchmark, in each track; only the first are made
 CHUNK = 40
 FOLDS, EPOCHS, BATCH, RATE = 5, 120, 32, 2e-3
 TEMPERATURES = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 1.6, 2.0)
@@ -53,15 +53,15 @@ SETTINGS = tuple(Setting(w, 1e-2, d) for w in (32, 64) for d in (0.2, 0.4))
 
 
 def make_campaigns(folder: Path, number: int, *, chunk: int = CHUNK) -> float:
-    """Simulate training campaigns, those that are not there yet.
+    """Simulate the missing training campaigns.
 
     Args:
-        folder: of the campaigns; ``truths`` has what acts in each, and the processor time.
+        folder: of the campaigns; ``truths`` has the acting causes of each, and the processor time.
         number: of campaigns.
         chunk: number of campaigns simulated together.
 
     Returns:
-        The processor time of all, s.
+        The total processor time, s.
     """
     from tunnel_reference.make import as_campaign, truth_of
     from tunnel_reference.severity import read_and_fit, simulate_motions, size_separably
@@ -82,7 +82,7 @@ def make_campaigns(folder: Path, number: int, *, chunk: int = CHUNK) -> float:
                 simulated = read_and_fit(draw, motion)
                 try:
                     write_campaign(as_campaign(simulated, one.name), target)
-                except TunnelError:  # the reader refuses it; the benchmark draws again, this leaves it out
+                except TunnelError:  # refused by the reader: left out here, redrawn in the benchmark
                     continue
                 truth = truth_of(simulated)
                 truths[one.name] = {key: truth[key] for key in ("effects", "small")}
@@ -98,11 +98,11 @@ class Samples:
     """Training campaigns.
 
     Args:
-        runs: statistics of the runs, shape (campaigns, most runs, k), those that are missing 0.
-        there: which runs are there, shape (campaigns, most runs).
+        runs: statistics of the runs, shape (campaigns, most runs, k), 0 for missing runs.
+        there: whether each run exists, shape (campaigns, most runs).
         whole: statistics of all runs together, shape (campaigns, m).
-        acts: which labels act, shape (campaigns, labels).
-        asked: which labels are asked for, not small effects, shape (campaigns, labels).
+        acts: whether each label acts, shape (campaigns, labels).
+        asked: whether each label is scored (small effects are not), shape (campaigns, labels).
     """
 
     runs: Array
@@ -144,15 +144,15 @@ def read_samples(folder: Path) -> Samples:
 
 
 def trained(samples: Samples, seed: int, settings: Sequence[Setting], epochs: int = EPOCHS) -> Classifier:
-    """Train one network for each fold with every setting, and keep the setting with the least held-out loss.
+    """Train one network per fold with every setting, and keep the setting with the least held-out loss.
 
-    A network stops where the loss of its held-out fold is least. The temperature is the best on the held-out folds.
+    A network stops at the least loss on its held-out fold. The temperature is optimal on the held-out folds.
 
     Args:
         samples: of the training campaigns.
         seed: of folds, first weights and order.
-        settings: that are tried.
-        epochs: the most.
+        settings: to try.
+        epochs: greatest number.
 
     Returns:
         The classifier, without the facts of the simulation.
@@ -195,7 +195,7 @@ def _train_one(
     epochs: int,
     rng: np.random.Generator,
 ) -> tuple[float, dict[str, Array], Array]:
-    """Least held-out loss, the weights there, and the held-out logits."""
+    """Least held-out loss, its weights, and the held-out logits."""
     import torch
 
     torch.manual_seed(int(rng.integers(2**31)))
@@ -253,7 +253,7 @@ def _mirrored(runs: Array) -> Array:
 
 
 def _loss(logits: Array, samples: Samples) -> float:
-    """Cross-entropy of a campaign's labels, nats, the mean over the campaigns."""
+    """Mean over the campaigns of the cross-entropy of their labels, nats."""
     each = np.logaddexp(0.0, logits) - samples.acts * logits
     return float(np.sum(each * samples.asked) / len(logits))
 

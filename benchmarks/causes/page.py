@@ -25,7 +25,7 @@ def results_of(version: int) -> Path:
 
 
 def read_results(folder: Path = RESULTS) -> list[dict[str, Any]]:
-    """The results, those with the larger share of exact sets first.
+    """The results, in decreasing order of the share of exact sets.
 
     Args:
         folder: of one file for each method.
@@ -109,7 +109,7 @@ def page_text(
 
 
 def _where_others_win(found: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Tracks and scores in which another method is ahead of ours on the campaigns that both answered."""
+    """Tracks and scores in which another method is better than ours on the campaigns that both answered."""
     ours = next((r for r in found if r["method"] == OURS), None)
     if ours is None:
         return ["`tunnel diagnose` has not been run on this set yet."]

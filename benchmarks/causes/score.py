@@ -1,6 +1,6 @@
 """Scores an entry by the statistics of the project's blind checks.
 
-This is the only file that turns answers into what `diagnosis.blind` counts.
+Only this file converts answers to the cases of `diagnosis.blind`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FLOOR = 0.01
 """Least probability that the log score counts, and one minus the greatest: nobody knows better from so "
 "few trials."""
 WITHIN = 2.0  # standard deviations of a coefficient
-_SETS = 60  # of independent causes that are listed at most; the rest of the probability is in no credible set
+_SETS = 60  # most listed sets of independent causes; the remaining probability is in no credible set
 
 
 def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
@@ -39,7 +39,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
         folder: of one JSON file for each campaign.
 
     Raises:
-        TunnelError: when there is none, or one is not an answer.
+        TunnelError: when there are no files, or a file is not an answer.
     """
     found = {}
     for path in sorted(folder.glob("*.json")):
@@ -54,7 +54,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _check(answer: Mapping[str, Any]) -> None:
-    """The rules of the schema that a score depends on, without a validator's package."""
+    """Check the rules of the schema that affect a score, without a validator package."""
     labels = {*NAMES, UNKNOWN, *SCATTERING}
     named = answer["causes"] or []
     if not labels >= set(named) or not labels >= set(answer["probability"]):
@@ -72,8 +72,8 @@ def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]
     """Sets of causes with their probabilities, most probable first.
 
     Args:
-        answer: an entry's document. Where it states no sets, causes are independent, and `unknown` has its own
-            probability beside them.
+        answer: an entry's document. Without stated sets, causes are independent, and `unknown` has a separate
+            probability.
     """
     if answer.get("sets"):
         given = [(tuple(sorted(s["causes"])), float(s["probability"])) for s in answer["sets"]]
@@ -96,7 +96,7 @@ def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]
 
 
 def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Case:
-    """Truth and answer of a campaign as the blind checks have them.
+    """Truth and answer of a campaign in the form of the blind checks.
 
     Args:
         truth: from the key.
@@ -104,7 +104,7 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
     """
     causes = answer["causes"]
     own = None if causes is None else tuple(sorted(causes))
-    # the answer given comes first, as the blind checks expect; its place among equals does not matter
+    # the given answer comes first, as the blind checks expect; the order of equals does not matter
     sets = sorted(likely_sets(answer), key=lambda one: (one[0] != own, -one[1])) if own is not None else []
     document = {
         "causes": causes,
@@ -114,14 +114,14 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
         "inclusion": {n: float(answer["probability"].get(n, 0.0)) for n in NAMES} if own is not None else {},
         "coefficients": answer.get("coefficients", {}),
         "repeatability": {"spreads": _spreads(answer.get("scatter", {}))},
-        "gap": {"closed": 0.0},  # not asked of an entry
+        "gap": {"closed": 0.0},  # not required of entries
         "wall_s": float(answer.get("seconds", 0.0)),
     }
     return case(name, truth, document)
 
 
 def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an entry says of the scatter between runs, as a diagnosis has it."""
+    """An entry's scatter between runs, in the form of a diagnosis."""
     effects = {number: name for name, number in SCATTERING.items()}
     return [
         {
@@ -135,10 +135,10 @@ def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def log_score(cases: Sequence[Case]) -> float | None:
-    """Mean over campaigns of the log probability of what acts and what does not, nats; 0 is best.
+    """Mean over campaigns of the log probability of the acting and absent causes, nats; 0 is best.
 
     Args:
-        cases: truth and answer of every campaign; those without an answer count as a half for every cause.
+        cases: truth and answer of every campaign; a missing answer counts as a half for every cause.
     """
     stated = {c.name: dict.fromkeys(NAMES, 0.5) | c.answer["inclusion"] for c in cases}
     scores = []
@@ -149,7 +149,7 @@ def log_score(cases: Sequence[Case]) -> float | None:
 
 
 def _coefficients(cases: Sequence[Case]) -> dict[str, Any]:
-    """Errors of both coefficients before and after, where an entry states them."""
+    """Errors of both coefficients before and after, where stated by an entry."""
     found: dict[str, Any] = {}
     for name in COEFFICIENTS:
         for when in ("before", "after"):
@@ -197,12 +197,12 @@ def score(
     Args:
         folder: of the set.
         key: its document, as `benchmarks.causes.make.check` returns it.
-        answers: by campaign; campaigns without one are not scored, and their number is stated.
+        answers: by campaign; campaigns without an answer are not scored, and their number is stated.
         name: of the method.
-        about: what it is.
+        about: description of the method.
 
     Raises:
-        TunnelError: when an answer is to a campaign that the set does not have.
+        TunnelError: when an answer is for a campaign outside the set.
     """
     strange = sorted(set(answers) - set(key["truths"]))
     if strange:

@@ -1,8 +1,8 @@
-"""Summary statistics of a campaign for the neural classifier: fixed, from the records alone and not from any fit of
+"""Summary statistics of a campaign for the neural classifier: fixed functions of the records, without any fit of
 the project.
 
-They describe the residuals of the nominal model in its weak form (moments.py), run by run in stretches of time and
-by harmonic, and of all runs together by cause. Numbers of a large range are compressed by arcsinh or a logarithm.
+They describe the residuals of the nominal model in its weak form (moments.py), for each run by time interval and
+harmonic, and for all runs together by cause. Numbers of a large range are compressed by arcsinh or a logarithm.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 STRETCHES = 8
 _HARMONICS = 3
-_PER_STRETCH = 3 + 2 * _HARMONICS  # mean, cosine and sine of each harmonic, what they leave, the amplitude
+_PER_STRETCH = 3 + 2 * _HARMONICS  # mean, cosine and sine of each harmonic, their residual, the amplitude
 _FLOOR = 1e-6
 
 
@@ -26,7 +26,7 @@ def summaries(campaign: Campaign) -> tuple[Array, Array]:
         campaign: of free decays.
 
     Returns:
-        Of every run, shape (runs, k), and of all together, shape (m,), dimensionless.
+        Statistics of every run, shape (runs, k), and of all together, shape (m,), dimensionless.
     """
     found = equations_of(campaign)
     left, causes = found.residuals()
@@ -69,7 +69,7 @@ def mirrored(runs: Array) -> Array:
 
 
 def _stretches(found: Equations, left: Array, number: int) -> Array:
-    """Harmonics of the residual in noise standard deviations by stretch of a run, shape (stretches, 9)."""
+    """Harmonics of the residual in noise standard deviations by interval of a run, shape (intervals, 9)."""
     own = np.flatnonzero(found.run == number)
     table = np.zeros((STRETCHES, _PER_STRETCH))
     for place, part in enumerate(np.array_split(own, STRETCHES)):
@@ -87,7 +87,7 @@ def _stretches(found: Equations, left: Array, number: int) -> Array:
 
 
 def _of_reading(run: Run, resolution: float) -> Array:
-    """Of the reading itself: lines above the motion and beside it, its lattice, its ends, the time stamps."""
+    """Statistics of the reading: lines above the motion and beside it, lattice, ends, time stamps."""
     y, dt = run.record.yaw_rad, run.record.sample_interval
     f0 = frequency(run) / (2.0 * np.pi)
     width = max(2 * round(np.pi * 0.25 / (2.0 * np.pi * f0 * dt)) + 1, 7)
@@ -122,7 +122,7 @@ def _line(values: Array, dt: float, low: float, high: float) -> tuple[float, flo
 
 
 def _by_cause(left: Array, causes: dict[str, Array]) -> Array:
-    """Shares of the residual that a cause closes alone and beside all others, and both in noise, shape (4 n,)."""
+    """Shares of the residual that a cause explains alone and beside all others, and both in noise, shape (4 n,)."""
     bases = {}
     for name, columns in causes.items():
         u, size, _ = np.linalg.svd(columns, full_matrices=False)
@@ -140,7 +140,7 @@ def _by_cause(left: Array, causes: dict[str, Array]) -> Array:
 
 
 def _rest(left: Array, columns: Array) -> float:
-    """Sum of squares beside some columns."""
+    """Residual sum of squares after a fit of some columns."""
     rest = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-9)[0] if columns.size else left
     return float(rest @ rest)
 

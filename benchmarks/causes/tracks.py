@@ -1,4 +1,4 @@
-"""The tracks of the benchmark: what acts in their campaigns, and how many campaigns they have."""
+"""The tracks of the benchmark: the causes in their campaigns, and the number of campaigns."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Track:
         count: number of campaigns.
         kinds: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
         certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`.
-        first: families of which one acts in every campaign, in turn; empty: all.
-        about: what it is, in a few words.
+        first: families that act in turn, one in every campaign; empty: all.
+        about: description in a few words.
         scatter: whether the runs differ by chance.
         level: of the scatter, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
         stated: share of campaigns that state their scatter.
-        normal: share of campaigns whose scatter is normal; the others have another distribution.
+        normal: share of campaigns with normal scatter; the others have another distribution.
     """
 
     count: int
@@ -79,12 +79,12 @@ _SCATTERING: Mapping[str, Track] = {
 
 @dataclass(frozen=True)
 class Edition:
-    """A set of its own, with a seal of its own.
+    """A separate set, with its own seal.
 
     Args:
-        seed: of everything drawn.
+        seed: of all random numbers.
         tracks: by name.
-        real: whether the packaged measured records are in it.
+        real: whether the set includes the packaged measured records.
     """
 
     seed: int
@@ -113,7 +113,7 @@ class Drawn:
     """One campaign to simulate.
 
     Args:
-        name: as in the set; it says nothing of the track.
+        name: in the set; it does not reveal the track.
         track: of an edition.
         draw: the campaign before its effects are scaled.
     """
@@ -140,7 +140,7 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
 
 
 def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
-    """The campaigns of a track; families come in turn, so that their frequencies differ by at most one."""
+    """The campaigns of a track; families alternate, so their frequencies differ by at most one."""
     track, number = _ALL[name], list(_ALL).index(name)
     rng = np.random.default_rng([seed, number])
     pool = np.array(track.first or [name for name in FAMILIES if name in NAMES])

@@ -1,19 +1,19 @@
-"""What is lost without a setting of the diagnosis? On campaigns whose truth is open.
+"""The loss without each setting of the diagnosis, on campaigns of known truth.
 
-Every number that decides is moved by a factor of two either way, or switched off, and campaigns are answered again:
+Every deciding number is doubled, halved or switched off, and the campaigns are answered again:
 
-- the settings of the weighing (decision 0007) on the fits that are there: the sets are only weighed again;
-- any other setting by whole diagnoses, which takes as long as they do.
+- the settings of the weighing (decision 0007) on the existing fits: the sets are only reweighed;
+- any other setting by repeating whole diagnoses, at their full cost.
 
     python -m docs.studies.ablation SET [--count N] [--rerun NAME ...] [--odds] [--search]
 
 ``--odds`` fits the constants of the odds against ``unknown`` to the same fits: it maximises the probability of the
-truth, and of ``unknown`` where a true effect is withheld. ``--search`` says of every wrong answer whether the
-search missed the truth or the answer weighs more: the true set is fitted alone.
+truth, and of ``unknown`` where a true effect is withheld. For every wrong answer, ``--search`` fits the true set
+alone to show whether the search missed it or the answer has more weight.
 
-SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how
-many answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how
-often a wrong set is stated where one true effect is withheld, by deleting the sets that hold it.
+SET is made by ``tunnel blind make``; its key is opened, so it is no longer a blind test. The table gives the
+numbers of exact answers and of false causes, the mean logarithm of the probability of the truth, and the frequency
+of wrong sets where one true effect is withheld by deleting the sets that contain it.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ FACTORS = (0.0, 0.5, 2.0)
 """By which each is multiplied; 0 switches it off."""
 
 ODDS = ("weighing.unknown_at", "weighing.unknown_gap", "weighing.unknown_left")
-_LEAST = 0.02  # of a probability: what is certain and wrong must not decide alone
+_LEAST = 0.02  # least probability: a single certain and wrong answer must not decide
 
 Names = tuple[str, ...]
 
@@ -71,10 +71,10 @@ class Case:
 
     Args:
         truth: names of the true effects, sorted; ``("unknown",)`` outside the vocabulary.
-        small: of those that need not be named.
-        read_off: causes read off the records.
+        small: names of the true effects that need not be found.
+        read_off: causes detected in the records.
         sets: fitted sets; empty where nothing was weighed.
-        nominal: what the nominal model leaves; None where nothing was weighed.
+        nominal: misfit of the nominal model; None where nothing was weighed.
         causes: the answer where nothing was weighed.
     """
 
@@ -86,7 +86,7 @@ class Case:
     causes: Names = ()
 
     def right(self, causes: Names) -> bool:
-        """Whether an answer is the truth, but for small effects."""
+        """Whether an answer equals the truth, except for small effects."""
         return set(causes) - self.small == set(self.truth)
 
     def answers(
@@ -96,7 +96,7 @@ class Case:
 
         Args:
             withheld: an effect whose sets are deleted.
-            chosen: how the sets are weighed.
+            chosen: settings of the weighing.
         """
         if self.nominal is None:
             return [(self.causes, 1.0)]
@@ -109,16 +109,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Tally:
-    """How campaigns were answered.
+    """Counts of the answers.
 
     Args:
         exact: campaigns whose causes are exactly right.
         cases: campaigns.
-        false: causes named that do not act.
-        named: causes named.
+        false: number of named causes that do not act.
+        named: number of named causes.
         log_score: mean logarithm of the probability of the truth, at least ln 0.001.
-        stated: trials without a true effect in which a set is stated with one half or more.
-        trials: how many.
+        stated: trials with a withheld effect in which a set has a probability of one half or more.
+        trials: number of these trials.
     """
 
     exact: int
@@ -172,7 +172,7 @@ def moved(name: str, factor: float) -> Settings:
 
 @contextmanager
 def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterator[None]:
-    """Keep what is weighed meanwhile."""
+    """Record the sets weighed inside the context."""
     weigh = decide.weigh
 
     def kept(
@@ -198,11 +198,11 @@ def read_case(
     only: Sequence[str] | None = None,
     settings: Settings = Settings(),
 ) -> Case:
-    """Diagnose a campaign, and keep the sets that are weighed last.
+    """Diagnose a campaign, and keep the last weighed sets.
 
     Args:
         truth: names of the effects that act and matter.
-        small: names of those that act and need not be found.
+        small: names of acting effects that need not be found.
         only: names of the effects to try; None: all.
     """
     seen: list[tuple[Sequence[FittedSet], ChannelMisfit]] = []
@@ -239,12 +239,12 @@ def fitted_odds(cases: Sequence[Case]) -> dict[str, float]:
     """The settings of the odds against ``unknown`` under which the truth is most probable.
 
     Args:
-        cases: whose sets are weighed again, with all effects and without each true one in turn.
+        cases: their sets are reweighed, with all effects and without each true effect in turn.
     """
     start = [Settings().values()[name] for name in ODDS]
 
     def log_probability(case: Case, chosen: WeighingSettings) -> float:
-        """Of the truth, and half of that of ``unknown`` with every true effect withheld in turn."""
+        """Log probability of the truth, plus half that of ``unknown`` with every true effect withheld in turn."""
         right = sum(p for names, p in case.answers(chosen=chosen) if case.right(names))
         total = float(np.log(max(right, _LEAST)))
         if case.truth != UNKNOWN:

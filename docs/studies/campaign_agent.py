@@ -2,8 +2,8 @@
 
 ``python -m docs.studies.campaign_agent train OUT.safetensors`` trains on one thread, in linear theory.
 ``python -m docs.studies.campaign_agent score docs`` plays 50 campaigns in the full simulation and writes the page's
-table; with ``--agent FILE --seed N`` it plays an agent of one's own, trained from seed N, as one more row. Training
-needs the extra ``train``; the score does not.
+table; ``--agent FILE --seed N`` adds a row for another agent, trained from seed N. Training needs the extra
+``train``; the score does not.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
 STEPS = 90_000
-CAMPAIGNS = 16  # in parallel, so that the network is evaluated for all of them at once
+CAMPAIGNS = 16  # in parallel: one evaluation of the network for all
 TRAINING: dict[str, Any] = {"sample_rate": 25.0, "noise_std": 0.025, "max_runs": 12}
 """A quarter of the samples with half the noise hold the same information and take a quarter of the time. Campaigns
 of an untrained agent are cut off earlier."""
@@ -91,11 +91,11 @@ def train(steps: int, seed: int) -> Agent:
     """Train by proximal policy optimisation (Schulman et al., arXiv 1707.06347).
 
     Args:
-        steps: runs to make in all (number).
+        steps: total number of runs.
     """
     import torch
 
-    torch.set_num_threads(1)  # the network is so small that a second thread only costs time
+    torch.set_num_threads(1)  # a second thread only costs time on so small a network
     envs = make(CAMPAIGNS, **TRAINING)
     model = model_of(envs, seed, verbose=1)
     model.learn(steps)
@@ -121,7 +121,7 @@ def score(agent: Agent, name: str = "trained") -> list[Row]:
 
 
 def write_score(docs: Path, rows: Sequence[Row]) -> None:
-    """Write the episodes as CSV beside those of other agents, and fill the page's table.
+    """Add the episodes to the CSV of all agents, and fill the page's table.
 
     Args:
         docs: the folder docs of the source tree.

@@ -2,7 +2,7 @@
 
 Both policies of a preset play the same seeds: the same truth, and in the i-th run the same noise. Medians have
 distribution-free 95 % intervals from order statistics (David & Nagaraja, Order Statistics, 3rd ed. (2003), ch. 7,
-doi 10.1002/0471722162); those of the difference rest on the differences seed by seed.
+doi 10.1002/0471722162); intervals of the difference use the differences seed by seed.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ class Row:
     """One episode.
 
     Args:
-        runs: made until the goal, or until the episode was cut off; number of them.
-        rig_time_s: likewise, s.
+        runs: number of runs until the goal, or until the episode was cut off.
+        rig_time_s: rig time until the goal, or until the episode was cut off, s.
         reached: whether the goal was reached.
         on_first: whether it was reached with the first run.
         right: whether the answer is the effect that acts; of an identification, whether Cnβ and Cnr are both
             within three standard deviations of the truth.
         cn_beta_error: error of Cnβ over its standard deviation (1); of an identification.
-        cn_r_error: likewise of Cnr (1).
+        cn_r_error: error of Cnr over its standard deviation (1); of an identification.
     """
 
     preset: str
@@ -217,7 +217,7 @@ def replaced(page: str, name: str, text: str) -> str:
 
 
 def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
-    """How Cnr's standard deviation falls with the rig time in one campaign, by policy.
+    """Decrease of Cnr's standard deviation with the rig time in one campaign, by policy.
 
     Returns:
         By policy: rig time [s] and relative standard deviation (1), each of shape (runs + 1,).
@@ -233,10 +233,10 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
 
 @styled
 def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Array]]) -> Figure:
-    """One campaign of each policy, and how many of all have reached the goal, against the rig time.
+    """One campaign of each policy, and the share of all that have reached the goal, against the rig time.
 
     Args:
-        followed: of `example`.
+        followed: from `example`.
     """
     fig = figure(WIDTH, 2.9)
     panels = fig.subplots(1, 3)
@@ -253,7 +253,7 @@ def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Arr
             own = _of(rows, preset, policy)
             spent = np.sort([row.rig_time_s / 60.0 for row in own if row.reached])
             share = 100.0 * np.arange(1, spent.size + 1) / len(own)
-            # the last share holds to the end: the campaigns that are left stopped short of the goal
+            # the last share extends to the end: the other campaigns did not reach the goal
             x, y = np.concatenate(([0.0], spent, [longest])), np.concatenate(([0.0], share, share[-1:]))
             dash = ("-", "--", "-.")[place]
             axes.step(x, y, dash, where="post", color=COLOURS[_COLOUR[policy]], label=policy)

@@ -1,8 +1,8 @@
-"""Diagnose measured driven records, and predict motion that no fit has seen.
+"""Diagnose measured driven records, and predict motion that was not fitted.
 
 ``python -m docs.studies.driven_records --data FOLDER [--answers FOLDER]`` writes ``docs/driven-records.md`` and its
-figure. The folder of data holds the campaigns ``silverbox`` and ``emps``. Diagnoses that are in the folder of
-answers already, as JSON, are not made again.
+figure. The folder of data has the campaigns ``silverbox`` and ``emps``. Diagnoses already in the folder of answers,
+as JSON, are not repeated.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 PAGE = Path(__file__).parents[1] / "driven-records.md"
 ARROW = "arrow"
-_QUIET = 30  # samples over which an input counts as quiet, where its standard deviation is below
+_QUIET = 30  # samples over which an input with a smaller standard deviation than `_SILENCE` counts as quiet
 _SILENCE = 1.5e-3  # V
 PUBLISHED = {
     "yaw_inertia": (95.1, "kg"),
@@ -53,7 +53,7 @@ class Predicted:
 
     Args:
         reading: by run id, shape (n,), in the unit of the reading.
-        error: reading less prediction by run id, shape (n,), in that unit.
+        error: reading minus prediction by run id, shape (n,), in the unit of the reading.
     """
 
     reading: Mapping[str, Array]
@@ -61,13 +61,13 @@ class Predicted:
 
 
 def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
-    """The nominal model, and that with the effects of a diagnosis' likeliest answer, fitted to all runs.
+    """The nominal model, and the model with the effects of a diagnosis' likeliest answer, fitted to all runs.
 
     Args:
         document: of the diagnosis; the fit of its effects starts from its parameters.
     """
     likeliest = document["candidates"][0]
-    parameters = {  # those of a single effect have no prefix
+    parameters = {  # parameters of a single effect have no prefix
         name if "." in name else f"{likeliest['effect']}.{name}": given
         for name, given in likeliest["parameters"].items()
     }
@@ -87,10 +87,10 @@ def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
 
 
 def predicted(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> Predicted:
-    """Fit the blocks that are seen, and predict all from the input.
+    """Fit some blocks, and predict all from the input.
 
     Args:
-        seen: by run, shape (n,). The initial state of a run without any stays that of the fit to all blocks.
+        seen: fitted blocks by run, shape (n,). A run without any keeps its initial state of the fit to all blocks.
     """
     runs = whole.problem.data.runs
     point, _ = fit_seen(whole, seen)
@@ -110,7 +110,7 @@ def gaps(campaign: Campaign, readings: Mapping[str, Array] | None = None) -> Cam
     """The free decays where the input is quiet before the end of each run.
 
     Args:
-        readings: by run id, at the samples of the record, rad; None: those of the records.
+        readings: by run id, at the samples of the record, rad; None: the recorded readings.
     """
     runs: list[Run] = []
     for run in campaign.runs:
@@ -276,7 +276,7 @@ The validation record that others state their errors on is not among these data.
 
 
 def diagnosed(campaign: Campaign, answers: Path | None, name: str) -> Mapping[str, Any]:
-    """The document of a diagnosis, read where it is there already, and kept."""
+    """The document of a diagnosis, read where it exists, otherwise computed and kept."""
     path = None if answers is None else answers / f"{name}.json"
     if path is not None and path.exists():
         found: Mapping[str, Any] = json.loads(path.read_text("utf-8"))

@@ -1,9 +1,9 @@
-"""Draw how the code is laid out: the rooms of every package, in the order of the import contracts.
+"""Draw the layout of the code: the rooms of every package, in the order of the import contracts.
 
     python -m docs.studies.layout
 
-writes docs/images/layout.svg. The rooms and their order are read from the contracts in pyproject.toml, the words
-from the docstrings of the rooms; a test compares the picture with them.
+writes docs/images/layout.svg. Rooms and order come from the contracts in pyproject.toml, texts from the docstrings
+of the rooms; a test compares the picture with them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Room:
     """A folder of a package, or a module at its top.
 
     Args:
-        layer: its place in the package's contract; it imports only from rooms of a greater number.
+        layer: its place in the package's contract; a room imports only from rooms of greater number.
         summary: first line of its docstring.
     """
 
@@ -43,7 +43,7 @@ class Room:
 
     @property
     def is_folder(self) -> bool:
-        """Whether it has modules of its own."""
+        """Whether it contains modules."""
         return (ROOT / self.package / self.name).is_dir()
 
 

@@ -1,9 +1,9 @@
-"""How much training the environments need: ``python -m docs.studies.learning_curves docs`` measures it.
+"""The amount of training for the environments, measured by ``python -m docs.studies.learning_curves docs``.
 
-Agents are trained with Stable-Baselines3 on one thread; during the training the agent as it is then plays episodes
-that no training has seen, each time the same ones, and takes its most probable action. The score of an episode is
-its return, in nats. Data, figure and table of docs/how-to/train-an-agent.md are written. Training needs the extra
-``train`` and some fifteen minutes of one core; ``--draw`` draws the stored data.
+Agents are trained with Stable-Baselines3 on one thread. At intervals the current agent plays a fixed set of
+episodes, not used in training, with its most probable actions. The score of an episode is its return, in nats.
+Data, figure and table of docs/how-to/train-an-agent.md are written. Training needs the extra ``train`` and some
+fifteen minutes of one core; ``--draw`` draws the stored data.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ SETTINGS: dict[str, Any] = {
 """Of PPO for ``FreeDecay-v0``, where they differ from those of the packaged agent."""
 RUNS = 16  # in parallel
 SEEDS = (0, 1)
-SWING = radians(20.0)  # rad, that the policy written by hand keeps
-SPEED = 25.0  # m/s, at which it does so
+SWING = radians(20.0)  # rad, amplitude of the hand-written policy
+SPEED = 25.0  # m/s, wind speed of the hand-written policy
 CURVES = ("FreeDecay-v0", "Campaign-v0")
 LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
 """Steps of each training: control periods, and runs."""
@@ -73,12 +73,12 @@ class Point:
     """The score of a policy, or of an agent at one point of its training.
 
     Args:
-        policy: ``trained``, or a policy that is not trained here.
-        seed: of the training; 0 for another policy.
-        steps: of the training so far; 0 for another policy.
+        policy: ``trained``, or a policy for comparison.
+        seed: of the training; 0 for a policy for comparison.
+        steps: of the training so far; 0 for a policy for comparison.
         nats: mean return of the episodes, nats.
         std_error: of the mean, from the scatter between the episodes, nats.
-        episodes: number of them.
+        episodes: their number.
     """
 
     environment: str
@@ -113,7 +113,7 @@ def play_runs(act: Callable[[Array], Array], begin: Callable[[dict[str, Any]], N
     returns, over = np.zeros(count), np.zeros(count, dtype=bool)
     while not over.all():
         observations, rewards, terminated, truncated, _ = envs.step(act(observations))
-        returns += np.where(over, 0.0, rewards)  # a run that has ended is restarted by itself
+        returns += np.where(over, 0.0, rewards)  # a finished run restarts automatically
         over |= terminated | truncated
     envs.close()
     return returns
@@ -123,7 +123,7 @@ def play_campaigns(act: Callable[[Any], Any]) -> Array:
     """The returns of campaigns of ``Campaign-v0``, nats less rig time, shape (n,).
 
     Args:
-        act: the action in an environment in which an episode is under way.
+        act: the action in an environment during an episode.
     """
     env = gymnasium.make("tunnel_sim/Campaign-v0")
     returns = np.zeros(EPISODES["Campaign-v0"])
@@ -148,7 +148,7 @@ class _Held:
 
 
 def untrained() -> list[Point]:
-    """The policies that the agents are compared with."""
+    """The policies for comparison with the agents."""
     from tunnel_sim.envs.conditions import FreeDecayConfig
     from tunnel_sim.envs.engines import operator_action
 
@@ -206,7 +206,7 @@ def train(environment: str, seed: int, steps: int) -> list[Point]:
     found: list[Point] = []
 
     class Score(BaseCallback):
-        """Scores the agent before a rollout, each time that the steps have doubled."""
+        """Scores the agent before a rollout whenever the number of steps has doubled."""
 
         next_steps = 0
 
@@ -226,7 +226,7 @@ def train(environment: str, seed: int, steps: int) -> list[Point]:
 
 
 def features_of(env: Any) -> Array:
-    """What the agent of a campaign sees."""
+    """The features for the agent of a campaign."""
     from tunnel_lab.envs.policies import features
 
     return features(env.known.observation())
@@ -273,7 +273,7 @@ def curves(points: Sequence[Point]) -> Figure:
 def _panel(axes: Axes, points: Sequence[Point]) -> None:
     mine = [one for one in points if one.policy == TRAINED]
     first = min(one.steps for one in mine if one.steps)
-    start = first / 2.0  # where an axis of logarithms has its zero
+    start = first / 2.0  # position of zero on the logarithmic axis
     for place, seed in enumerate(sorted({one.seed for one in mine})):
         line = [one for one in mine if one.seed == seed]
         axes.errorbar(

@@ -1,14 +1,13 @@
-"""Which decisions would a setting of half or twice its size change? On campaigns whose truth is open.
+"""The decisions that change with a setting of half or twice its size, on campaigns of known truth.
 
     python -m docs.studies.margins FOLDER [FOLDER ...] [--count N] [--kept FILE]
 
-Each folder is a campaign, or a set made by ``tunnel blind make``. Every setting of the diagnosis that is not
-whole is replaced by one that remembers what it would be at half and at twice its size. Each comparison that it
-takes part in is then made three times, so that one diagnosis of each campaign says of all settings how often a
-comparison comes out differently. Where none does, the setting decides nothing in these campaigns. Where some do,
-the answer need not change: `docs.studies.ablation` moves one setting at a time and answers again. A setting
-that becomes part of an array before it is compared is not followed. FILE keeps the counts of every campaign; the
-same command goes on where it was interrupted. They are those of one state of the code.
+Each folder is a campaign, or a set made by ``tunnel blind make``. Every non-integer setting of the diagnosis is
+replaced by a number that also tracks its half and double. Each comparison with it is then evaluated three times:
+one diagnosis of a campaign shows, for all settings, how often a comparison changes. If none changes, the setting
+decides nothing in these campaigns. If some change, the answer need not: `docs.studies.ablation` changes one setting
+at a time and repeats the answer. A setting that becomes part of an array before a comparison is not tracked. FILE
+keeps the counts of every campaign, for one state of the code; the same command continues after an interruption.
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 FACTORS = (0.5, 2.0)
 
-#: By setting: comparisons made, and how many come out differently at each factor, since `watched` was called.
+#: By setting: number of comparisons, and of changed ones at each factor, since `watched` was called.
 Counts = defaultdict[str, list[int]]
 _counts: Counts = defaultdict(lambda: [0, 0, 0])
 
 
 class Watched(float):
-    """A number that remembers what it would be if settings that it is made from were of another size.
+    """A number that tracks its values under other sizes of the settings behind it.
 
     Args:
         at: by name of a setting, its value at each of `FACTORS`.
@@ -54,7 +53,7 @@ class Watched(float):
         return made
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        """Functions and operators of NumPy and SciPy; of arrays and other methods the result is not followed."""
+        """Functions and operators of NumPy and SciPy; results of arrays and other methods are not tracked."""
         plain = tuple(map(_plain, inputs))
         result = getattr(ufunc, method)(*plain, **options)
         if method != "__call__" or options:
@@ -69,7 +68,7 @@ def _plain(value: Any) -> Any:
 
 
 def _moved(inputs: Sequence[Any], name: str, place: int) -> list[Any]:
-    """The inputs at a factor of a setting; a number that is not made from it stays as it is."""
+    """The inputs at a factor of a setting; numbers that do not depend on it are unchanged."""
     return [
         one.at[name][place] if isinstance(one, Watched) and name in one.at else _plain(one) for one in inputs
     ]
@@ -88,7 +87,7 @@ def _followed(operate: Callable[..., Any], inputs: Sequence[Any], result: Any) -
 
 
 def _compared(compare: Callable[..., Any], inputs: Sequence[Any], result: Any) -> Any:
-    """The result; how often it would be another is counted."""
+    """The result; changes at other factors are counted."""
     for name in _names(inputs):
         _counts[name][0] += 1
         for place in range(len(FACTORS)):
@@ -116,7 +115,7 @@ _COMPARISONS = (np.less, np.less_equal, np.greater, np.greater_equal)
 
 
 def watched() -> tuple[Settings, Counts]:
-    """The usual settings, every one that is not whole watched, and the counts of their comparisons from now."""
+    """The usual settings with all non-integer ones watched, and the counts of their comparisons from now."""
     _counts.clear()
     usual = Settings()
     numbers = {
@@ -128,12 +127,12 @@ def watched() -> tuple[Settings, Counts]:
 
 
 def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | None = None) -> Iterator[str]:
-    """Rows of Markdown, one of every setting that is not whole.
+    """Rows of Markdown, one for every non-integer setting.
 
     Args:
-        count: of the campaigns of each folder, from the first.
-        known: counts by campaign from before; those of further campaigns are added.
-        kept: the file that keeps them.
+        count: number of campaigns of each folder, from the first.
+        known: earlier counts by campaign; counts of further campaigns are added.
+        kept: the file for the counts.
     """
     campaigns = [path.parent for folder in folders for path in sorted(folder.rglob("campaign.toml"))[:count]]
     total: dict[str, Any] = defaultdict(lambda: np.zeros(5, int))

@@ -24,8 +24,8 @@ class Ratio:
 
     Args:
         value: the ratio.
-        low: end of its 95 % interval, ratio.
-        high: the other end, ratio.
+        low: lower end of its 95 % interval, ratio.
+        high: upper end of its 95 % interval, ratio.
     """
 
     value: float
@@ -55,9 +55,9 @@ class NoiseRow:
 
     Args:
         zeta: true damping ratio.
-        window: of the networks on the first three cycles, over the bound of those three cycles.
-        runs: by method on the whole record, over the bound of the whole record; None where it fails on any.
-        coverage: share of the networks' 95 % intervals that hold the truth, ratio.
+        window: of the networks on the first three cycles, over the bound of these cycles.
+        runs: by method on the whole record, over the bound of the whole record; None where any fit fails.
+        coverage: share of the networks' 95 % intervals that contain the truth, ratio.
     """
 
     zeta: float

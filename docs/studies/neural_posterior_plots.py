@@ -1,4 +1,4 @@
-"""The figure of the study of `neural_posterior`, from the tables that `benchmarks.neural_posterior` writes."""
+"""The figure of the study of `neural_posterior`, from the tables of `benchmarks.neural_posterior`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rows_of(paths: Sequence[Path]) -> list[Row]:
 
 @styled
 def study_figure(rows: Sequence[Row]) -> Figure:
-    """Errors against those of output error, calibration, and the loss against the size of the training."""
+    """Errors against the errors of output error, calibration, and the loss against the size of the training."""
     found = figure(12.0, 4.0)
     errors, calibration, curve = found.subplots(1, 3)
     _errors(errors, [row for row in rows if row.get("kind") == "single"])

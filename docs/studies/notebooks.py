@@ -1,4 +1,4 @@
-"""Run the notebooks and store what they print and draw, so that they can be read where nothing is installed.
+"""Run the notebooks and store their output, for readers without an installation.
 
 ``python -m docs.studies.notebooks`` in the source tree; with names, only those, such as ``ten-minutes``.
 """
@@ -31,7 +31,7 @@ def executed(path: Path) -> Any:
 
 
 def main() -> None:
-    """Store the outputs of the notebooks that are named, or of all."""
+    """Store the outputs of the named notebooks, or of all."""
     nbformat: Any = import_module("nbformat")
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", help="notebooks without .ipynb; default: all")

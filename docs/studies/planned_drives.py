@@ -41,7 +41,7 @@ truth = {{ cn_beta = 0.4719, cn_r = -0.1033 }}
 sensor.sample_rate = 100.0
 """
 _FOUR = {"springs": [3, 5, 6, 8], "speeds": [0, 10, 15, 20]}
-LONG = "four springs, four speeds, three releases"  # without simulations, which would take long
+LONG = "four springs, four speeds, three releases"  # without simulations, to save time
 PLANS = {
     "spring 5, 0 and 15 m/s, five releases": {"springs": [5], "speeds": [0, 15], "repeats": 5},
     "spring 5, 0 and 15 m/s, one release": {"springs": [5], "speeds": [0, 15], "repeats": 1},
@@ -57,9 +57,9 @@ class Case:
     Args:
         drive: kind and number of frequencies of the planned drive.
         bounds: Cnβ and Cnr of the free decays, then of the planned drive, 1/rad.
-        wrong: of a prior guess whose Izz is 2 % too small or too large, the lesser ratio of Cnr's bounds (1) and
-            the larger peak of the response (rad).
-        errors: root-mean-square errors of the estimates in the same order, 1/rad; empty where none were made.
+        wrong: with a prior guess of Izz 2 % too small or too large: the lesser ratio of Cnr's bounds (1) and the
+            larger peak of the response (rad).
+        errors: root-mean-square errors of the estimates, in the order of ``bounds``, 1/rad; empty if not simulated.
     """
 
     plan: str
@@ -136,7 +136,7 @@ def table(cases: Sequence[Case]) -> str:
 
 
 def _both(case: Case, form: str, place: int, over: int | None = None) -> str:
-    """A bound, or the ratio of two, and in brackets what the simulations gave where there are any."""
+    """A bound, or the ratio of two bounds, with any result of the simulations in brackets."""
     shown = [
         f"{values[place] / (1.0 if over is None else values[over]):{form}}"
         for values in (case.bounds, case.errors)

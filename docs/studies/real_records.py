@@ -26,13 +26,13 @@ _KEY_PARAMETERS = 4  # shown of each answer
 
 @dataclass(frozen=True)
 class Expected:
-    """What acts in a record, by its source or an energy balance.
+    """The causes in a record, by its source or an energy balance.
 
     Args:
-        causes: all that must be named; ``unknown`` where no effect of the vocabulary explains the record.
-        also: what may be named beside them.
-        words: what the answer must contain, in verdict or cautions; empty: nothing.
-        why: what is known, in a sentence.
+        causes: all required causes; ``unknown`` where no effect of the vocabulary explains the record.
+        also: further permitted causes.
+        words: required text in verdict or cautions; empty: none.
+        why: the known facts, in a sentence.
     """
 
     causes: frozenset[str]
@@ -76,7 +76,7 @@ EXPECTED: Mapping[str, Expected] = {
 
 
 def judge(expected: Expected, document: Mapping[str, Any]) -> bool:
-    """Whether all expected causes and no others are named, and the expected words are said."""
+    """Whether all expected causes and no others are named, and the required words are present."""
     named = set(document["causes"])
     said = " ".join((document["verdict"], *document["cautions"]))
     return expected.causes <= named <= expected.causes | expected.also and expected.words in said
@@ -92,7 +92,7 @@ def records(folder: Path | None) -> dict[str, Campaign]:
 
 
 def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple[str, str]:
-    """One record's row and part of the page, by the document of its diagnosis or why it was refused."""
+    """One record's row and part of the page, from the document of its diagnosis or the reason for its refusal."""
     expected = EXPECTED[name]
     if isinstance(document, str):
         row = f"| [{name}](#{name}) | {_names(expected.causes)} | refused | | wrong |"
@@ -127,7 +127,7 @@ def _names(causes: Sequence[str] | frozenset[str]) -> str:
 
 
 def page(parts: Sequence[tuple[str, str]]) -> str:
-    """The whole page of the rows and sections of the records."""
+    """The whole page, from the rows and sections of the records."""
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (
         "# Real records\n\nWhat the diagnosis says of measured records, and what their sources or energy balances "

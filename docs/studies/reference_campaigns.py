@@ -1,4 +1,4 @@
-"""Campaigns of the reference simulator, and which method is closer, for the tutorial on the paper's networks."""
+"""Campaigns of the reference simulator, and the closer method, for the tutorial on the paper's networks."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tunnel_sim.vocabulary.plan import Truth
 
 
 def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple[Campaign, Truth]]:
-    """Campaigns of the reference simulator, whose integrator and laws are not those of the virtual rig.
+    """Campaigns of the reference simulator, whose integrator and laws are independent of the virtual rig.
 
     Args:
-        count: number of campaigns, of conditions and truth of their own.
+        count: number of campaigns, each with different conditions and truth.
         softening: with a spring that softens and a damping that grows with the amplitude, as in `SOFTENING`.
     """
     from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
@@ -41,11 +41,11 @@ def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the network is the closer of two, over many campaigns.
+    """Comparison of the network with the conventional method over many campaigns.
 
     Args:
         rms: root mean square of each method's quantity, % of the truth or of the release angle.
-        closer: number of campaigns in which the network's is smaller than the conventional method's.
+        closer: number of campaigns in which the network's error is smaller than the conventional method's.
     """
 
     rms: Mapping[str, float]

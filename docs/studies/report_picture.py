@@ -21,7 +21,7 @@ WIDTH, HEIGHT = 1180, 940  # pixels
 
 
 def plan(readme: str) -> str:
-    """The plan of the README, as its first TOML block has it."""
+    """The plan of the README, its first TOML block."""
     (first, *_) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
     return str(first)
 

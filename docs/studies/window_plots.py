@@ -1,4 +1,4 @@
-"""A figure of a table of windows and what reproduces it. matplotlib is imported inside the function."""
+"""A figure of a table of windows and its explanations. matplotlib is imported inside the function."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TITLE = 17  # characters in a line
 
 @styled
 def window_figure(found: WindowDiagnosis, shown: Sequence[Explanation]) -> Figure:
-    """Both columns of a table of windows, and explanations of it.
+    """Both columns of a table of windows, and their explanations.
 
     Args:
         found: the table (rad/s for ωn) with its scatter.

@@ -1,8 +1,8 @@
-"""Which effects reproduce both columns of a table of windows, as the paper's Table III.
+"""Effects that reproduce both columns of a table of windows, such as the paper's Table III.
 
-Every effect of the vocabulary that has a trend to show in one run is fitted to the table by simulation, then
-pairs of one that moves the frequency with one that moves the damping; they are weighed by BIC. The likelihood
-of a column is Student's: its scatter is estimated from few windows, and normal tails would be overconfident.
+Every effect of the vocabulary with a trend within one run is fitted to the table by simulation, then pairs of an
+effect on the frequency with an effect on the damping; they are weighed by BIC. The likelihood of a column is
+Student's: its scatter is estimated from few windows, and normal tails would be overconfident.
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ _STEP = 0.01  # of the finite differences, in units of the parameters' scales
 _FAR = 1e3  # residual where a trial does not oscillate through the table, in standard deviations
 _SCALES = (0.02, 5e-4)  # of the base ωn (rad/s) and ζ
 _SLOWEST, _LEAST_ZETA, _MOST_ZETA = 0.1, 0.05, 0.2  # bounds of the base: a share of ωn, and ζ
-_ADJUSTMENTS = 3  # of the base, which an effect of great severity moves far
-_MOVES = 3.84  # fall of a column's χ² by chance once in twenty: an effect that does more moves the column
+_ADJUSTMENTS = 3  # of the base, which a severe effect changes considerably
+_MOVES = (
+    3.84  # decrease of a column's χ² exceeded by chance once in twenty: more shows an effect on the column
+)
 #: Odds of 20:1 as a difference of BIC; less is "cannot be distinguished".
 DISTINGUISHED = 2.0 * log(20.0)
 
@@ -40,14 +42,14 @@ class Explanation:
     """One hypothesis fitted to both columns.
 
     Args:
-        effects: with their fitted severities; empty is the linear model.
-        omega_n: base natural frequency, that of the linear model they are added to, rad/s.
+        effects: with their fitted severities; empty for the linear model.
+        omega_n: base natural frequency, before the effects are added, rad/s.
         zeta: base damping ratio.
         columns: as simulated and windowed.
         chi2_zeta: sum of squared residuals of the ζ column over its scatter², dimensionless.
-        chi2_omega: likewise of the ωn column.
+        chi2_omega: sum of squared residuals of the ωn column over its scatter², dimensionless.
         bic: Bayesian information criterion, dimensionless.
-        probability: among the hypotheses weighed, all equally likely before, a fraction.
+        probability: among the weighed hypotheses, with equal priors, a fraction.
     """
 
     effects: tuple[Effect, ...]
@@ -72,13 +74,13 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class WindowDiagnosis:
-    """What a table of windows says.
+    """The diagnosis of a table of windows.
 
     Args:
-        measured: the table; of an entry with two readings their mean.
+        measured: the table, with the mean of an entry's two readings.
         std: scatter of every entry.
         explanations: best first.
-        flat: names of effects that move neither column: the table says nothing of them.
+        flat: names of effects without influence on either column, which the table cannot show.
     """
 
     state: RigState
@@ -89,20 +91,20 @@ class WindowDiagnosis:
 
     @property
     def tied(self) -> tuple[Explanation, ...]:
-        """Those that the table cannot distinguish from the best: odds of less than 20:1."""
+        """Explanations that the table cannot distinguish from the best: odds of less than 20:1."""
         best = self.explanations[0].bic
         return tuple(e for e in self.explanations if e.bic - best < DISTINGUISHED)
 
     def probability_of(self, *names: str) -> float:
-        """Summed weight of the hypotheses that hold at least one of the effects named."""
+        """Total weight of the hypotheses with at least one of the named effects."""
         held = [e for e in self.explanations if {k.name for k in e.kinds} & set(names)]
         return sum(e.probability for e in held)
 
     def explanation(self, *names: str) -> Explanation:
-        """The hypothesis that holds just these effects, in any order; none is the linear model.
+        """The hypothesis with exactly these effects, in any order; none for the linear model.
 
         Raises:
-            TunnelError: when it was not weighed: one of its effects moves neither column.
+            TunnelError: when it was not weighed, because one of its effects changes neither column.
         """
         for e in self.explanations:
             if {kind.name for kind in e.kinds} == set(names):
@@ -113,15 +115,15 @@ class WindowDiagnosis:
         )
 
     def separation(self, one: Explanation, other: Explanation, state: RigState) -> float:
-        """How far a further run's table would set two explanations apart.
+        """Separation of two explanations by the table of a further run.
 
-        Both keep what was fitted here: severities, inertia and mechanical damping.
+        Both keep their fitted severities, inertia and mechanical damping.
 
         Returns:
             Distance of the two predicted tables in standard deviations of this table's scatter, √Σ(Δ/std)².
 
         Raises:
-            TunnelError: when one of them would not oscillate through all windows.
+            TunnelError: when either would not oscillate through all windows.
         """
         count = self.measured.zeta.size
         a, b = (
@@ -139,7 +141,7 @@ def diagnose_windows(
     *,
     kinds: Sequence[type[Effect]] = ALL_EFFECTS,
 ) -> WindowDiagnosis:
-    """Weigh which effects reproduce both columns of a table of windows.
+    """Weigh the effects that reproduce both columns of a table of windows.
 
     Args:
         table: rows in the order of time; None takes the paper's Table III.
@@ -178,7 +180,7 @@ def diagnose_windows(
 
 
 def has_trend(kind: type[Effect]) -> bool:
-    """Whether an effect has a trend to show in one run: it is neither random nor periodic nor a mere step."""
+    """Whether an effect has a trend within one run: it is not random, periodic or a mere step."""
     return kind.fitted and not kind.line and not kind.skips
 
 
@@ -204,14 +206,14 @@ def _effects(kinds: Kinds, x: Array) -> tuple[Effect, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A table to be fitted. Unknowns: severities in units of the effects' scales, then base ωn and ζ."""
+    """A table to fit. Unknowns: severities in units of the effects' scales, then base ωn and ζ."""
 
     state: RigState
     measured: Columns
     std: Columns
 
     def together(self, a: Explanation, b: Explanation) -> tuple[Kinds, Array]:
-        """A pair, and where its fit starts: both severities, and the first one's base."""
+        """A pair, and the start of its fit: both severities, and the base of the first explanation."""
         kinds = (*a.kinds, *b.kinds)
         units = [e.severity / e.parameters()[0].scale for e in (*a.effects, *b.effects)]
         base = self.measured.omega_n.mean(), self.measured.zeta.mean()
@@ -234,7 +236,7 @@ class _Task:
         return _residuals(columns, self.measured, self.std)
 
     def scan(self, kind: type[Effect]) -> Array | None:
-        """Where a fit starts: the severity whose columns fit best once the base is adjusted."""
+        """The start of a fit: the severity whose columns fit best with an adjusted base."""
         info = kind.parameters()[0]
         best, least = None, np.inf
         for unit in (sign * size for size in _SCAN for sign in (1.0, -1.0)):
@@ -247,7 +249,7 @@ class _Task:
         return best
 
     def adjusted(self, kinds: Kinds, x: Array) -> Array | None:
-        """Move the base by what the means of both columns miss: ωn as a ratio, ζ as a difference."""
+        """Correct the base by the errors of both columns' means: ωn as a ratio, ζ as a difference."""
         for _ in range(_ADJUSTMENTS):
             columns = self.columns(kinds, x)
             if columns is None:

@@ -1,8 +1,8 @@
-"""A table of windows, as the paper's Table III, and the simulation of one, for the page on the paper's own gap.
+"""A table of windows, such as the paper's Table III, and its simulation, for the page on the paper's own gap.
 
-Such a table holds damping ratio and natural frequency of one wind-on run, three cycles at a time. The linear
-model leaves both columns constant; `docs.studies.window_rivals` compares what makes them drift. The paper does not
-name the run behind its table: `RigState` is an inference, see `tunnel_lab.paper.networks.infer_springs`.
+The table has damping ratio and natural frequency of one wind-on run, three cycles at a time. In the linear model
+both columns are constant; `docs.studies.window_rivals` compares causes of their drift. The paper does not name the
+run behind its table: `RigState` is an inference, see `tunnel_lab.paper.networks.infer_springs`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 CYCLES = 3
-_POINTS = 100  # of a window, as the paper's first network takes them
+_POINTS = 100  # per window, as for the paper's first network
 _RATE = 250.0  # Hz of the simulated reading
 _TREND = 2  # degree of the smooth trend whose residual is the table's scatter
 
@@ -41,8 +41,8 @@ class RigState:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         derivatives: Cnβ and Cnr, 1/rad.
-        release_angle: rad. It scales severities (a cubic one as its inverse square) and, but for effects
-            with an angle of their own, nothing else.
+        release_angle: rad. It scales severities (a cubic one as its inverse square) and nothing else, except for
+            effects with a characteristic angle.
         air_density: ρ, kg/m³.
     """
 
@@ -67,7 +67,7 @@ class Columns:
 
 
 def rig_state(spring: int = 5, wind_speed: float = 10.0, release_angle: float = radians(20.0)) -> RigState:
-    """The state assumed behind Table III; the defaults are what `infer_springs` leaves, and a guess at 20°.
+    """The state assumed behind Table III; the defaults agree with `infer_springs`, and 20° is a guess.
 
     Args:
         spring: number in Table II.
@@ -86,8 +86,8 @@ def read_table(table: Sequence[WindowRow]) -> tuple[Columns, Columns]:
         table: rows in the order of time.
 
     Returns:
-        Values and standard deviations. The scatter is what a quadratic in the window's number leaves, so it
-        is itself known to √(1/2ν) only, with ν = windows − 3.
+        Values and standard deviations. The scatter is the residual of a quadratic in the window's number, and is
+        itself known only to √(1/2ν), with ν = windows − 3.
 
     Raises:
         TunnelError: when there are fewer than six rows.
@@ -115,7 +115,7 @@ def _scatter(column: Array) -> float:
 
 
 def freedom(windows: int) -> int:
-    """Degrees of freedom behind a column's scatter: windows less the trend's coefficients."""
+    """Degrees of freedom behind a column's scatter: windows minus the trend's coefficients."""
     return windows - _TREND - 1
 
 
@@ -131,11 +131,11 @@ def simulate_windows(
     """Simulate a release and window its reading as the paper did.
 
     Args:
-        effects: effects to add to the linear model; none with a random part, of which one table shows one draw.
+        effects: effects to add to the linear model; none with a random part, because one table is a single draw.
         omega_n: base natural frequency in the state ``base``, rad/s.
         zeta: base damping ratio there.
         count: of consecutive windows of three cycles from the release on.
-        base: the state in which the base ωn and ζ hold; None is ``state`` itself.
+        base: the state of the base ωn and ζ; None: ``state`` itself.
 
     Returns:
         Both columns; None where the motion does not oscillate through all windows.
@@ -165,7 +165,7 @@ def simulate_windows(
     curve, begin = CubicSpline(motion.time_s, reading), 0.0
     decay = _first_guess(motion.time_s, reading, zeta)
     rows: list[Decay] = []
-    for place in range(-1, count):  # the first window twice: its guess may be of another length
+    for place in range(-1, count):  # the first window twice: the length of its guess may be wrong
         decay = None if decay is None else _window(curve, begin, decay)
         if decay is None:
             return None
@@ -204,7 +204,7 @@ def _window(curve: CubicSpline, begin: float, decay: Decay) -> Decay | None:
 
 
 def _first_guess(time: Array, reading: Array, zeta: float) -> Decay | None:
-    """A decay of the mean frequency of the upward crossings, which an offset does not shift."""
+    """A decay of the mean frequency of the upward crossings, which is independent of an offset."""
     upward = np.flatnonzero(np.diff(np.signbit(reading - reading.mean()).astype(int)) < 0)
     if upward.size < CYCLES:
         return None

@@ -1,5 +1,5 @@
-"""The bench: a page in the browser for the whole way from a logger's files to a report.
+"""The bench: pages in the browser for all stages from a logger's files to a report.
 
-Each stage is one module. It calls the functions behind a command, or the command itself in a process of its own,
-and keeps everything in files (`workspace`): a page shows what is on the disk, so that nothing is lost with it.
+Each stage is one module. It calls the functions behind a command, or runs the command in a separate process, and
+keeps everything in files (`workspace`): a page shows the state of the disk, so closing it loses nothing.
 """

@@ -47,8 +47,8 @@ MISSING = {
 """What is missing without these; the others are optional, or required (`faults`)."""
 _OF_JOINT = "0 for a joint without a spring"
 """The stiffness of a driven run in still air."""
-_MOST_ROWS = 20  # of a table without a scroll bar
-_MOST_LINES = 8  # of faults that are listed
+_MOST_ROWS = 20  # in a table without a scroll bar
+_MOST_LINES = 8  # listed faults
 _PASTE = """(event) => {
   const api = getElement(event.currentTarget.id.slice(1)).api;
   const cell = api.getFocusedCell();
@@ -69,7 +69,7 @@ def stated(session: Session) -> Cells:
 
 
 def typed(session: Session) -> Cells:
-    """The conditions as they were typed last, saved in the campaign or not."""
+    """The conditions as last typed, saved in the campaign or not."""
     saved = stated(session)
     if not session.draft.is_file():
         return saved
@@ -81,7 +81,7 @@ def typed(session: Session) -> Cells:
 
 
 def faults(cells: Cells, *, plausible: bool) -> Words:
-    """What is wrong, as a command would print it; with ``plausible`` also values that look like a wrong unit."""
+    """The faults, as a command would print them; with ``plausible`` also values that look like a wrong unit."""
     faults_by_cell = {}
     for row, texts in cells.items():
         where = f"run '{row}'" if row else "the rig"
@@ -106,7 +106,7 @@ def faults(cells: Cells, *, plausible: bool) -> Words:
 
 
 def number(text: str, where: str) -> float | None:
-    """The number that a cell holds, with a decimal point or comma; None where it is empty."""
+    """The number in a cell, with a decimal point or comma; None where it is empty."""
     if not text.strip():
         return None
     try:
@@ -118,7 +118,7 @@ def number(text: str, where: str) -> float | None:
 
 
 def save(session: Session, cells: Cells) -> Words:
-    """Save conditions in the campaign, or as a draft beside it while something is wrong (`faults`).
+    """Save conditions in the campaign, or as a draft beside it while there are `faults`.
 
     Raises:
         TunnelError: when the campaign would not be readable for another reason.
@@ -145,10 +145,10 @@ def save(session: Session, cells: Cells) -> Words:
 
 
 def judge(session: Session, plausible: bool) -> None:
-    """State whether values that look like a wrong unit are refused.
+    """Set whether values that look like a wrong unit are refused.
 
     Raises:
-        TunnelError: when a value that is kept would then be refused.
+        TunnelError: when a saved value would then be refused.
     """
     document = _document(session)
     document["sensor"] = {**document.get("sensor", {}), "plausible": False}
@@ -177,7 +177,7 @@ def driven_runs(session: Session) -> frozenset[str]:
 
 @lru_cache(maxsize=16)
 def _driven(folder: Path, versions: tuple[tuple[int, int], ...]) -> frozenset[str]:
-    """Those of a folder while its run files keep their ``versions``: conditions do not change them."""
+    """The driven runs of a folder while its run files keep their ``versions``: conditions do not change them."""
     del versions
     return frozenset(run.id for run in read_campaign(folder).runs if run.drive is not None)
 
@@ -185,10 +185,10 @@ def _driven(folder: Path, versions: tuple[tuple[int, int], ...]) -> frozenset[st
 def restore(
     session: Session, before: Cells, held: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 ) -> None:
-    """State again what was stated before a campaign was written anew; errors as of `save`.
+    """Restore the conditions stated before a campaign was rewritten; errors as of `save`.
 
     Args:
-        held: what the files state and the campaign takes only beside an air density, by row and key.
+        held: conditions from the files that the campaign takes only with an air density, by row and key.
     """
     kept = {
         row: {
@@ -201,9 +201,9 @@ def restore(
 
 
 def pasted(cells: Cells, columns: list[str], row: str, key: str, text: str) -> Cells:
-    """Cells with a block from a spreadsheet put in, its upper left cell at a place.
+    """Cells with a block from a spreadsheet inserted, its upper left cell at ``row`` and ``key``.
 
-    The block has rows on lines and cells separated by tabs; what lies outside the table is left out.
+    The block has rows on lines and cells separated by tabs; cells outside the table are left out.
     """
     rows = [name for name in cells if name != RIG]
     result = {name: dict(texts) for name, texts in cells.items()}
@@ -301,7 +301,7 @@ class ConditionsPage:
                 "domLayout": "autoHeight" if short else "normal",
                 "tooltipShowDelay": 300,
             },
-            auto_size_columns=False,  # they share the width, whatever it becomes
+            auto_size_columns=False,  # columns share the width, also after resizing
         )
         grid.classes("grid" if short else "grid tall").props('aria-label="Conditions of the runs"')
         grid.on("cellValueChanged", self._edited, ["data", "colId", "newValue"])
@@ -314,7 +314,7 @@ class ConditionsPage:
         self._put({(row, key): "" if value is None else str(value)})
 
     def _put(self, texts: Mapping[tuple[str, str], str]) -> None:
-        """Change cells of what is on the disk, which another tab may have changed meanwhile."""
+        """Change cells on the disk, which another tab may have changed meanwhile."""
         with self._fault.around():
             cells = typed(self._session)
             if cells.keys() != self._cells.keys():
@@ -349,7 +349,7 @@ class ConditionsPage:
             self._check()
 
     def _check(self) -> None:
-        """Save what is right, and mark what is not: in the table, in the fields and in words."""
+        """Save the valid cells, and mark the others: in the table, in the fields and in words."""
         cells = self._cells
         wrong = save(self._session, cells)
         windy = any(cells[run]["wind_speed"].strip() not in ("", "0") for run in self._runs)

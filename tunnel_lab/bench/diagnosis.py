@@ -55,7 +55,7 @@ _NO_SPRING = "no run can be planned without a stated spring"
 
 
 class DiagnosePage:
-    """The page: it follows the log of the command, whoever has started it."""
+    """The page: it follows the log of the command, wherever that was started."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
         self._session, self._frame = session, frame
@@ -156,13 +156,13 @@ class DiagnosePage:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a diagnosis has come, by what it has printed.
+    """The progress of a diagnosis, from its printed lines.
 
     Args:
-        stages: those begun: time (s since its start, as printed) and name of each.
-        tried: the set of effects that is tried, in words; empty where none is.
+        stages: time (s since the start, as printed) and name of each stage that has begun.
+        tried: the set of effects being tried, in words; empty for none.
         reached: the last stage.
-        seconds: of the last line, s since its start.
+        seconds: time of the last line, s since the start.
     """
 
     stages: tuple[tuple[str, str], ...] = ()
@@ -172,7 +172,7 @@ class Progress:
 
 
 def progress_of(lines: Sequence[str]) -> Progress:
-    """How far a diagnosis has come, by the lines that it has printed."""
+    """The progress of a diagnosis, from its printed lines."""
     names = {words: name for name, words in STEPS.items()}
     found = Progress()
     for seconds, stage, effects in (m.groups() for m in map(_PRINTED.fullmatch, lines) if m):
@@ -185,7 +185,7 @@ def progress_of(lines: Sequence[str]) -> Progress:
 
 
 class Answer:
-    """The answer: in words, in figures, and by hand."""
+    """The answer in words and figures, and fits with causes chosen by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from diagnosis.words import remainder, scatter, tables, verdict
@@ -241,11 +241,11 @@ class Answer:
             return
         with self._figures:
             for figure in figures:
-                ui.html(figure, sanitize=False, tag="figure")  # drawn here, its texts escaped
+                ui.html(figure, sanitize=False, tag="figure")  # drawn by this program with escaped texts
 
 
 class ByHandPart:
-    """Switches for the causes, of which those of the diagnosis are on at first, and the closure with them."""
+    """Switches for the causes, initially those of the diagnosis, and the closure with them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from tunnel_sim.effects import known_effects
@@ -271,7 +271,7 @@ class ByHandPart:
         ui.timer(0.0, partial(self._fit_chosen, False), once=True)
 
     async def _fit_chosen(self, converged: bool) -> None:
-        """Fit what is chosen; changes made meanwhile are fitted together afterwards."""
+        """Fit the chosen causes; changes made meanwhile are fitted together afterwards."""
         self._converged = converged
         if self._waiting:
             return
@@ -340,14 +340,14 @@ def build_next_run(session: Session, frame: Frame) -> None:
 
 
 class _Rivals:
-    """Two answers to choose, and the run that would distinguish them."""
+    """Fields for two answers, and the run that would distinguish them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from diagnosis.words.numbers import windy
         from tunnel_sim.effects import known_effects
 
         self._session, self._left_out = session, left_out_of(document)
-        blown = windy(document)  # an effect of the wind cannot be fitted where none blew
+        blown = windy(document)  # an effect of the wind cannot be fitted to runs without wind
         fitted = {
             kind.name: plain(kind.name)
             for kind in known_effects()
@@ -413,7 +413,7 @@ def show_run(run: Mapping[str, float]) -> None:
     )
 
     def download() -> None:
-        """The table that ``campaign.toml`` takes once the record is there."""
+        """The table to add to ``campaign.toml`` once the record exists."""
         stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
         head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
         table = head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
@@ -424,7 +424,7 @@ def show_run(run: Mapping[str, float]) -> None:
 
 
 class ReportPage:
-    """The page: the report is written anew when author or notes change."""
+    """The page: the report is rewritten when author or notes change."""
 
     def __init__(self, session: Session, _: Frame) -> None:
         self._session = session

@@ -1,4 +1,4 @@
-"""The stage Identify: estimators side by side, and the uncertainty budget; each a command in its own process."""
+"""The stage Identify: estimators side by side, and the uncertainty budget, each a command in a separate process."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _MOST_RUNS = 50
 
 
 class IdentifyPage:
-    """The page: it looks at the files until every command has ended."""
+    """The page: it polls the files until every command has ended."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
         self._session, self._frame = session, frame
@@ -150,7 +150,7 @@ class IdentifyPage:
 
 
 async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
-    """Run ``tunnel identify`` several times, each with the name of its log and options, one per processor."""
+    """Run several ``tunnel identify`` commands, one per processor; an order is a name for the log and options."""
     free = asyncio.Semaphore(os.cpu_count() or 1)
 
     async def one(name: str, given: tuple[str, ...]) -> None:
@@ -165,7 +165,7 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
 
 
 def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
-    """Estimates of one campaign: the coefficients, ωn and ζ of the runs, and what the estimators say."""
+    """Estimates of one campaign: the coefficients, ωn and ζ of the runs, and the notes of the estimators."""
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
     rows = tuple(

@@ -1,4 +1,4 @@
-"""The runs that identify and diagnose leave out: one choice, made on either page."""
+"""The runs that identify and diagnose leave out: one choice for both pages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def options(session: Session) -> tuple[str, ...]:
 
 
 def left_out_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Ids of the runs that a diagnosis left out as asked."""
+    """Ids of the runs that a diagnosis left out at the user's request."""
     return tuple((document.get("provenance") or {}).get("left_out", ()))
 
 

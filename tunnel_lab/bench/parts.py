@@ -1,6 +1,6 @@
 """Parts that several pages share: the frame with the stages, errors, tables, links and charts.
 
-What a command says is shown in the words of the page: fields instead of options.
+Messages of commands are shown in the words of the page: fields instead of options.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def page_words(text: str) -> str:
 
 
 def _field(found: re.Match[str]) -> str:
-    """An option as its field, with what is to be typed there; an option without a field as it is."""
+    """An option as its field, with the value to type there; an option without a field is unchanged."""
     if found[1] not in FIELDS:
         return found[0]
     return f"“{FIELDS[found[1]]}” {found[2]}" if found[2] else f"“{FIELDS[found[1]]}”"
@@ -70,13 +70,13 @@ def address(session: Session, stage: str) -> str:
 
 
 class Frame:
-    """The head of a page: where one is, and which stages of the session are open; without one, neither."""
+    """The head of a page: the current stage, and the open stages of the session; without a session, neither."""
 
     def __init__(self, title: str, session: Session | None = None, stage: str = "") -> None:
         self._session, self._stage = session, stage
         ui.add_head_html(_HEAD)
         ui.colors(primary="var(--link)")
-        ui.dark_mode(None)  # as the browser
+        ui.dark_mode(None)  # follows the browser
         ui.page_title(f"{title} · {session.name}" if session else title)
         with ui.element("header").classes("top"):
             ui.link("Skip to the page", "#main").classes("skip")
@@ -93,7 +93,7 @@ class Frame:
             ui.html(title, sanitize=False, tag="span")
 
     def refresh(self, on: ui.element | None = None) -> None:
-        """Show the stages as the files allow them now, and the way on in its place."""
+        """Show the stages that the files now allow, and the links to other stages."""
         assert self._session is not None
         self.steps.clear()
         with self.steps, ui.element("ol"):
@@ -112,7 +112,7 @@ class Frame:
                 self.way_on()
 
     def way_on(self) -> None:
-        """Links to the next stage and to the last, where they are open."""
+        """Links to the next and the final stage, where they are open."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
@@ -131,13 +131,13 @@ class Frame:
 
 
 class Fault:
-    """The line that says what is wrong, next to what caused it; nothing while all is well."""
+    """The line that states an error, next to its cause; empty without an error."""
 
     def __init__(self) -> None:
         self._place = ui.element("div").props("role=alert aria-live=assertive")
 
     def show(self, error: TunnelError | str) -> None:
-        """Show the line that the terminal would print, in the page's words; an empty one is none."""
+        """Show the line that the terminal would print, in the page's words; an empty line clears it."""
         self._place.clear()
         if str(error):
             with self._place:
@@ -145,7 +145,7 @@ class Fault:
 
     @contextmanager
     def around(self) -> Iterator[None]:
-        """Show the error of what is done inside."""
+        """Show an error raised inside the context."""
         self.show("")
         try:
             yield
@@ -180,7 +180,7 @@ def show_facts(facts: Iterable[tuple[str, ...]]) -> None:
 
 
 def show_items(lines: Iterable[str]) -> None:
-    """Items of the list that is open."""
+    """Items of the enclosing list."""
     for line in lines:
         with ui.element("li"):
             ui.label(line)
@@ -192,14 +192,14 @@ def heading(text: str) -> None:
 
 
 def show_command(words: str) -> None:
-    """The command that does the same in a terminal."""
+    """The equivalent command for a terminal."""
     with ui.element("p").classes("command"):
         ui.label("In a terminal:").classes("soft")
         ui.html(tag="code", sanitize=False, content=escape(words))
 
 
 def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui.element:
-    """A button; the main one is the way on."""
+    """A button; the main one continues to the next step."""
     element = ui.element("button").props("type=button").classes("button go" if main else "button")
     with element:
         ui.html(escape(text), sanitize=False, tag="span")
@@ -210,10 +210,10 @@ class Chart(ui.element, component="static/chart.js"):
     """The chart.
 
     Args:
-        title: what it shows, for a screen reader too.
+        title: of the chart, also for a screen reader.
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
-        moved: called with the id of a mark and where it was moved, in the unit of its axis; may be awaitable.
+        moved: called with the id of a mark and its new position, in the unit of its axis; may be awaitable.
     """
 
     def __init__(
@@ -242,7 +242,7 @@ class Chart(ui.element, component="static/chart.js"):
 
         Args:
             marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
-                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the words ``about``.
+                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the text ``about``.
         """
         self._props.update(marks=[dict(mark) for mark in marks])
         self.update()

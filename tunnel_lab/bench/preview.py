@@ -1,4 +1,4 @@
-"""What is read from dropped files, with the choices stated so far, and the fields to state them in."""
+"""Contents of dropped files under the current choices, and the fields for these choices."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST_RECORDS = 24
 READINGS = ("angle", "counts", "voltage", "rate", "acceleration")
 """Kinds of unit that a reading may have."""
 Role = Literal["time", "angle", "condition", "input"]
-_STILL = 0.01  # of a run's readings from the least to the greatest: a range that looks flat
+_STILL = 0.01  # of the range of a run's readings: a smaller range looks flat
 _WRITTEN = {
     "rate": "Sample rate, where there are no times [Hz]",
     "counts_per_turn": "Counts of an encoder per turn",
@@ -51,14 +51,14 @@ _WRITTEN = {
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A run in the chart of its record, times by the file's clock.
+    """A run in the chart of its record; times by the file's clock.
 
     Args:
         start: of the run: the release, s.
-        end: where it has come to rest, or the next run begins, s.
-        rest: the reading at which it rests, in the reading's unit.
-        about: the rest in words: how well it is known, or that it is stated.
-        fault: why the run is left out; empty where it is used.
+        end: where the run has come to rest, or the next run begins, s.
+        rest: the reading at rest, in the reading's unit.
+        about: the source of ``rest`` in words: its uncertainty, or that it is stated.
+        fault: the reason for leaving the run out; empty where it is used.
     """
 
     run: str
@@ -83,19 +83,21 @@ class Drawn:
 
 def files_of(session: Session) -> list[Path]:
     """The dropped files, by name."""
-    return sorted(path for path in session.uploads.glob("[!.]*") if path.is_file())  # not those being written
+    return sorted(
+        path for path in session.uploads.glob("[!.]*") if path.is_file()
+    )  # without files being written
 
 
 def choices_of(session: Session) -> ImportChoices:
-    """What has been stated about the files."""
+    """The choices stated about the files."""
     return read_recipe(session.choices) if session.choices.is_file() else ImportChoices()
 
 
 def state(session: Session, changes: Mapping[str, Any]) -> None:
-    """Keep changed choices, as a recipe beside the campaign; what is None is found from the files.
+    """Save changed choices as a recipe beside the campaign; None stands for detection from the files.
 
     Raises:
-        TunnelError: when a value is not one.
+        TunnelError: when a value is not valid.
     """
     now = choices_of(session).model_dump(exclude_defaults=True) | dict(changes)
     kept = {key: value for key, value in now.items() if value is not None}
@@ -112,10 +114,10 @@ def settings_of(choices: ImportChoices) -> str:
 
 
 def settings_from(text: str | None) -> dict[str, Any]:
-    """The choices that state conditions of all runs, from a text as ``--set`` takes it.
+    """The conditions of all runs as choices, from a text in the format of ``--set``.
 
     Raises:
-        TunnelError: when it is not one.
+        TunnelError: when the text is not in this format.
     """
     from tunnel_sim.files.importing.conditions import parse_setting
 
@@ -154,14 +156,14 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
 
 
 def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
-    """Read the dropped files; air densities that are missing are stated on the next page.
+    """Read the dropped files; missing air densities are stated on the next page.
 
     Returns:
-        What was read, and the faults of the files that cannot be read beside the others.
+        The import, and the faults of the unreadable files.
 
     Raises:
-        TunnelError: for the first fault, as ``tunnel import`` does, where no file can be read, or where a condition
-            is open that only the user can state.
+        TunnelError: for the first fault, as from ``tunnel import``, where no file can be read, or where a missing
+            condition can be stated only by the user.
     """
     from tunnel_sim.files.importing.conditions import Unstated
     from tunnel_sim.files.importing.records import read_records
@@ -193,7 +195,7 @@ def leave_out(session: Session, names: Sequence[str]) -> None:
     """State which files and runs are left out.
 
     Raises:
-        TunnelError: when a name is not one.
+        TunnelError: when a name is not that of a file or run.
     """
     state(session, {"leave_out": tuple(names)})
 
@@ -211,10 +213,10 @@ def _tables(session: Session) -> Iterator[tuple[Path, Sequence[Table]]]:
 
 
 def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[float | None]]]:
-    """The columns of the first table that can be read, as they are in the file.
+    """The columns of the first readable table, unchanged.
 
     Returns:
-        Name, unit where one is stated, row numbers and values of each column with numbers; few enough to draw.
+        Name, unit (if stated), row numbers and values of each numeric column; few enough to draw.
     """
     import numpy as np
 
@@ -230,7 +232,7 @@ def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[floa
 
 
 def column_names(session: Session) -> list[str]:
-    """Names of the columns in the dropped files; empty where one cannot be read."""
+    """Names of the columns in the dropped files; empty where a file cannot be read."""
     found = list(_tables(session))
     if len(found) < len(files_of(session)):
         return []
@@ -241,7 +243,7 @@ def column_names(session: Session) -> list[str]:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the dropped files: what it is or would be, whether it is read as that, and its unit if known."""
+    """A column of the dropped files: its actual or possible meaning, whether it is used, and its unit if known."""
 
     name: str
     unit: str
@@ -251,14 +253,14 @@ class Column:
 
     @property
     def units(self) -> list[str]:
-        """The units that can be stated for it; none where the file alone can."""
+        """The units that the user can state for it; none where only the file can state the unit."""
         from tunnel_sim.files.importing.tables import UNITS
 
         kinds = {"time": ("time",), "angle": READINGS}.get(self.role, ())
         return [unit for kind in kinds for unit in UNITS[kind]]
 
     def stating(self, unit: str | None) -> dict[str, Any]:
-        """The choices that state one of its `units`; a column that is not used is then the one to use."""
+        """The choices that state one of its `units`; an unused column is thereby chosen."""
         key = "time_unit" if self.role == "time" else "unit"
         if self.used or unit is None:
             return {key: unit}
@@ -266,7 +268,7 @@ class Column:
 
 
 def columns_of(session: Session) -> list[Column]:
-    """The columns of all dropped files that can be read, each name once."""
+    """The columns of all readable dropped files, each name once."""
     from tunnel_sim.files.importing.columns import find_pairs
 
     choices = choices_of(session)
@@ -350,7 +352,7 @@ def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]
 
 
 def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
-    """Where a run rests: as stated, at the centre of its oscillation, or at its end; and that in words."""
+    """The reading at rest, and its source in words: as stated, the oscillation's centre, or the run's end."""
     import numpy as np
 
     from identification.examination.free_motion import centre_of
@@ -370,11 +372,11 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
 
 
 def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaitable[None]]) -> None:
-    """A field for the unit of each of the first columns; a changed unit makes choices, which are then stated."""
+    """A field for the unit of each of the first columns; a changed unit calls ``state`` with the choices."""
     with ui.element("div").classes("fields wide"):
         for column in columns[:MOST_COLUMNS]:
             units = column.units
-            if column.unit not in units:  # the unit of the file, which is not one of a time or an angle
+            if column.unit not in units:  # the unit in the file, neither of a time nor of an angle
                 units = [*units, *([column.unit] if column.unit else [])]
 
             async def change(event: events.ValueChangeEventArguments[Any], column: Column = column) -> None:
@@ -400,7 +402,7 @@ def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaita
 def show_choices(
     session: Session, columns: list[str], changed: Callable[[str, Any], Awaitable[None]]
 ) -> None:
-    """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
+    """The fields of the choices; a change calls back with name and new value, None for detection from the files."""
     from tunnel_sim.files.importing.tables import UNITS
     from tunnel_sim.vocabulary.drive import HOLDS
     from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS

@@ -1,4 +1,4 @@
-"""The stage Records: what the dropped files hold, what is stated about them, and the campaign that they become."""
+"""The stage Records: contents of the dropped files, choices about them, and the campaign made of them."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class RecordsPage:
         ui.timer(0.0, self._first, once=True)
 
     async def _draw_runs(self) -> None:
-        """The runs of a campaign that was not made of dropped files, as they are."""
+        """The runs of a campaign that was not made from dropped files."""
         from tunnel_sim.files.campaign_folder import read_campaign
 
         with self._fault.around():
@@ -107,7 +107,7 @@ class RecordsPage:
             ui.navigate.to(address(rename(self._session, name), "records"))
 
     def _show_left_out(self, imported: Imported | None) -> None:
-        """The field for files and runs that are left out, with the runs that were found."""
+        """The field for files and runs to leave out, with the runs that were found."""
         chosen = list(preview.choices_of(self._session).leave_out)
         files = [path.name for path in preview.files_of(self._session)]
         runs = [] if imported is None else [part.id for part in imported.parts]
@@ -127,14 +127,14 @@ class RecordsPage:
             await self._read()
 
     async def _stated(self, changes: dict[str, Any]) -> None:
-        """Keep the unit of a column; the fields of the choices show it too."""
+        """Save the unit of a column; the fields of the choices also show it."""
         with self._fault.around():
             preview.state(self._session, changes)
             self._show_choices()
             await self._read()
 
     async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
-        """Keep a mark where it was moved; it goes back where the files cannot be read like that."""
+        """Save the new position of a mark; it moves back if the files cannot be read with it."""
         with self._fault.around():
             before = preview.choices_of(self._session).stretch_of(mark.file, mark.run)
             preview.move(self._session, mark, {kind: at})
@@ -145,7 +145,7 @@ class RecordsPage:
             self._draw(self._imported)
 
     async def _read(self, *, redraw: bool = True) -> bool:
-        """Read the files with the choices as they are; the charts stay where only a mark was moved.
+        """Read the files with the current choices; the charts are not redrawn where only a mark was moved.
 
         Returns:
             False where the files cannot be read.
@@ -166,7 +166,7 @@ class RecordsPage:
         if imported is None and not redraw:
             return False
         self._imported = imported
-        # A campaign without files that were dropped is written only where the user has left them out.
+        # A campaign without some of the dropped files is written only where the user has left these out.
         if imported is not None and not faults:
             self._write_button.props(remove="disabled")
         else:
@@ -223,7 +223,7 @@ class RecordsPage:
                 drop_zone(more(self._session), kept, Fault())
 
     def _draw(self, imported: Imported) -> None:
-        """Draw the records, or only their marks where they are drawn already."""
+        """Draw the records, or only their marks where the records are already drawn."""
         records = preview.drawn(imported)
         marks = [mark for record in records for mark in record.marks]
         unit = imported.campaign.sensor.unit
@@ -263,7 +263,7 @@ class RecordsPage:
             field.update()
 
     async def _rest_typed(self, mark: preview.Mark, field: ui.number) -> None:
-        """Keep a rest; where the field is emptied, the rest is found again."""
+        """Save a reading at rest; where the field is emptied, it is detected again."""
         await self._moved(mark, "rest", field.value)
 
     def _chart(self, record: preview.Drawn) -> Chart:
@@ -284,9 +284,9 @@ class RecordsPage:
 
 
 def write(session: Session, imported: Imported) -> None:
-    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
+    """Write the campaign, as ``tunnel import`` does; conditions stated earlier are kept.
 
-    Conditions that a campaign takes only beside an air density stay with the draft until it is stated.
+    Conditions that a campaign takes only with an air density stay in the draft until that is stated.
 
     Raises:
         TunnelError: when the folder cannot be written.

@@ -1,4 +1,4 @@
-"""What the bench answers where it cannot do what is asked: a status of HTTP and a page or a line that says why."""
+"""Replies of the bench to requests that it refuses: an HTTP status, and a page or a line with the reason."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _WORDS = {
     HTTPStatus.NOT_FOUND: "There is no such page.",
     HTTPStatus.METHOD_NOT_ALLOWED: "This address does not take such a request.",
 }
-# The theme is the browser's: this page has no script that would choose it.
+# The theme follows the browser: this page has no script to choose it.
 _PAGE = """<!doctype html>
 <html lang="en-GB" style="color-scheme: light dark">
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -43,7 +43,7 @@ _PAGE = """<!doctype html>
 
 
 def add_refusals(app: FastAPI) -> None:
-    """Answer errors by `refusal`, also where NiceGUI has an answer of its own."""
+    """Answer errors by `refusal`, also where NiceGUI has its own reply."""
     for kind in (HTTPException, HTTPStatus.NOT_FOUND.value, TunnelError, OSError):
         app.add_exception_handler(kind, refusal)
 
@@ -55,7 +55,7 @@ def refusal(request: Request, error: Exception) -> Response:
         words, headers = _WORDS.get(status, f"{error.detail}"), error.headers
     elif status == HTTPStatus.INSUFFICIENT_STORAGE:
         words = "The disk is full: nothing was kept. Free some space, and try again."
-    elif isinstance(error, OSError):  # its text may name a file that is nobody's business
+    elif isinstance(error, OSError):  # its text may disclose the name of a file
         words = f"A file cannot be read or written ({(error.strerror or type(error).__name__).lower()})."
     else:
         words = page_words(str(error))
@@ -66,7 +66,7 @@ def refusal(request: Request, error: Exception) -> Response:
 
 
 def status_of(error: BaseException) -> HTTPStatus:
-    """The status of HTTP for an error; that of the files, as they are now, is a conflict."""
+    """The HTTP status for an error; errors of the present files are a conflict."""
     if isinstance(error, HTTPException):
         return HTTPStatus(error.status_code)
     if isinstance(error, UnknownCampaign):
@@ -78,7 +78,7 @@ def status_of(error: BaseException) -> HTTPStatus:
 
 
 def say_odd_messages() -> None:
-    """Say in one line that a page's websocket has sent what is not a message of a page."""
+    """Report in one line that a page's websocket has sent an invalid message."""
     for name in ("engineio.server", "socketio.server"):
         logging.getLogger(name).addFilter(_in_one_line)
     asyncio.get_running_loop().set_exception_handler(_say_odd_message)
@@ -92,7 +92,7 @@ def _in_one_line(record: logging.LogRecord) -> bool:
 
 
 def _say_odd_message(loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
-    """Say an error of a task of the websocket's library in one line; any other is a fault of the bench."""
+    """Report an error in a task of the websocket library in one line; any other is a fault of the bench."""
     task, error = context.get("future"), context.get("exception")
     code = getattr(task.get_coro(), "cr_code", None) if isinstance(task, asyncio.Task) else None
     if (

@@ -1,4 +1,4 @@
-"""The server of the bench, on the loopback interface only: who may use it, and its addresses."""
+"""The server of the bench, on the loopback interface only: its access control and its addresses."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 _OTHERS_MASK = 0o077
 """Permissions that files and folders written by the bench and its commands do not have: any of other users."""
-_CONFLICT = 409  # status of HTTP for what the files do not allow now
+_CONFLICT = 409  # HTTP status of requests that the present files do not allow
 _LENGTH = re.compile(r"[0-9]{1,20}")
 
 
@@ -70,7 +70,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
     app.on_startup(say_odd_messages)
     app.on_shutdown(_end)
-    with suppress(KeyboardInterrupt):  # the usual end
+    with suppress(KeyboardInterrupt):  # Ctrl-C is the usual end
         icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
         ui.run(
             host=HOST,
@@ -88,7 +88,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
 
 
 async def _say_when_open(port: int, words: str) -> None:
-    """Print the address as soon as the port answers, which is after the start of the application."""
+    """Print the address as soon as the port answers, after the start of the application."""
     while True:
         with suppress(OSError):
             _, writer = await asyncio.open_connection(HOST, port)
@@ -99,13 +99,13 @@ async def _say_when_open(port: int, words: str) -> None:
 
 
 async def _end() -> None:
-    """End what was started: the user has ended the bench, it has not crashed."""
+    """End the commands that were started: the user has ended the bench, it has not crashed."""
     work.end_fits()
     await asyncio.to_thread(work.stop_all)
 
 
 class Guard:
-    """Lets only the bench's own pages through: those that show the secret token of this start of the server."""
+    """Admits only requests with the secret token of this start of the server."""
 
     def __init__(self, app: ASGIApp, port: int, token: str) -> None:
         self._app = app
@@ -123,10 +123,10 @@ class Guard:
         status, words = self._refusal(headers, query)
         if status and scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": words[:120]})
-        elif status:  # what is left of the request is not read
+        elif status:  # the rest of the request is not read
             await _answer(send, status, (b"connection", b"close"), body=f"{words}\n".encode())
         elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
-            # The token moves from the address into a cookie, so that it is in no history or bookmark.
+            # The token moves from the address into a cookie, to keep it out of histories and bookmarks.
             rest = urlencode({name: value for name, value in query.items() if name != "token"})
             # The path cannot name another host or end the header.
             path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
@@ -137,7 +137,7 @@ class Guard:
             await self._app(scope, receive, send)
 
     def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> tuple[int, str]:
-        """Status of HTTP and words of a request that is not answered; 0 for any other."""
+        """HTTP status and text of a refused request; 0 for any other."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
             return 421, "This is the bench of another address; use the one that tunnel bench printed."
@@ -163,7 +163,7 @@ async def _answer(send: Send, status: int, *headers: tuple[bytes, bytes], body: 
 
 
 def add_pages(folder: Path) -> None:
-    """Add the pages of a workspace, and the addresses beside them."""
+    """Add the pages of a workspace, and its other addresses."""
     add_refusals(app)
     add_uploads(app, folder)
 
@@ -215,7 +215,7 @@ def add_pages(folder: Path) -> None:
                     ui.label(why).classes("fault")
                     ui.link("Back to the records", address(session, "records")).classes("button")
                 else:
-                    # Only here: the first page need not wait for what the stages load.
+                    # Only here: the first page need not wait for the imports of the stages.
                     module, _, build = opened.builder.partition(".")
                     getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
         except (TunnelError, HTTPException) as error:
@@ -224,7 +224,7 @@ def add_pages(folder: Path) -> None:
 
 
 def build_start(folder: Path) -> None:
-    """The first page: a place to drop files on, and the campaigns."""
+    """The first page: a drop zone for files, and the campaigns."""
     words = "Drop the files of a data logger. Every step writes the files that the commands write."
     ui.label(words).classes("lede")
     drop_zone(NEW, ui.navigate.to, Fault())

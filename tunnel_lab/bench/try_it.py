@@ -1,4 +1,4 @@
-"""Try it: the virtual rig with sliders, and the trace that follows them."""
+"""Try it: the virtual rig with sliders, and its trace."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ RATE = 200.0
 
 
 class Car(ui.element, component="static/car.js"):
-    """The model from above, which swings as the trace does, in real time."""
+    """The model from above, swinging with the trace in real time."""
 
     def show(self, time: list[float], angle: list[float]) -> None:
         """Swing by a trace: times in s, angles in rad."""
@@ -146,7 +146,7 @@ class TryItPage:
 
 @dataclass(frozen=True)
 class RigTrial:
-    """What is chosen.
+    """The settings of the sliders.
 
     Args:
         cn_beta: Cnβ, 1/rad.
@@ -170,7 +170,7 @@ class RigTrial:
 
 
 def chosen_effect(trial: RigTrial) -> Effect | None:
-    """The effect of a trial with the values of its example, except the severity; None where it does nothing."""
+    """The effect of a trial with the values of its example, except the severity; None where it has no influence."""
     if not trial.effect or trial.severity == 0.0:
         return None
     kind = effect_class(trial.effect)
@@ -211,7 +211,7 @@ def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
             raise TunnelError(str(error), where="the rig", remedy=remedy) from error
         records.append(read_motion(motion, sensor, rng, chain))
     nominal, seen = records[0].yaw_rad, records[-1].yaw_rad
-    size = min(nominal.size, seen.size)  # where samples are dropped there are fewer
+    size = min(nominal.size, seen.size)  # an effect may drop samples
     return records[0].time_s[:size], nominal[:size], seen[:size]
 
 
@@ -242,7 +242,7 @@ def effect_words(trial: RigTrial) -> list[str]:
 
 
 def said(trial: RigTrial, time: Array, nominal: Array, seen: Array) -> str:
-    """What the trial shows, in a sentence.
+    """A sentence on the result of the trial.
 
     Args:
         time: s, shape (n,).

@@ -1,4 +1,4 @@
-"""Dropped files: the place to drop them on, the addresses that take them, and how they are kept."""
+"""Dropped files: the drop zone, the upload addresses, and the storage."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ _one_at_a_time = Lock()  # two requests must not take the same new name
 
 
 def more(session: Session) -> str:
-    """Address that takes more files of a session."""
+    """Address for further files of a session."""
     return address(session, "upload")
 
 
 def too_large(size: int) -> str:
-    """Why an upload of a size in bytes is refused."""
+    """The reason for refusing an upload of ``size`` bytes."""
     most = f"{UPLOAD_BYTES / 1e6:.0f} MB of an upload"
     return f"{size / 1e6:.0f} MB are more than the {most}; use tunnel import, or drop fewer files at a time"
 
 
 def drop_zone(url: str, kept: Callable[[str], Awaitable[None] | None], fault: Fault) -> None:
-    """A place to drop files on, or to choose them with; a refusal is shown as a fault.
+    """A zone to drop or choose files; a refusal is shown as a fault.
 
     Args:
-        url: where the files are sent.
-        kept: called with the address of their page when all are kept.
+        url: address for the files.
+        kept: called with the address of their page when all are saved.
     """
     most = UPLOAD_BYTES - 1_000_000  # less the frame of the request
     label = f"Drop files here, or press + to choose (at most {UPLOAD_BYTES / 1e6:.0f} MB)"
@@ -76,7 +76,7 @@ def drop_zone(url: str, kept: Callable[[str], Awaitable[None] | None], fault: Fa
 
 
 def add_uploads(app: FastAPI, folder: Path) -> None:
-    """Add the addresses that take files, for a workspace; each answers with the address of the files' page."""
+    """Add the upload addresses of a workspace; each answers with the address of the files' page."""
 
     @app.post(NEW)
     async def to_new(request: Request) -> Response:
@@ -89,7 +89,7 @@ def add_uploads(app: FastAPI, folder: Path) -> None:
 
 
 async def _take(request: Request, session_for: Callable[[Sequence[str]], Session]) -> Response:
-    """Keep the files of a request in the session for their names."""
+    """Save the files of a request in the session for their names."""
 
     def kept(files: Sequence[UploadFile]) -> Session:
         contents = [(file.filename or "", file.file.read()) for file in files]
@@ -110,13 +110,13 @@ async def _take(request: Request, session_for: Callable[[Sequence[str]], Session
 
 
 def keep(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
-    """Keep files, all or none, under safe names; a file of the same name is replaced.
+    """Save files, all or none, under safe names; a file of the same name is replaced.
 
     Args:
         files: name and content of each.
 
     Raises:
-        TunnelError: when two have one name, or they cannot be written.
+        TunnelError: when two files have the same name, or they cannot be written.
     """
     names = [safe_name(name) for name, _ in files]
     if len(set(names)) < len(names):
@@ -133,4 +133,4 @@ def keep(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
         for partial, _ in staged:
             partial.unlink(missing_ok=True)
         with suppress(OSError):
-            session.uploads.rmdir()  # only where nothing is in it
+            session.uploads.rmdir()  # succeeds only where it is empty

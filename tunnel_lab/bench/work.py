@@ -1,8 +1,8 @@
-"""Work of the bench in processes of their own: commands of ``tunnel``, and fits with causes chosen by hand.
+"""Work of the bench in separate processes: commands of ``tunnel``, and fits with causes chosen by hand.
 
-A command outlives a page and a crash of the server. Its log says everything about it: the command and the process
-in the first line, what the command prints, and its exit status in the last line. The process holds a lock on the
-log, so that any server sees whether it still runs. The process of the fits keeps those made so far.
+A command outlives a page and a crash of the server. Its log has the command and the process in the first line, then
+the output, and the exit status in the last line. The process locks the log, so any server sees whether it still
+runs. The process of the fits caches its results.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ State = tuple[tuple[str, int, int], ...]
 
 @dataclass(frozen=True)
 class Work:
-    """What a log says about a command.
+    """The state of a command, from its log.
 
     Args:
-        command: as one would type it; empty where there is no log.
+        command: as typed in a terminal; empty where there is no log.
         started: date and time, ISO 8601.
         lines: printed so far.
-        printed: when the last of them was, s since the epoch.
-        pauses: how often it was paused.
+        printed: time of the last line, s since the epoch.
+        pauses: number of pauses.
         status: exit status; None while it runs, and where it ended without one.
     """
 
@@ -64,7 +64,7 @@ class Work:
 
     @property
     def error(self) -> str:
-        """The line that says why it ended without a result; empty where it did not."""
+        """The line with the reason for ending without a result; empty otherwise."""
         if not self.command or self.running or self.status == 0:
             return ""
         if self.status is None:
@@ -74,7 +74,7 @@ class Work:
 
 
 def work_of(log: Path) -> Work:
-    """The state of a command by its log, which need not exist."""
+    """The state of a command from its log, which need not exist."""
     try:
         lines = log.read_text("utf-8", "replace").splitlines()
     except OSError:
@@ -84,7 +84,7 @@ def work_of(log: Path) -> Work:
         return Work()
     child = _started.get(log)
     if child is not None:
-        child.poll()  # else a process that has ended stays in the table
+        child.poll()  # otherwise a finished process remains as a zombie
     import fcntl
 
     running, body, printed = False, lines[1:], 0.0
@@ -132,12 +132,12 @@ def start(words: Sequence[str], log: Path) -> None:
 
 
 def pause(log: Path) -> None:
-    """Suspend a command: it keeps everything that it has found, and takes no time of the processor."""
+    """Suspend a command: it keeps its results and uses no processor time."""
     _send(log, "SIGSTOP", _PAUSED)
 
 
 def go_on(log: Path) -> None:
-    """Let a suspended command go on where it was."""
+    """Resume a suspended command."""
     _send(log, "SIGCONT", _GOES_ON)
 
 
@@ -183,7 +183,7 @@ class Runs:
 
 
 async def closure(runs: Runs, effects: Sequence[str], *, converged: bool) -> Closure:
-    """How far the gap closes with effects chosen by hand.
+    """The part of the gap that effects chosen by hand explain.
 
     Args:
         converged: whether the fit frees their forms and goes on until it has converged.
@@ -231,5 +231,5 @@ def _by_hand(runs: Runs) -> ByHand:
 
 
 def _answered(runs: Runs, method: str, *given: object, **named: object) -> Any:
-    """What a method of `ByHand` gives, in the process that keeps the fits."""
+    """The result of a method of `ByHand`, from the process of the fits."""
     return getattr(_by_hand(runs), method)(*given, **named)

@@ -1,4 +1,4 @@
-"""The files of the bench: campaigns in a folder, what belongs to each, and the stages that these files open."""
+"""The files of the bench: campaigns in a folder, the files of each, and the stages that these files open."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Session:
         return (self.campaign / CAMPAIGN_FILE).is_file()
 
     def state(self) -> tuple[tuple[str, int, int], ...]:
-        """What changes when a file of the campaign does: names, times and sizes (bytes)."""
+        """A fingerprint of the campaign's files: names, times and sizes (bytes)."""
         files = sorted(path for path in self.campaign.rglob("*") if path.is_file())
         return tuple((str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in files)
 
@@ -51,17 +51,17 @@ class Session:
 
     @property
     def choices(self) -> Path:
-        """What was stated about the dropped files: a recipe, as ``tunnel import --recipe`` takes it."""
+        """The choices about the dropped files: a recipe, as for ``tunnel import --recipe``."""
         return self._beside("recipe.toml")
 
     @property
     def draft(self) -> Path:
-        """Conditions as typed that cannot be saved in the campaign yet."""
+        """Typed conditions that cannot be saved in the campaign yet."""
         return self._beside("draft.json")
 
     @property
     def uncertainties(self) -> Path:
-        """Uncertainties of the inputs, as ``tunnel identify --uncertainties`` takes them."""
+        """Uncertainties of the inputs, as for ``tunnel identify --uncertainties``."""
         return self._beside("uncertainties.toml")
 
     @property
@@ -89,7 +89,7 @@ class Session:
         return self._beside("report.html")
 
     def log(self, work: str) -> Path:
-        """What a command in a process of its own has printed."""
+        """The output of a command in a separate process."""
         return self._beside(f"{work}.log")
 
     def _beside(self, ending: str) -> Path:
@@ -121,7 +121,7 @@ def open_session(folder: Path, name: str) -> Session:
 
 
 def common_name(file_names: Sequence[str]) -> str:
-    """A name for a campaign of files: that of their folder, or what their names begin with, or the first one."""
+    """A name for a campaign of files: their folder's, or the common beginning of their names, or the first name."""
     paths = [re.split(r"[/\\]", unicodedata.normalize("NFKC", name)) for name in file_names]
     if len(paths) == 1:
         return safe_name(Path(safe_name(paths[0][-1])).stem)
@@ -131,13 +131,13 @@ def common_name(file_names: Sequence[str]) -> str:
     stems = [Path(safe_name(path[-1])).stem for path in paths]
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
     shared = "".join(letters[0] for letters in alike)
-    # A number that is cut in two, or a letter before numbers that differ, is not a name.
+    # Part of a number, or a letter before differing numbers, is not a name.
     whole = re.sub(r"[\W_]*(?:[^\W\d_]?\d*)?$", "", shared) if shared not in stems else shared
     return safe_name(whole) if len(whole) >= _LEAST_NAME else safe_name(stems[0])
 
 
 def new_session(folder: Path, *file_names: str) -> Session:
-    """A session for dropped files, by their `common_name` or one like it that nothing in the workspace has."""
+    """A session for dropped files, named by their `common_name` or a variant not used in the workspace."""
     stem = common_name(file_names)
     taken = {path.name.split(".")[0].lower() for path in _entries(folder)}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
@@ -145,10 +145,10 @@ def new_session(folder: Path, *file_names: str) -> Session:
 
 
 def rename(session: Session, name: str) -> Session:
-    """Give a session whose campaign has not been written another name.
+    """Rename a session whose campaign has not been written.
 
     Raises:
-        TunnelError: when it is not a name, is taken, or the campaign has been written.
+        TunnelError: when the name is not valid, is taken, or the campaign has been written.
     """
     where = f"the name '{one_line(name, 60)}'"
     if session.imported:
@@ -194,7 +194,7 @@ def safe_name(text: str) -> str:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage: its key in addresses, the title of its page, and what builds the page, in a module of this room."""
+    """A stage: its key in addresses, the title of its page, and the builder of the page in this package."""
 
     key: str
     title: str
@@ -212,7 +212,7 @@ STAGES = (
 
 
 def closed(session: Session, key: str) -> str:
-    """Why a stage cannot be opened: what to do first, in one line; empty where the stage is open."""
+    """The step to do before a stage can be opened, in one line; empty where the stage is open."""
     place = [stage.key for stage in STAGES].index(key)
     if place > 0 and not session.imported:
         return "Write the campaign on the page Records first."
@@ -228,7 +228,7 @@ def closed(session: Session, key: str) -> str:
 
 
 def is_current(session: Session, result: Path) -> bool:
-    """Whether a result is of the campaign as it is now."""
+    """Whether a result belongs to the present state of the campaign."""
     document = read_result(result)
     if document is None:
         return False

@@ -1,4 +1,4 @@
-"""The commands of ``tunnel``, kindred ones in one file; the docstring of a command's function is its help text.
+"""The commands of ``tunnel``, related ones in one file; the docstring of a command's function is its help text.
 
-What a command needs it imports inside the function, so that the command line starts at once.
+Commands import inside their functions, for a fast start of the command line.
 """

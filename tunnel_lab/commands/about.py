@@ -1,4 +1,4 @@
-"""``tunnel docs``, ``doctor`` and ``schema``: the documentation, what is installed, and what the files hold."""
+"""``tunnel docs``, ``doctor`` and ``schema``: the documentation, the installation, and the formats of files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, inst
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-LARGEST_ERROR = 5.0  # standard deviations by which the self-check may miss the truth
+LARGEST_ERROR = 5.0  # largest error of the self-check, standard deviations
 _COMPILER_S = 5.0
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -140,7 +140,7 @@ def compiler() -> str:
 
 
 def extras() -> Iterator[tuple[str, str]]:
-    """The extras and what each lacks."""
+    """The extras, and the missing packages of each."""
     from importlib.util import find_spec
 
     for extra, modules in EXTRAS.items():
@@ -153,7 +153,7 @@ def self_check() -> Iterator[tuple[str, str, bool]]:
     """Simulate and identify a small campaign.
 
     Yields:
-        What was checked, the result in words, and whether it is as it should be.
+        The check, its result in words, and whether it passed.
     """
     begun = time.perf_counter()
     try:
@@ -243,7 +243,7 @@ def schema_of(name: str) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Without titles, and with the first line of a description where it is a docstring."""
+    """A schema without titles; a description from a docstring is reduced to its first line."""
     if isinstance(value, dict):
         kept = {
             key: _plain(part) for key, part in value.items() if not (key == "title" and isinstance(part, str))

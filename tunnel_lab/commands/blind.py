@@ -36,7 +36,7 @@ to a separate key, whose salted SHA-256 is published with the data.
 
 
 class ScatterLevel(StrEnum):
-    """How wide the scatter between runs is."""
+    """Width of the scatter between runs."""
 
     MIXED = "mixed"
     SMALL = "small"

@@ -1,4 +1,4 @@
-"""``tunnel demo``: two faults planted in the virtual rig, and found again; or the estimators beside the truth."""
+"""``tunnel demo``: two faults injected into the virtual rig and diagnosed; or estimates compared with the truth."""
 
 from __future__ import annotations
 
@@ -94,10 +94,10 @@ def demo(
 
 
 def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
-    """Simulate a plan with effects, identify and diagnose the records, write all of it and print two screens.
+    """Simulate a plan with effects, identify and diagnose the records, write all results and print two screens.
 
     Returns:
-        Clauses on what the diagnosis missed; empty where it found what was planted.
+        Clauses on faults that the diagnosis missed; empty where it found all.
     """
     import diagnosis
     from identification import identify
@@ -108,9 +108,9 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json, write_whole
 
-    files = Session(folder, CAMPAIGN)  # named as on the bench, which opens them as they are
+    files = Session(folder, CAMPAIGN)  # named as on the bench, which can open them
     text = (resources.files("tunnel_lab") / "data" / PLAN).read_text(encoding="utf-8")
-    text = re.sub(r"(?m)^seed = \d+", f"seed = {plan.seed}", text, count=1)  # comments stay as they are
+    text = re.sub(r"(?m)^seed = \d+", f"seed = {plan.seed}", text, count=1)  # keeps the comments
     with bar("simulating runs", len(plan.conditions)) as progress:
         campaign = simulate_campaign(plan, progress=progress)
     write_campaign(campaign, files.campaign, truth=truth_document(plan), overwrite=True)
@@ -132,7 +132,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
 
 
 def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> None:
-    """Print what was planted, what was found, and how far the gap closes."""
+    """Print the injected faults, the findings, and the explained part of the gap."""
     from diagnosis.words.tables import waterfall_table
     from tunnel_sim.effects.registry import effect_class
 
@@ -154,7 +154,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
 
 
 def found_table(plan: CampaignPlan, document: Document) -> Table:
-    """What was planted, beside what the nominal model alone and the model with the causes give."""
+    """The injected values, beside the results of the nominal model and of the model with the causes."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
     from tunnel_sim.effects.registry import effect_class
@@ -185,7 +185,7 @@ def found_table(plan: CampaignPlan, document: Document) -> Table:
 def planted_and_found(
     plan: CampaignPlan, document: Document
 ) -> dict[tuple[str, str], tuple[float, Document | None]]:
-    """Planted parameters by effect and name, each with that of the answer; None where it is not in the answer."""
+    """Injected parameters by effect and name, each with the answer's; None where the answer lacks it."""
     answer = document["candidates"][0]
     given = {
         tuple(name.split(".")) if "." in name else (answer["effect"], name): found
@@ -199,9 +199,9 @@ def planted_and_found(
 
 
 def missed_faults(plan: CampaignPlan, document: Document) -> list[str]:
-    """Clauses on what a diagnosis missed: other causes, or a size or coefficient too far from the truth.
+    """Clauses on errors of a diagnosis: other causes, or a size or coefficient too far from the truth.
 
-    What is chosen among stated values, such as the spring, has no standard deviation and must be the planted one.
+    A choice among stated values, such as the spring, has no standard deviation and must equal the injected value.
     """
     planted = sorted(effect.name for effect in plan.effects)
     if sorted(document["causes"]) != planted:
@@ -228,7 +228,7 @@ def _listed(values: Iterable[float]) -> str:
 
 
 def show_next(folder: Path) -> None:
-    """Name the commands to go on with, as they can be typed here."""
+    """Print the next commands, as typed in this folder."""
     typed = sys.argv[0] if Path(sys.argv[0]).stem == "tunnel" else ""
     name = "tunnel" if not typed or shutil.which("tunnel") else shlex.quote(typed)
     steps = (
@@ -246,7 +246,7 @@ def compare_estimators(plan: CampaignPlan, folder: Path) -> list[str]:
     """Simulate the paper's campaign, compare estimates with the truth, and draw both.
 
     Returns:
-        Clauses on the checks that fail.
+        Clauses on failed checks.
     """
     from tunnel_lab.plotting import runs
     from tunnel_lab.plotting.style import save_both
@@ -265,9 +265,9 @@ def compare_estimators(plan: CampaignPlan, folder: Path) -> list[str]:
 
 
 def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
-    """Clauses on the checks that fail: estimates that are missing, or too far from the truth for their std.
+    """Clauses on failed checks: estimates missing, or too far from the truth for their standard deviation.
 
-    The distance is checked for the maximum-likelihood estimator only, whose standard deviations should be exact.
+    The distance is checked only for the maximum-likelihood estimator, whose standard deviations should be exact.
     """
     lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
     for estimate in estimates:
@@ -283,7 +283,7 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
 
 
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
-    """Simulate, identify by the paper's two methods and the default one, and write all of it into the folder."""
+    """Simulate, identify by the paper's two methods and the default method, and write all results to the folder."""
     from identification import identify
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign

@@ -1,4 +1,4 @@
-"""``tunnel diagnose`` and ``compare``: where the nominal model does not fit, and which effect explains it."""
+"""``tunnel diagnose`` and ``compare``: the misfit of the nominal model, and the effects that explain it."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def diagnose(
 
 
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
-    """Write the formula proposed as an effects file; None where no formula is proposed."""
+    """Write the proposed formula as an effects file; None without a proposal."""
     import tomli_w
 
     from tunnel_sim.files.writing import write_whole
@@ -235,7 +235,7 @@ def diagnose_with_progress(
     model: JointModel | None = None,
     leave_out: Sequence[str] = (),
 ) -> Diagnosis:
-    """Diagnose, with step and effect on standard error where that is a terminal."""
+    """Diagnose, showing step and effect on standard error if that is a terminal."""
     import diagnosis
 
     with step_display() as show_step:
@@ -243,7 +243,7 @@ def diagnose_with_progress(
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
-    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when it has none."""
+    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when there is none."""
     from diagnosis.words.cautions import UNPATCHED
 
     if answer.model is None:
@@ -306,7 +306,7 @@ def compare(
     if len(documents) < 2:
         raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
     diagnoses = [read_diagnosis(path) for path in documents]
-    # The campaign's name; the file's where campaigns share a name; else a number too.
+    # The campaign's name; the file's where campaigns share a name; if also shared, with a number.
     names, stems = [str(d["campaign"]) for d in diagnoses], [one_line(path.stem) for path in documents]
     if len(set(names)) < len(names):
         names = stems
@@ -326,7 +326,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     from diagnosis.words.scatter import spread_estimate
 
     def excess(document: Document, key: str) -> str:
-        """With its standard deviation by chance, where the document has the noise of its runs."""
+        """An excess with its standard deviation by chance, where the document has the noise of its runs."""
         value, std = document["gap"][key], excess_std(document)
         return f"{value:.4g}" if std is None else with_std(value, std)
 
@@ -362,7 +362,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
             cells = (_NONE if given is None else estimated(given) for given in found)
             coefficients.append((f"{label} {key}", *cells))
     first, *others = (document["coefficients"]["after"] for document in documents)
-    differences = []  # taken as independent of each other
+    differences = []  # assumed independent
     for name, label in labels.items():
         row, mine = [label], first.get(name)
         for theirs in (other.get(name) for other in others):

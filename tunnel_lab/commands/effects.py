@@ -167,7 +167,7 @@ def run(
 
 
 def summary(kind: type[Effect]) -> str:
-    """What an effect is, in one sentence: the first line of its docstring."""
+    """An effect in one sentence: the first line of its docstring."""
     return inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
 
 
@@ -196,7 +196,7 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
     """Effects with equation and parameters, one row each."""
     last = "equation, then parameters [unit]"
     result = table("Effects beyond the nominal model", "effect", "channel", "condition", last)
-    for column in result.columns[:3]:  # names are to be copied, so never folded
+    for column in result.columns[:3]:  # never folded, for copying names
         column.no_wrap = True
     for kind in kinds:
         parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]

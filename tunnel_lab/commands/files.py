@@ -1,4 +1,4 @@
-"""``tunnel import`` and ``export``: a campaign from files as instruments write them, and as one file for others."""
+"""``tunnel import`` and ``export``: a campaign from files of instruments, and as one file for other programs."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def import_files(
 
 
 class ExportFormat(StrEnum):
-    """What the file is."""
+    """Format of the file."""
 
     MAT = "mat"
     CSV = "csv"

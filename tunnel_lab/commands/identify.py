@@ -194,7 +194,7 @@ def run(
 
 
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
-    """Identify turning points by their own likelihood: ωn and ζ, in JSON as of a run."""
+    """Identify turning points by their own likelihood: ωn and ζ, with the JSON of a run."""
     from identification.estimate import Estimate, Quantity, RunEstimate
     from identification.printing import TextTable, with_std
     from identification.signal.turning_points import fit_turning_points

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 PACKAGED = "packaged"
 """Name of the installed baseline."""
-_RESULTS = ("trials.", "score", "breakdown")  # how the names of the files in --out begin
+_RESULTS = ("trials.", "score", "breakdown")  # beginnings of the file names in --out
 
 
 def score(
@@ -108,7 +108,7 @@ def score(
     from tunnel_sim.files.writing import write_whole
 
     names = chosen_estimators(estimators) or ALL_ESTIMATORS
-    if breakdown:  # it has its own conditions
+    if breakdown:  # with its own conditions
         for name, value in {"GRID": grid, "--check": check, "--write-baseline": write_baseline}.items():
             if value is not None:
                 raise TunnelError(
@@ -173,7 +173,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
 
 
 def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
-    """Refuse a folder that holds anything but an interrupted score, unless ``overwrite``."""
+    """Refuse a folder with anything other than an interrupted score, unless ``overwrite``."""
     from tunnel_sim.files.writing import clear_leftovers
 
     if out is None or not out.exists():
@@ -182,7 +182,7 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
     if not out.is_dir():
         raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
     names = {path.name for path in out.iterdir()}
-    # The parts are removed when all results are written: a full disk may have stopped it in between.
+    # The parts are removed after all results are written: a full disk may have interrupted the writing.
     interrupted = "parts" in names and all(name.startswith(_RESULTS) for name in names - {"parts"})
     if names and not interrupted and not overwrite:
         raise TunnelError("exists already", where=str(out), remedy="name another --out or add --overwrite")

@@ -111,7 +111,7 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
     """Figures of a diagnosis by the name of their file.
 
     Raises:
-        TunnelError: for a figure or a run that it does not have, or a diagnosis without curves.
+        TunnelError: for an unknown figure or run, or a diagnosis without curves.
     """
     from tunnel_lab.report import draw
     from tunnel_lab.report.diagnosis_file import read_document
@@ -226,7 +226,7 @@ def render(
 
     targets = out or list(_DEFAULT)
     for path in targets:
-        where = f"--out {path}"  # what cannot be written is refused before the work is done
+        where = f"--out {path}"  # unwritable files are refused before the work is done
         if path.suffix.lower() not in (".mp4", ".png"):
             raise TunnelError(
                 "is neither .mp4 nor .png", where=where, remedy="name a file that ends in one of these"

@@ -1,4 +1,4 @@
-"""``tunnel simulate`` and ``tunnel plan``: a campaign from a plan, and the plan of the drive that tells most."""
+"""``tunnel simulate`` and ``tunnel plan``: a campaign from a plan, and a plan with the most informative drive."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _COEFFICIENTS = ("cn_beta", "cn_r")
 
 
 class RunFormat(StrEnum):
-    """How the runs are written."""
+    """Format of the runs."""
 
     PARQUET = "parquet"
     CSV = "csv"
 
 
 class Goal(StrEnum):
-    """What the input is to make small."""
+    """The uncertainty that the input is to minimise."""
 
     D = "d"
     CN_R = "cn_r"
@@ -126,7 +126,7 @@ def simulate(
     if seed is not None:
         loaded = replace(loaded, seed=seed)
     loaded = replace(loaded, effects=loaded.effects + added)
-    plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
+    plan_effects(loaded)  # refuses invalid effects before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
     if picture is not None:
         refuse_unwritable_files(picture)
@@ -148,7 +148,7 @@ def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
     """Refuse a file, or a folder that may not be replaced, before the work is done."""
     from tunnel_sim.files.writing import clear_leftovers
 
-    clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside
+    clear_leftovers(folder.resolve().parent)  # restore files that a killed command had set aside
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:
@@ -231,7 +231,7 @@ def plan_drive(
         raise TunnelError("is the plan itself", where=f"--out {out}", remedy="name another file")
     refuse_unwritable_files(out)
     document, rig, where = read_plan(plan), load_rig(), shown(plan)
-    if buffeting is not None:  # of the bandwidth that the plan states
+    if buffeting is not None:  # with the bandwidth stated in the plan
         kind = the_effect(random="broad_band", condition="wind_on")
         stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
         kept = [effect for effect in document.effects if effect.name != kind.name]
@@ -242,7 +242,7 @@ def plan_drive(
     if document.drive is not None:
         raise TunnelError("has a [drive] already", where=where, remedy="give a plan of free decays alone")
     loaded = plan_from(document, rig, where)
-    plan_effects(loaded)  # refuses what cannot be simulated
+    plan_effects(loaded)  # refuses invalid effects
     spent = rig_time(document)
     changes, setup = _changes(document), Costs().setup
     cells = len(document.wind_speeds) * (len(document.springs) + len(document.spring_stiffness))
@@ -302,7 +302,7 @@ def _changes(document: PlanDocument) -> float:
 
 
 def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> Table:
-    """The bounds of both plans, and their ratio with the first repeated ``longer`` times, to equal rig time."""
+    """The bounds of both plans, and their ratio with the first repeated ``longer`` times, for equal rig time."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, significant, unit
 

@@ -54,8 +54,8 @@ PartsT = TypeVar("PartsT", Costs, Scatter)
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
     """Choose the runs of a campaign; the reward is the information gained minus the cost.
 
-    Arguments that are None take the preset's value (`tunnel_lab.envs.menu`); docs/reference/envs/campaign.md has a
-    table of all.
+    Arguments that are None take the preset's value (`tunnel_lab.envs.menu`); docs/reference/envs/campaign.md lists
+    all.
 
     Args:
         preset: ``identification`` or ``diagnosis``.
@@ -63,15 +63,15 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             noise; ``full``: runs in MuJoCo, estimated by a fit. None: ``full`` for a diagnosis, else ``linear``.
         noise_std: of the sensor, rad.
         sample_rate: of the sensor, Hz.
-        severities: the effects that the diagnosis considers, each with the range its severity is drawn from, in
-            its unit; the diagnosis preset only.
+        severities: the effects that the diagnosis considers, each with the range of its severity in its unit; the
+            diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
         costs: rig time of a run, `Costs` or some of its times by name, s; None: those of `Costs`.
         seconds_per_nat: rig time that a nat is worth, s.
         rig: path of a rig description; None takes the packaged rig.
-        scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: none.
-        **unknown: refused.
+        scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: no differences.
+        **unknown: other names, which are refused.
 
     Raises:
         EnvError: when an argument is out of range or a name is unknown.
@@ -175,8 +175,8 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
 
         Args:
             seed: of the truth and all noise; None continues with the present generator.
-            options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) in place of
-                what is drawn.
+            options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) instead of drawn
+                values.
 
         Raises:
             TunnelError: for an unknown option, coefficient or effect, or a number out of range.
@@ -225,7 +225,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return self.known.observation(), float(reward), done, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Print the last run and the estimate, or return `picture`, as the ``render_mode`` says."""
+        """Print the last run and the estimate, or return `picture`, according to ``render_mode``."""
         if self.render_mode == "human":
             print(line_of(self.known), flush=True)
         elif self.render_mode == "rgb_array":
@@ -255,7 +255,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
 
 
 def _by_name(given: object, kind: type[PartsT], name: str) -> PartsT:
-    """An object of a class of numbers: as given, or from some of its numbers by name; None: its defaults."""
+    """A dataclass of numbers: as given, or from some of its numbers by name; None: its defaults."""
     if isinstance(given, kind):
         return given
     known = [one.name for one in dataclasses.fields(kind)]
@@ -287,8 +287,8 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
     """Whether a campaign has reached its goal.
 
     Args:
-        targets: relative standard deviations of Cnβ and Cnr (fractions), where there is no vocabulary.
-        probability: of one effect alone (a probability), where there is a vocabulary.
+        targets: relative standard deviations of Cnβ and Cnr (fractions), used without a vocabulary.
+        probability: of one effect alone (a probability), used with a vocabulary.
     """
     if not known.choices:
         return False
@@ -316,11 +316,11 @@ def line_of(known: Knowledge) -> str:
 
 
 def picture(known: Knowledge, targets: tuple[float, float], probability: float) -> NDArray[np.uint8]:
-    """The last record beside the standard deviations, or the probabilities, so far; RGB, shape (480, 960, 3).
+    """The last record, and the standard deviations or probabilities so far; RGB, shape (480, 960, 3).
 
     Args:
         targets: relative standard deviations of Cnβ and Cnr, fractions.
-        probability: that ends a diagnosis (a probability).
+        probability: threshold that ends a diagnosis (a probability).
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -329,7 +329,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     from tunnel_lab.plotting.style import COLOURS
 
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
-    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
+    canvas: Any = FigureCanvasAgg(figure)  # only partly typed by matplotlib
     angles, right = figure.subplots(1, 2)
     angles.set(xlabel="time [s]", ylabel="angle β [rad]")
     if known.last is None or not known.runs:

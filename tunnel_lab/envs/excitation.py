@@ -1,7 +1,7 @@
 """A policy for the operator preset of ``FreeDecay-v0``: it keeps the body swinging.
 
-A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment
-has the sign of the rate, as long as the swing is smaller than wanted.
+A planned drive is tuned to the expected resonance. Feedback finds the actual one: the moment has the sign of the
+rate while the swing is smaller than desired.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from tunnel_sim.envs.information import propagator
 from tunnel_sim.vocabulary.arguments import Number
 
 _FOLLOWS = 0.5  # gain of the observer in a sixth of a cycle
-_BAND = 0.05  # of the amplitude, within which the moment is reduced
+_BAND = 0.05  # share of the amplitude within which the moment is reduced
 
 
 class Resonant:
-    """Push with the rate below an amplitude, and against it above.
+    """Push in the direction of the rate below an amplitude, and against it above.
 
-    Angle and rate are followed by an observer: an undamped oscillator, moved by the applied moment and corrected by
-    every reading. The moment is that of the period to come, for which they are predicted.
+    An observer estimates angle and rate: an undamped oscillator, driven by the applied moment and corrected by
+    every reading. The moment follows from their prediction for the coming period.
 
     Args:
         config: of the environment.
-        stiffness: of spring and air together, N m/rad; a few per cent off do not matter.
-        inertia: Izz, kg m², in the same way.
+        stiffness: of spring and air together, N m/rad; an error of a few per cent is harmless.
+        inertia: Izz, kg m²; an error of a few per cent is harmless.
         wind_speed: set-point, m/s.
         amplitude: of the swing, rad.
 
@@ -60,12 +60,12 @@ class Resonant:
         share = 1.0 - (1.0 - _FOLLOWS) ** (self.omega * interval)  # a radian is a sixth of a cycle
         self._gain = share * np.array([1.0, self.omega])
         self.state: np.ndarray[Any, Any] | None = None
-        self._centre = 0.0  # to which the moment of the last period shifts the oscillation, rad
+        self._centre = 0.0  # centre of the oscillation under the moment of the last period, rad
 
     def __call__(self, observation: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         """The action for the period after an observation, shape (2,)."""
         readings = observation[:-2]
-        if self.state is None:  # held at its angle
+        if self.state is None:  # the body is fixed at its angle
             self.state = np.array([float(np.mean(readings)), 0.0])
         else:
             shift = np.array([self._centre, 0.0])

@@ -81,10 +81,10 @@ class Menu:
         return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
 
     def choice(self, action: Iterable[int]) -> Choice:
-        """The run that an action stands for: indices of spring, speed, angle and duration.
+        """The run of an action: indices of spring, speed, angle and duration.
 
         Raises:
-            TunnelError: when it is not four indices within the menu.
+            TunnelError: when the action is not four indices within the menu.
         """
         remedy = f"give four whole numbers from 0 to below {', '.join(map(str, self.shape))}"
         numbers = np.asarray(action)
@@ -114,7 +114,7 @@ def make_menu(
     """Check and convert the arguments of an environment: springs by number, m/s, degrees and s.
 
     Raises:
-        TunnelError: when a list is empty, repeats itself, or holds a value that the rig does not allow.
+        TunnelError: when a list is empty, repeats a value, or has a value that the rig does not allow.
     """
     numbers = [int(number) for number in checked_numbers(springs, "springs", WHERE, COUNT)]
     for number in numbers:
@@ -147,7 +147,7 @@ class Costs:
     speed_change: float = 60.0
 
     def __post_init__(self) -> None:
-        """Refuse what is not a time."""
+        """Refuse values that are not times."""
         for name, value in vars(self).items():
             Number(unit="s").checked(value, f"costs: {name}", WHERE)
 
@@ -184,7 +184,7 @@ PRESETS = {name: Preset(**table) for name, table in tomllib.loads(_FILE.read_tex
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:
-    """The preset's sensor with the values that are not None; its reading is not quantised.
+    """The preset's sensor with the given values, without quantisation; None takes the preset's value.
 
     Args:
         noise_std: rad.

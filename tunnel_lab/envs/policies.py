@@ -1,7 +1,7 @@
 """Policies for ``Campaign-v0``: a rig engineer's plan, and optimal design.
 
-A policy is called with `Knowledge`, which holds the results of the runs but not the truth, and
-returns an action. No policy draws random numbers.
+A policy is a function from `Knowledge`, which has the results of the runs but not the truth, to an action. Policies
+do not draw random numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FEATURES = 20
 LAYERS = 3
 PACKAGED = "campaign-agent.safetensors"
 _PAIRS = np.triu_indices(4, 1)
-_SMALLEST = 1e-12  # of a standard deviation, so that its logarithm is finite
+_SMALLEST = 1e-12  # least standard deviation: keeps its logarithm finite
 
 
 def scripted(known: Knowledge) -> Action:
@@ -53,15 +53,15 @@ def scripted(known: Knowledge) -> Action:
 def greedy(known: Knowledge) -> Action:
     """The run with the largest expected information on (Cnβ, Cnr) per rig time.
 
-    Over the whole menu, the expected information gain (exact Fisher information at the present estimate; Izz, Cr,
-    the sensor's zero and every release unknown) over the run's cost. Runs that might diverge are left out; where
-    every run might, it is the scripted run.
+    It maximises, over the whole menu, the expected information gain (exact Fisher information at the present
+    estimate; Izz, Cr, the sensor's zero and every release unknown) divided by the run's cost. Runs that might
+    diverge are left out; where all might, it is the scripted run.
     """
     return _best(known, lambda choice: expected_gain(known, choice))
 
 
 def _best(known: Knowledge, gain: Callable[[Choice], float]) -> Action:
-    """The action with the largest gain per rig time; the scripted one where none has any."""
+    """The action with the largest gain per rig time; the scripted one where no action has a gain."""
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
         choice = known.conditions.menu.choice(action)
@@ -72,7 +72,7 @@ def _best(known: Knowledge, gain: Callable[[Choice], float]) -> Action:
 
 
 def expected_gain(known: Knowledge, choice: Choice) -> float:
-    """Information that a run is expected to add about (Cnβ, Cnr), nats; 0 where the run might diverge."""
+    """Expected information of a run on (Cnβ, Cnr), nats; 0 where the run might diverge."""
     conditions = known.conditions
     after = expected_belief(
         known.belief,
@@ -85,12 +85,12 @@ def expected_gain(known: Knowledge, choice: Choice) -> float:
 
 
 def separating(known: Knowledge) -> Action:
-    """The run that is expected to distinguish the two most probable answers best, per rig time.
+    """The run that best distinguishes the two most probable answers per rig time.
 
-    Over the whole menu, half the squared separation of the two fitted models (the expected log-likelihood ratio,
-    nats; see `diagnosis.answer.next_run.separation`) over the run's cost. If only one effect is named, its rival
-    is the nominal model. It is the scripted run while no gap is detected or no run had wind, because the fitted
-    models cannot then predict other runs.
+    It maximises, over the whole menu, half the squared separation of the two fitted models (the expected
+    log-likelihood ratio, nats; see `diagnosis.answer.next_run.separation`) divided by the run's cost. If only one
+    effect is named, its rival is the nominal model. Without a detected gap, or without a run with wind, the fitted
+    models cannot predict other runs, and it is the scripted run.
     """
     rivals = None if known.study is None else best_rivals(known.study)
     if rivals is None or not rivals[0].problem.data.wind_on:
@@ -112,9 +112,9 @@ def separating(known: Knowledge) -> Action:
 
 
 def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
-    """The fits of the two most probable answers; the second is the nominal one where only one effect is fitted.
+    """The fits of the two most probable answers; the second is nominal where only one effect is fitted.
 
-    It is None while no effect is fitted.
+    None where no effect is fitted.
     """
     fits = [answer.hypothesis.fit for answer in study.answers if answer.hypothesis is not None]
     if not fits:
@@ -160,7 +160,7 @@ class Agent:
         mean: of the features, shape (20,).
         variance: of the features, shape (20,).
         layers: weights and biases, shapes (outputs, inputs) and (outputs,).
-        menu: as `menu_text` writes it: that of the training.
+        menu: menu of the training, in the format of `menu_text`.
     """
 
     mean: Array
@@ -172,12 +172,12 @@ class Agent:
         """The run that the agent chooses after an observation.
 
         Raises:
-            TunnelError: when the menu is not that of the training.
+            TunnelError: when the menu differs from the menu of the training.
         """
         if menu_text(menu) != self.menu:
             remedy = "use the menu of the identification preset, or train an agent with yours"
             raise refusal("the agent was trained with another menu", remedy)
-        spread = np.sqrt(self.variance + 1e-8)  # as NormalizeObservation
+        spread = np.sqrt(self.variance + 1e-8)  # as in NormalizeObservation
         values = (features(observation) - self.mean) / spread
         for weight, bias in self.layers[:-1]:
             values = np.tanh(weight @ values + bias)
@@ -205,7 +205,7 @@ def menu_text(menu: Menu) -> str:
 
 
 def read_agent(path: Path) -> Agent:
-    """An agent from a file that `Agent.to_bytes` made."""
+    """An agent from a file written by `Agent.to_bytes`."""
     from safetensors import SafetensorError, safe_open
 
     try:

@@ -1,6 +1,6 @@
 """A campaign in progress: the rig with its hidden truth, and the results of the runs so far.
 
-`CampaignSession` holds the truth and makes runs; `Knowledge` is what operators, policies and observations may use.
+`CampaignSession` has the truth and makes runs; operators, policies and observations may use only `Knowledge`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 LARGE = 1e4
 """Bound of estimates and covariances in the observation, in their units."""
-_EMPTY = Record(np.arange(2.0), np.zeros(2))  # of a run that is only planned
+_EMPTY = Record(np.arange(2.0), np.zeros(2))  # for a planned run
 MEAN = {"cn_beta": 0.45, "cn_r": -0.12, "yaw_inertia": 0.1014, "mechanical_damping": 0.016}
 """Means of the coefficients an episode draws, in their units."""
 STD = {"cn_beta": 0.08, "cn_r": 0.03, "yaw_inertia": 0.004, "mechanical_damping": 0.004}
@@ -60,9 +60,9 @@ class Conditions:
     Args:
         sensor: its zero is not used, because each episode has its own.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
-        linear: whether runs come from linear theory instead of MuJoCo and a fit; without effects only.
+        linear: whether runs come from linear theory instead of MuJoCo and a fit; only without effects.
         scatter: differences between the runs, unknown to the operator.
-        max_runs: the run at which their drift is complete, a count.
+        max_runs: number of the run at which the drift of the runs is complete.
     """
 
     rig: Rig
@@ -97,7 +97,7 @@ class Conditions:
         return np.arange(max(2, round(duration * rate))) / rate
 
     def link(self, choice: Choice) -> Array:
-        """How the run's decay depends on the shared parameters, shape (2, 4); see `run_link`."""
+        """Dependence of the run's decay on the shared parameters, shape (2, 4); see `run_link`."""
         condition = choice.condition("next", self.rig.air.density)
         return run_link(stated_run(condition, _EMPTY), self.rig_properties)
 
@@ -111,9 +111,9 @@ class Knowledge:
         choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
         fits: reading and fit of the runs that the belief uses, with their links; empty where ``linear``.
-        learnt: what these runs give, where ``linear``.
-        study: the last diagnosis; None before the first, or where there is no vocabulary.
-        status: of the last run, ``ok`` or what went wrong.
+        learnt: results of these runs where ``linear``.
+        study: the last diagnosis; None before the first, or without a vocabulary.
+        status: of the last run, ``ok`` or the fault.
     """
 
     conditions: Conditions
@@ -138,7 +138,7 @@ class Knowledge:
 
     @property
     def last(self) -> Choice | None:
-        """The run before; None before the first."""
+        """The last run; None before the first."""
         return self.choices[-1] if self.choices else None
 
     @property
@@ -157,7 +157,7 @@ class Knowledge:
         return self.conditions.costs.of(choice, self.last)
 
     def observation(self) -> dict[str, Array]:
-        """What the environment shows of it; docs/reference/envs/campaign.md lists the keys."""
+        """The observation of the environment; docs/reference/envs/campaign.md lists the keys."""
         last = self.last or Choice(0, 0.0, 0.0, 0.0, 0.0)
         run = [last.spring_stiffness, last.wind_speed, last.release_angle, last.duration]
         observed = {
@@ -172,7 +172,7 @@ class Knowledge:
 
 
 def first_knowledge(conditions: Conditions) -> Knowledge:
-    """Before the first run: the prior is the distribution the truth is drawn from."""
+    """The knowledge before the first run: the prior is the distribution from which the truth is drawn."""
     return Knowledge(conditions, (prior_belief(MEAN, STD),))
 
 
@@ -180,7 +180,7 @@ class CampaignSession:
     """The rig in one episode.
 
     Args:
-        rng: parent of the generators of the runs, so that the noise of a run depends on its number only.
+        rng: parent of the generators of the runs; the noise of a run depends only on its number.
     """
 
     def __init__(self, conditions: Conditions, truth: RigTruth, rng: np.random.Generator) -> None:
@@ -194,7 +194,7 @@ class CampaignSession:
     def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
         """Make a run and update the knowledge.
 
-        A run whose motion grows without bound is lost: it costs time without result.
+        A run whose motion grows without bound is lost: it takes time and gives no result.
         """
         conditions, truth = self._conditions, self.truth
         costs = (*known.costs, known.cost(choice))
@@ -203,7 +203,7 @@ class CampaignSession:
         zero = truth.sensor_zero + own.pop("zero", 0.0)
         condition = choice.condition(f"r{len(known.choices):02d}", conditions.rig.air.density)
         if conditions.linear:
-            # by the closed form of the linear model; the belief is updated to first order
+            # closed form of the linear model; the belief is updated to first order
             link, time = conditions.link(choice), conditions.sample_times(choice.duration)
             true, values = _deviating(choice, truth.values, own)
             decay = Decay(*map(float, conditions.link(true) @ shared_parameters(values)))
@@ -257,7 +257,7 @@ class CampaignSession:
 def _deviating(
     choice: Choice, values: Mapping[str, float], own: Mapping[str, float]
 ) -> tuple[Choice, dict[str, float]]:
-    """The conditions and coefficients of a run that deviates from what was chosen."""
+    """The conditions and coefficients of a run that deviates from the choice."""
 
     def true(name: str, stated: float) -> float:
         return stated * max(0.0, 1.0 + own.get(name, 0.0))
@@ -294,7 +294,7 @@ def probabilities(known: Knowledge) -> Array:
 def diagnostic_information(known: Knowledge) -> float:
     """ln(answers) minus the entropy of the probabilities, nats.
 
-    It is 0 while no gap is detected: its absence does not show which effect acts.
+    Without a detected gap it is 0: this does not show which effect acts.
     """
     if known.study is None or not known.study.answers:
         return 0.0
@@ -339,11 +339,11 @@ def draw_truth(
 ) -> RigTruth:
     """Draw an episode's truth; values from the options of a reset replace the drawn ones.
 
-    Every number is always drawn, so that one option does not change the other numbers.
+    Every number is always drawn; an option therefore does not change the other numbers.
 
     Args:
-        severities: the effects, of which one acts, each with the same probability and a severity log-uniform in
-            its range (SI units); no effect acts where it is empty.
+        severities: the effects, one of which acts, all equally probable, with severities log-uniform in their
+            ranges (SI units); empty: no effect acts.
 
     Raises:
         TunnelError: for an unknown option, coefficient or effect, or a number that is out of range.

@@ -1,4 +1,4 @@
-"""An estimator asked for the estimate of one simulated campaign: one bad answer must not stop the others."""
+"""The estimate of one simulated campaign: one bad answer must not stop the others."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ These are not failures of the estimator.
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a campaign has no estimate.
+    """The reason why a campaign has no estimate.
 
     Args:
-        status: one of `VERBS`, or another reason of the caller's.
+        status: one of `VERBS`, or another reason stated by the caller.
         message: one line.
-        shown: what a user needs to find the cause: a traceback, or the line.
-        error: name of the type of the exception; empty without one.
+        shown: the details for a user to find the cause: a traceback, or the line.
+        error: name of the exception's type; empty without an exception.
     """
 
     status: str
@@ -55,20 +55,20 @@ class Failure:
 
 
 def asked(campaign: Campaign, estimator: str | Estimator) -> Estimate | Failure:
-    """The estimate of a campaign, or why there is none."""
+    """The estimate of a campaign, or the reason for its absence."""
     try:
         return identify(campaign, estimator, throw=False)
     except WrongReturn as error:
         return Failure(WRONG, one_line(error), str(error), type(error).__name__)
     except TunnelError as error:
         return Failure(REFUSED, one_line(error), str(error), type(error).__name__)
-    except (Exception, SystemExit) as error:  # whatever an estimator raises is counted and shown
+    except (Exception, SystemExit) as error:  # all exceptions of an estimator are counted and shown
         return Failure(RAISED, one_line(raised_line(error)), own_traceback(error), type(error).__name__)
 
 
 @dataclass(frozen=True)
 class Failed:
-    """Failures of one status: how many, and what is shown of the first."""
+    """Failures of one status: their number, and the details of the first."""
 
     status: str
     count: int
@@ -81,7 +81,7 @@ class Failed:
 
 
 def counted_failures(failures: Iterable[Failure | Failed]) -> tuple[Failed, ...]:
-    """Failures by status in the order of `VERBS`, each with the first of them; other statuses are left out."""
+    """Failures by status in the order of `VERBS`, each with the first failure; other statuses are left out."""
     found: dict[str, Failed] = {}
     for one in failures:
         number, text = (one.count, one.first) if isinstance(one, Failed) else (1, one.shown)

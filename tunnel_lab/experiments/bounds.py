@@ -1,4 +1,4 @@
-"""The Cramér–Rao bounds that errors are compared with: of the nominal model, and the scatter where runs scatter."""
+"""Cramér–Rao bounds for comparison with errors: of the nominal model, including any scatter between runs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from tunnel_sim.vocabulary.rig import Rig
 
 
 def reading_deviation(sensor: SensorModel) -> float:
-    """Standard deviation of a reading with its quantisation, rad."""
+    """Standard deviation of a reading, quantisation included, rad."""
     return float(np.hypot(sensor.noise_std, sensor.resolution / np.sqrt(12.0)))
 
 
 def decay_bound(time: Array, release: float, omega_n: float, zeta: float, noise: float) -> dict[str, float]:
-    """The bound of ``zeta`` (1) and ``omega_n`` (rad/s) of one run that is released at rest, its zero unknown.
+    """The bound of ``zeta`` (1) and ``omega_n`` (rad/s) of one run released at rest, with unknown zero.
 
     Args:
         time: sample times from the release, shape (n,), s.
@@ -64,10 +64,10 @@ def coefficients_bound(
     noise: float,
     scatter: Repeatability | None = None,
 ) -> Mapping[str, float]:
-    """The bound of Cnβ, Cnr, Izz and Cr by name, SI; those that the campaign does not determine are left out.
+    """The bound of Cnβ, Cnr, Izz and Cr by name, SI; coefficients not determined by the campaign are left out.
 
     Args:
-        releases: the angle from which each run is released at rest, rad.
+        releases: release angle of each run, at rest, rad.
         noise: standard deviation of a reading, rad.
         scatter: of the runs; None: they repeat exactly.
 
@@ -90,8 +90,8 @@ class PlanBounds:
     """The bounds of a planned campaign.
 
     Args:
-        runs: of ``omega_n`` and ``zeta`` of each run, as of `decay_bound`.
-        campaign: of the coefficients, as of `coefficients_bound`.
+        runs: bounds of ``omega_n`` and ``zeta`` of each run, from `decay_bound`.
+        campaign: bounds of the coefficients, from `coefficients_bound`.
     """
 
     runs: tuple[Mapping[str, float], ...]
@@ -110,10 +110,10 @@ def nominal_oscillation(condition: Condition, truth: Truth, rig: Rig) -> dict[st
 
 
 def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> PlanBounds:
-    """The bounds of a campaign of free decays as its plan states it, whatever effects act.
+    """The bounds of a planned campaign of free decays, without regard to its effects.
 
     Args:
-        widths: relative standard deviations between runs by name, as `Repeatability` has them; zero: none.
+        widths: relative standard deviations between runs by name, as in `Repeatability`; zero: none.
     """
     from tunnel_sim.engine.virtual_campaign import stated_run  # only here: loads MuJoCo
 
@@ -124,7 +124,7 @@ def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> Pl
         {} if found is None else decay_bound(time, one.release_angle, **found, noise=noise)
         for one, found, time in zip(plan.conditions, nominal, times, strict=True)
     )
-    if not all(runs):  # one that does not oscillate, or a sensor without noise
+    if not all(runs):  # a run does not oscillate, or the sensor has no noise
         return PlanBounds(runs, {})
     bare = tuple(
         stated_run(one, Record(time, np.zeros(time.size)))

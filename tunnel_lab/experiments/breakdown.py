@@ -1,8 +1,8 @@
 """The bias that each unmodelled effect causes in each estimator, with its tables and figures.
 
 The campaigns are made by the reference simulator, which shares no numerics with estimators or model. Each has
-twelve runs on three springs and one effect in its textbook form. The effect is sized so that the residuals of the
-nominal refit exceed the noise by 1 or 10 times its power. matplotlib is imported inside the functions.
+twelve runs on three springs and one effect in its textbook form. The effect is sized for an excess of the nominal
+refit of 1 or 10 noise variances. matplotlib is imported inside the functions.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ ABOUT = (
     "Bias in % of the truth; in brackets in reported standard deviations. Severity: excess residual power after "
     "the nominal refit, in noise powers."
 )
-_SIDE_BY_SIDE = 3  # estimators in one table of a terminal of 80 columns
-_DECADES = 2.0  # of standard deviations above one, at the ends of the colours
-_DARK = 1.2  # decades from which white text is legible
+_SIDE_BY_SIDE = 3  # estimators in a table for 80 columns
+_DECADES = 2.0  # decades of standard deviations above one, at the ends of the colours
+_DARK = 1.2  # decades above which white text is legible
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,8 @@ class BiasCase:
 
     Args:
         effect: its name, or ``no effect``.
-        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
-        reached: excess after the reference simulator's own nominal refit, in noise powers (a ratio).
+        severity: target excess, in noise variances (a ratio); 0 for no effect.
+        reached: excess after the reference simulator's nominal refit, in noise variances (a ratio).
         realisation: number of the realisation, from 0.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
     """
@@ -121,11 +121,11 @@ def make_cases(
 ) -> list[BiasCase]:
     """Size the effects and simulate their campaigns.
 
-    Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
-    positive. The campaign without effect comes first, then by effect, severity and realisation.
+    Realisations differ in the noise and in random forcing. Effects with a sign are positive. The campaign without
+    effect comes first; the others are ordered by effect, severity and realisation.
 
     Args:
-        severities: excess to leave after the nominal refit, in noise powers.
+        severities: target excesses after the nominal refit, in noise variances (ratios).
         duration: of every run, s.
         show_steps: show the progress of sizing on standard error.
     """
@@ -170,7 +170,7 @@ def draw_effect(conditions: Conditions, name: str, severity: float, seed: int) -
     """A campaign with one effect in its textbook form.
 
     Args:
-        severity: excess to size it for, in noise powers (a ratio).
+        severity: target excess, in noise variances (a ratio).
     """
     form = forms_of(name)[0]
     rng = np.random.default_rng([seed, EFFECTS.index(name)])
@@ -184,7 +184,7 @@ def _random(draw: CampaignDraw) -> bool:
 
 
 def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
-    """The same case with other noise, and other forcing where it is random."""
+    """The same case with other noise and other random forcing."""
     name = draw.effects[0].form.family if draw.effects else NOTHING_ADDED
     key = EFFECTS.index(name) if draw.effects else len(EFFECTS)
     rng = np.random.default_rng([seed, key, number, 1])
@@ -208,8 +208,8 @@ def break_down(
     """Every estimator on every case.
 
     Args:
-        seed: the cases were made with.
-        parts: folder for finished work, so that an interrupted score can be continued; None for none.
+        seed: of the cases.
+        parts: folder for finished work, to continue an interrupted score; None: finished work is not kept.
     """
     mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
     work = knowing(partial(_estimate_case, tuple(estimators)), estimators)
@@ -230,9 +230,9 @@ class Bias:
 
     Args:
         effect: its name, or ``no effect``.
-        severity: excess that it was sized for, as a ratio to the noise power; 0 for no effect.
-        reached: mean excess over the realisations, in noise powers (a ratio).
-        departs: share of the realisations in which the estimator reported that the model departs.
+        severity: target excess, in noise variances (a ratio); 0 for no effect.
+        reached: mean excess over the realisations, in noise variances (a ratio).
+        departs: share of the realisations in which the estimator reported a departure from the model.
     """
 
     effect: str
@@ -245,7 +245,7 @@ class Bias:
 
 
 def biases(rows: Sequence[Row]) -> list[Bias]:
-    """Rows summarised over realisations; what an estimator does not give is left out."""
+    """Rows summarised over realisations; quantities that an estimator does not give are left out."""
     absent = not_given(rows)
     groups: dict[tuple[str, float, str, str], list[Row]] = {}
     for row in rows:
@@ -263,7 +263,7 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
 
 
 def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
-    """The map as a table: a row for each effect, severity, estimator and quantity; units in the columns' names."""
+    """The biases as a table: a row for each effect, severity, estimator and quantity; units in column names."""
     import polars as pl
 
     rows = [
@@ -324,7 +324,7 @@ def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
     """The biases of one quantity that exceed one reported standard deviation.
 
     Effects are in rows and estimators in columns, each with its severities side by side. The colour is the bias in
-    reported standard deviations, the number the bias in %; smaller biases stay empty.
+    reported standard deviations, the number the bias in %; cells of smaller biases are empty.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -372,7 +372,7 @@ def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str]
     """Biases that are larger than one reported standard deviation, by effect, severity and estimator.
 
     Returns:
-        The bias in % of the truth and in reported standard deviations; severities are in noise powers (ratios).
+        The bias in % of the truth and in reported standard deviations; severities in noise variances (ratios).
     """
     cells = {}
     for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):

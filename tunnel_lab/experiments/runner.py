@@ -1,7 +1,7 @@
-"""One runner of experiments: a task is data, the work on it a pure function; finished tasks are not done again.
+"""The runner of experiments: a task is data, its work a pure function; finished tasks are not repeated.
 
-The workers are processes of this machine or of a Dask cluster; only this process keeps results, so that a task that
-is done twice is stored once. Nothing heavy is imported here, because worker processes start with this module.
+The workers are processes of this machine or of a Dask cluster. Only this process keeps results: a repeated task is
+stored once. Nothing heavy is imported here, because worker processes start with this module.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ _FEWEST_IN_FLIGHT = 8
 
 
 class Workers(Protocol):
-    """Those that do the work: `processes` or a cluster."""
+    """The executors of the work: `processes` or a cluster."""
 
     def __call__(
         self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], /
     ) -> Iterator[tuple[TaskT, ResultT]]:
-        """Yield every task with its result, in the order in which they finish."""
+        """Yield every task with its result, in the order of completion."""
 
 
 def run_tasks(
@@ -61,13 +61,13 @@ def run_tasks(
     size: Callable[[TaskT], int] = lambda _: 1,
     progress: Progress | None = None,
 ) -> int:
-    """Do the tasks that are not finished.
+    """Do the unfinished tasks.
 
     Args:
-        work: a pure function of a module: a task that is done twice gives the same.
-        finished: whether the result of a task is kept already.
+        work: a pure function of a module: a repeated task gives the same result.
+        finished: whether the result of a task is already stored.
         keep: called in this process with each task and its result.
-        size: of a task, as progress counts it.
+        size: weight of a task in the progress.
 
     Returns:
         Number of tasks that were finished before.
@@ -91,7 +91,7 @@ def run_tasks(
 
 
 def knowing(work: Callable[[TaskT], ResultT], estimators: Iterable[str]) -> Callable[[TaskT], ResultT]:
-    """The same work, which finds estimators of one's own in any process.
+    """The same work, with the user's estimators known in any process.
 
     Args:
         estimators: names of all that the work uses.
@@ -116,7 +116,7 @@ def said(line: str) -> None:
 
 
 def processes(jobs: int, say: Say = said) -> Workers:
-    """Processes of this machine; no job works in this one. The tasks of a process that dies are repeated."""
+    """Processes of this machine; 0 jobs: this process. The tasks of a process that dies are repeated."""
 
     def workers(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
         waiting = list(tasks)
@@ -150,9 +150,9 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
     """Workers of a Dask cluster.
 
     Args:
-        address: of a scheduler, such as ``tcp://host:8786``, or ``local`` for a cluster that is started here.
+        address: of a scheduler, such as ``tcp://host:8786``, or ``local`` to start a cluster here.
         workers: number of workers of a local cluster.
-        poll_s: how long to wait for a shard before the workers are counted, s.
+        poll_s: time to wait for a shard before counting the workers, s.
     """
 
     def crew(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
@@ -171,10 +171,10 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
 def _client(address: str, workers: int) -> Iterator[Client]:
     import distributed
 
-    make_client: Any = distributed.Client  # Dask's own functions carry no types
+    make_client: Any = distributed.Client  # Dask's functions are not typed
     make_cluster: Any = distributed.LocalCluster
 
-    for name in ("distributed", "distributed.client"):  # replaced by one line of our own
+    for name in ("distributed", "distributed.client"):  # replaced by a line of this program
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if address == LOCAL:
         options: dict[str, Any] = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
@@ -197,7 +197,7 @@ def _client(address: str, workers: int) -> Iterator[Client]:
 def _work_of(
     client: Any, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], say: Say, poll_s: float
 ) -> Iterator[tuple[TaskT, ResultT]]:
-    """Tasks with their results as they finish, few in flight at a time: two for each thread."""
+    """Tasks with their results in the order of completion; at most two per thread are in flight."""
     from distributed import KilledWorker, wait
 
     wait_for: Any = wait
@@ -243,7 +243,7 @@ def _work_of(
 
 
 def _tell_of_workers(client: Any, alone: bool, say: Say) -> bool:
-    """Whether no worker is connected, which is said once each time."""
+    """Whether no worker is connected; this is reported once each time."""
     if client.status != "running":
         raise _gone()
     address = client.scheduler.address if client.scheduler else ""

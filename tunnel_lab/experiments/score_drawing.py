@@ -35,9 +35,9 @@ class _Rows:
     Args:
         cells: their indices in the grid.
         labels: of the rows, some in several lines.
-        title: what the rows have in common.
-        quantities: those that are drawn, given by one of the estimators.
-        lines: that the longest label has.
+        title: the conditions common to the rows.
+        quantities: drawn quantities, given by at least one of the estimators.
+        lines: number of lines of the longest label.
     """
 
     cells: Sequence[int]
@@ -48,7 +48,7 @@ class _Rows:
 
 
 def _rows(results: Results, kind: str, title: str) -> _Rows | None:
-    """The rows of one kind of cell; None where there is none, or no estimator gives anything."""
+    """The rows of one kind of cell; None without such cells or estimates."""
     cells = [index for index, cell in enumerate(results.grid.cells) if cell.kind == kind]
     given = [name for name in _SHOWN if any(results.gives(one, name) for one in results.estimators)]
     quantities = [name for name in given if cells and name in results.grid.cells[cells[0]].quantities]
@@ -65,8 +65,8 @@ def score_figure(results: Results) -> Figure:
     """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
 
     Each kind of cell has two rows of panels, one panel for each estimator. Cells are in rows, in the order of
-    the grid, so that reading across compares the estimators; quantities differ in colour and marker. A kind of
-    which no estimator gives anything is left out.
+    the grid, to compare the estimators side by side; quantities differ in colour and marker. A kind without
+    estimates is left out.
     """
     every = (_rows(results, kind, title) for kind, title in _KINDS.items())
     kinds = [one for one in every if one is not None]
@@ -86,7 +86,7 @@ def score_figure(results: Results) -> Figure:
 
 
 def _block(part: SubFigure, results: Results, rows: _Rows, room: float, *, covered: bool) -> None:
-    """One row of panels, each so many inches wide."""
+    """One row of panels, each ``room`` inches wide."""
     trials = results.trials()
     panels = part.subplots(1, len(results.estimators), sharex=True, sharey=True, squeeze=False)[0]
     handles: dict[str, Any] = {}
@@ -108,7 +108,7 @@ def _block(part: SubFigure, results: Results, rows: _Rows, room: float, *, cover
     if covered:
         panels[0].set_xlim(-4.0, 104.0)
         panels[0].set_xticks([0, 50, 100])
-    else:  # they share the axis; the labels depend on what is drawn in one that has values
+    else:  # the panels share the axis; its labels depend on a panel with values
         known = [axes for axes in panels if np.isfinite(axes.dataLim.minposx)]
         log_axis((known or panels)[0], "x", room)
     part.supxlabel(
@@ -124,7 +124,7 @@ def _block(part: SubFigure, results: Results, rows: _Rows, room: float, *, cover
 
 
 def _draw(axes: Axes, scores: Sequence[Score], place: int, count: int, covered: bool) -> Any:
-    """The figures of one quantity in one panel, the place-th of so many; the handle for the legend."""
+    """Draw one quantity in a panel, the ``place``-th of ``count``; returns the handle for the legend."""
     shift = 0.36 * ((place + 0.5) / count - 0.5)
     spans: Any
     if covered:
@@ -143,7 +143,7 @@ def _draw(axes: Axes, scores: Sequence[Score], place: int, count: int, covered: 
 
 
 def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
-    """What distinguishes each cell of one kind from the others, in a few words, and what is common."""
+    """The conditions that distinguish each cell of one kind, in a few words, and the common conditions."""
     parts = []
     for cell in cells:
         noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"

@@ -1,8 +1,8 @@
-"""The grid of conditions that estimators are scored on, a TOML file; its cells, and the records drawn for them.
+"""The grid of conditions for scoring estimators, a TOML file; its cells, and their simulated records.
 
 The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial depends
-on the seed, its cell and its number only. Therefore every estimator gets the same records, and a cell keeps them
-in any grid.
+only on the seed, its cell and its number. Therefore every estimator gets the same records, and a cell has the same
+records in any grid.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class Cell:
         frequency: natural frequency of a decay, Hz; 0 in a campaign.
         wind_speed: of a campaign's wind-on runs, m/s; 0 in a decay.
         springs: of a campaign, N m/rad; none in a decay.
-        effect: as ``tunnel simulate --effect`` takes it, several joined by `` + ``; ``none`` for the nominal model.
+        effect: in the format of ``tunnel simulate --effect``, several joined by `` + ``; ``none``: nominal model.
     """
 
     kind: Literal["decay", "campaign"]
@@ -143,7 +143,7 @@ class Cell:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The scored quantities, by their names in an estimate's JSON."""
+        """Names of the scored quantities in an estimate's JSON."""
         return DECAY_QUANTITIES if self.kind == "decay" else CAMPAIGN_QUANTITIES
 
     @property
@@ -154,7 +154,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Grid:
-    """What to score on: at least one cell, all different, and the number of records or campaigns in each."""
+    """The conditions of a score: at least one cell, all different, and the number of trials in each."""
 
     name: str
     seed: int
@@ -163,11 +163,11 @@ class Grid:
     cells: tuple[Cell, ...]
 
     def trials_for(self, estimator: str) -> int:
-        """Number of trials that an estimator gets of each cell, always the first ones."""
+        """Number of trials for an estimator in each cell, always the first ones."""
         return min(self.trials, dict(self.trials_of).get(estimator, self.trials))
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Everything that determines the records, in JSON's types."""
+        """The data that determine the records, in JSON's types."""
         return {
             "name": self.name,
             "seed": self.seed,
@@ -178,7 +178,7 @@ class Grid:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Grid:
-        """The inverse of `to_json_dict`; a `TunnelError` when it is not a grid, or too large."""
+        """The inverse of `to_json_dict`; a `TunnelError` when the data are not a grid, or are too large."""
         where, remedy = "the grid as JSON", "write it again"
         check_shape(data, where, remedy)
         with as_described("is not a grid", where, remedy):
@@ -246,7 +246,7 @@ def load_grid(path: Path) -> Grid:
 
 
 def _check_effects(text: str, where: str) -> None:
-    """Refuse an entry of ``effects`` that is not read, does nothing, or names an effect twice."""
+    """Refuse an entry of ``effects`` that is malformed, does nothing, or names an effect twice."""
     try:
         acting = effects_of(text)
     except TunnelError as error:
@@ -267,9 +267,9 @@ def packaged_grid() -> Grid:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A campaign, which does not state its noise, with truth and Cramér–Rao bound by quantity, SI.
+    """A campaign without stated noise, with truth and Cramér–Rao bound by quantity, SI.
 
-    The bound is that of the nominal model, with the scatter between the runs where they scatter.
+    The bound is for the nominal model, including any scatter between the runs.
     """
 
     campaign: Campaign
@@ -278,7 +278,7 @@ class Trial:
 
 
 def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
-    """Make one trial of a cell, which are numbered from 0; the same arguments give the same bits.
+    """Make one trial of a cell; trials are numbered from 0. Results are bit-identical for equal arguments.
 
     Raises:
         TunnelError: when a run leaves the finite range.
@@ -317,7 +317,7 @@ def effects_of(text: str) -> tuple[Effect, ...]:
     """The effects of a cell, in the order of the vocabulary; none for ``none``.
 
     Args:
-        text: as `Cell` has it.
+        text: in the format of `Cell`.
 
     Raises:
         TunnelError: when a name is unknown or a value out of range.

@@ -1,6 +1,6 @@
-"""The trials of a score: every estimator on every trial of a grid, their table as Parquet, and their scores.
+"""The trials of a score: every estimator on every trial of a grid, the Parquet table, and the scores.
 
-A baseline is such a table of trials. It contains its grid, so that it can be repeated.
+A baseline is a table of trials. It contains its grid, to be repeatable.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ NamedT = TypeVar("NamedT", bound=Named)
 
 @dataclass(frozen=True)
 class Unit:
-    """Some trials of one cell, from the first to before the last; both and the cell are numbers from 0."""
+    """Trials of one cell, from the first up to but excluding the last; trials and cells are numbered from 0."""
 
     cell: int
     first: int
@@ -110,8 +110,8 @@ def estimate_rows(
 ) -> list[Row]:
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
-    Where the estimator raises an exception or returns something wrong, value and std are None, the status says
-    which, and the first row has the `Failure` as ``failure``.
+    Where the estimator raises an exception or returns an invalid result, value and std are None, the status gives
+    the kind of failure, and the first row has the `Failure` as ``failure``.
 
     Args:
         truth: by quantity, SI; ζ and ωn are those of the first run.
@@ -151,7 +151,7 @@ def estimate_rows(
 
 
 def outcome(row: Row) -> ScoredEstimate:
-    """A row as it is scored."""
+    """A row in the form for scoring."""
     quantity = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
     return ScoredEstimate(row["truth"], quantity, row["bound"])
 
@@ -167,18 +167,18 @@ def score_grid(
     """Every estimator on every trial of a grid, in the order of cells, trials and estimators.
 
     Args:
-        jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
+        jobs: processes; 0 works in this one. Except for the times, the rows do not depend on it.
         parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
-            are the same; None for none.
+            are unchanged; None: finished work is not kept.
 
     Raises:
-        TunnelError: more trials than a table can hold.
+        TunnelError: when there are more trials than a table can hold.
     """
     quantities = sum(len(cell.quantities) for cell in grid.cells)
     count = quantities * sum(grid.trials_for(name) for name in estimators)
     what = "rows (trials × estimators × quantities)"
     check_count(count, limits.SCORE_ROWS, what, "score", "give fewer trials, cells or estimators")
-    # Ordered across cells, so that the time left can be estimated early.
+    # Ordered across cells, to estimate the remaining time early.
     units = [
         Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
         for first in range(0, grid.trials, UNIT_TRIALS)
@@ -207,19 +207,19 @@ def rows_of(
     size: Callable[[NamedT], int] = lambda _: 1,
     progress: Progress | None = None,
 ) -> dict[str, list[Row]]:
-    """The rows of every task, by its name; those of finished tasks are kept in files of JSON.
+    """The rows of every task, by its name; rows of finished tasks are kept in JSON files.
 
     Args:
-        mark: rows kept under another mark are computed again, see `fingerprint`.
+        mark: rows kept under another mark are recomputed, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
-        parts: folder of the files; None for none.
+        parts: folder of the files; None: rows are not kept.
     """
     rows: dict[str, list[Row]] = {}
     if parts is not None:
         for task in tasks:
             try:
                 document = read_json(parts / f"{task.name}.json", remedy="score it again")
-            except TunnelError:  # there is none, or it is damaged
+            except TunnelError:  # missing or damaged
                 continue
             kept = document.get("rows")
             if document.get("fingerprint") != mark or not isinstance(kept, list):
@@ -245,7 +245,7 @@ def rows_of(
 
 
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
-    """SHA-256 of all that results depend on: conditions, estimators, the code below and one's own."""
+    """SHA-256 of everything that determines the results: conditions, estimators, and code of project and user."""
     from identification.estimators import own_estimators
 
     own = [one.code for one in own_estimators(estimators)]
@@ -291,11 +291,11 @@ class Results:
         return not_given(self.rows)
 
     def gives(self, estimator: str, quantity: str) -> bool:
-        """Whether an estimator gives a quantity, or fails to; see `not_given`."""
+        """Whether an estimator gives a quantity, or fails in trying; see `not_given`."""
         return quantity not in self.not_given.get(estimator, ())
 
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
-        """Median time of `identify` for one record of some cells, its examination included, ms."""
+        """Median time of `identify` for one record of some cells, examination included, ms."""
         wanted = set(cells)
         return median(
             float(row["milliseconds"])
@@ -305,14 +305,14 @@ class Results:
 
 
 def not_given(rows: Iterable[Row]) -> dict[str, tuple[str, ...]]:
-    """Quantities that an estimator gives in no trial, without saying that it failed in all of them, by estimator.
+    """Quantities by estimator that it gives in no trial, unless its status is a failure in all trials.
 
-    It says so by its status: an exception, or a campaign none of whose runs could be identified, is a failure.
+    Failures are exceptions, and campaigns none of whose runs could be identified.
 
     Args:
         rows: with ``estimator``, ``quantity``, ``value`` and ``status``.
     """
-    known: dict[tuple[str, str], list[bool]] = {}  # whether it is given, and whether it is not asked for
+    known: dict[tuple[str, str], list[bool]] = {}  # whether it is given, and whether it is not required
     for row in rows:
         seen = known.setdefault((row["estimator"], row["quantity"]), [False, False])
         seen[0] |= row["value"] is not None
@@ -325,7 +325,7 @@ def not_given(rows: Iterable[Row]) -> dict[str, tuple[str, ...]]:
 
 
 def failure_lines(rows: Sequence[Row]) -> list[str]:
-    """What is said of estimators that raised exceptions or returned something wrong: how often, and the first."""
+    """Lines on estimators that raised exceptions or returned invalid results: the number, and the first case."""
     by_estimator: dict[str, list[Failure]] = {}
     for row in rows:
         if "failure" in row:
@@ -339,7 +339,7 @@ def failure_lines(rows: Sequence[Row]) -> list[str]:
 
 
 def groups_of(grid: Grid) -> dict[str, list[int]]:
-    """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
+    """Groups of pooled cells: decays, campaigns, and campaigns with each effect."""
     groups: dict[str, list[int]] = {}
     for index, cell in enumerate(grid.cells):
         name = "single decays" if cell.kind == "decay" else "campaigns"
@@ -363,7 +363,7 @@ def trials_frame(results: Results) -> pl.DataFrame:
 
 
 def read_trials(path: Path) -> Results:
-    """Read what `write_trials` wrote; estimators are in the order of their first rows."""
+    """Read a file written by `write_trials`; estimators are in the order of their first rows."""
     where, remedy = shown(path), "write one with tunnel score --write-baseline"
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
     with as_described("is not a table of trials", where, remedy):
@@ -372,7 +372,7 @@ def read_trials(path: Path) -> Results:
         if wrong or "grid" not in schema:
             raise ValueError(", ".join(wrong) or "grid")
         frame = read_frame(content, where, remedy, _COLUMNS)
-        # Every row carries the same grid; one is enough.
+        # Every row has the same grid; one is enough.
         text = read_frame(content, where, remedy, ("grid",))["grid"][0]
         grid = Grid.from_json_dict(parse_json(text, where, remedy))
         rows = tuple(frame.to_dicts())
@@ -388,11 +388,11 @@ def read_trials(path: Path) -> Results:
                 raise ValueError("a value without its standard deviation")
             truth, value, std, bound = (row[name] for name in ("truth", "value", "std", "bound"))
             sizes = [abs(number) for number in (truth, value, std, bound) if number is not None]
-            possible = all(size <= limits.LARGEST_NUMBER for size in sizes)  # false for NaN as well
+            possible = all(size <= limits.LARGEST_NUMBER for size in sizes)  # also false for NaN
             possible &= truth != 0.0 if bound is None else not bound <= 0.0
             if (
                 possible and value is not None
-            ):  # its error is a number over bound, truth and standard deviation
+            ):  # its error is finite relative to bound, truth and standard deviation
                 scales = [abs(scale) for scale in (truth, std, bound) if scale]
                 errors = (abs(value - truth) / scale for scale in scales)
                 possible = std >= 0.0 and all(error <= limits.LARGEST_NUMBER for error in errors)
@@ -404,7 +404,7 @@ def read_trials(path: Path) -> Results:
 
 
 def packaged_baseline() -> Results:
-    """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
+    """The trials of all estimators on the packaged grid, the baseline of ``tunnel score --check packaged``."""
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
         return read_trials(path)
 

@@ -1,4 +1,4 @@
-"""A score in tables, and against its baseline."""
+"""A score in tables, and its comparison with a baseline."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _FEW = 20
 
 @dataclass(frozen=True)
 class Finding:
-    """One aspect of one estimator in the baseline and now, and whether it is worse beyond chance."""
+    """One aspect of one estimator in the baseline and now, and whether it is significantly worse."""
 
     estimator: str
     where: str
@@ -57,12 +57,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a check found.
+    """The result of a check.
 
     Args:
-        false_alarm_rate: probability that any finding of unchanged estimators is called worse.
-        identical: whether all estimates are the baseline's to the last bit.
-        added: estimators that are not in the baseline; they were not checked.
+        false_alarm_rate: probability that any finding on unchanged estimators is called worse.
+        identical: whether all estimates are bit-identical to the baseline's.
+        added: unchecked estimators, which are not in the baseline.
     """
 
     findings: tuple[Finding, ...]
@@ -72,7 +72,7 @@ class Verdict:
 
     @property
     def worse(self) -> tuple[Finding, ...]:
-        """The findings that are worse, the most significant first."""
+        """The worse findings, the most significant first."""
         worse = [finding for finding in self.findings if finding.worse]
         return tuple(sorted(worse, key=lambda finding: finding.change.p_value))
 
@@ -90,7 +90,7 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         rate: false-alarm probability of all tests together.
 
     Raises:
-        TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
+        TunnelError: when the baseline has cells not scored now, or has none of the estimators.
     """
     estimators = [name for name in baseline.estimators if name in now.estimators]
     for known in baseline.grid.cells:
@@ -133,7 +133,7 @@ def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, i
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
-    """A row for every estimator, cell and quantity that is given.
+    """A row for every estimator, cell and given quantity.
 
     It has the conditions, the figures, and their standard errors and intervals.
     """
@@ -208,16 +208,16 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -
 
 
 def lines_below(results: Results) -> list[str]:
-    """What is said below the tables: what the figures are, which are not given, and how far few trials reach."""
+    """Lines below the tables: the meaning of the figures, missing quantities, and the accuracy of few trials."""
     return [ABOUT, *not_given_lines(results.not_given), *_few_trials(results)]
 
 
 def not_given_lines(not_given: Mapping[str, Sequence[str]], symbols: Mapping[str, str] = NAMES) -> list[str]:
-    """What an estimator does not give, a line for each.
+    """Quantities that estimators do not give, a line for each estimator.
 
     Args:
         not_given: names of quantities by estimator.
-        symbols: how the quantities are written.
+        symbols: of the quantities, by name.
     """
     return [
         f"Not given by {name}: {', '.join(symbols[one] for one in quantities)}."
@@ -226,7 +226,7 @@ def not_given_lines(not_given: Mapping[str, Sequence[str]], symbols: Mapping[str
 
 
 def _few_trials(results: Results) -> list[str]:
-    """How far the RMSE of the fewest trials may be from the one that many would have."""
+    """Uncertainty of the RMSE from the smallest number of trials."""
     fewest = min(results.grid.trials_for(name) for name in results.estimators)
     if fewest >= _FEW:
         return []
@@ -238,7 +238,7 @@ def _few_trials(results: Results) -> list[str]:
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
-    """Of cells taken together: RMSE over the bound, the worst cell's, bias over the bound, % covered and failed."""
+    """Figures of pooled cells: RMSE over the bound, the worst cell's, bias over the bound, % covered and failed."""
     scores = [score(trials) for trials in every]
     worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
     scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]

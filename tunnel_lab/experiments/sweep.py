@@ -1,8 +1,8 @@
-"""A sweep: its shards, which are pure functions of the sweep and their numbers, and the folder that keeps them.
+"""A sweep: its shards, pure functions of the sweep and their numbers, and the folder of the results.
 
-``sweep.json`` in the folder describes the sweep. Every shard is a file in ``results``, and one in ``records`` where
-these are stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
-``checksums`` holds a file for each shard in the format of ``sha256sum --check``; a part that does not match its
+``sweep.json`` in the folder describes the sweep. Every shard has a file in ``results``, and one in ``records`` if
+records are stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
+``checksums`` has a file for each shard in the format of ``sha256sum --check``; a part that does not match its
 checksum is repeated.
 """
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 2
 MANIFEST = "sweep.json"
 RESULTS, RECORDS, CHECKSUMS = "results", "records", "checksums"
-_OWN = "estimator "  # before the name of one of one's own, in what a sweep was made with
+_OWN = "estimator "  # before the name of a user's estimator, in the versions of a sweep
 _ELSEWHERE = "name another --out"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
@@ -101,12 +101,12 @@ class Finished:
 
 @cache
 def made_with() -> dict[str, str]:
-    """Versions and processor that the bits of a result depend on."""
+    """Versions and processor that determine a result to the bit."""
     return {**{name: version(name) for name in _PACKAGES}, "machine": platform.machine()}
 
 
 def made_with_all(sweep: Sweep) -> dict[str, str]:
-    """The same with the code of the sweep's estimators of one's own."""
+    """Versions and processor, with the code of the user's estimators in the sweep."""
     own = own_estimators(sweep.document.estimators)
     return {**made_with(), **{f"{_OWN}{one.name}": one.code for one in own}}
 
@@ -119,8 +119,8 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     """Simulate the cases of a shard together, and estimate them one by one.
 
     Args:
-        sweep: as `Sweep.to_json` gives it.
-        nthread: threads that simulate; the result is the same to the bit whatever their number.
+        sweep: from `Sweep.to_json`.
+        nthread: number of simulating threads; results are bit-identical for any number.
     """
     plan = _sweep(sweep)
     cases = list(plan.shard(index))
@@ -164,7 +164,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
 
 
 def bounds_of(cases: Sequence[SweepCase]) -> dict[int, PlanBounds]:
-    """The bounds of cases by index; those that differ in seed and effects only are computed once."""
+    """The bounds of cases by index; cases that differ only in seed and effects share one computation."""
     known: dict[object, PlanBounds] = {}
     found = {}
     for case in cases:
@@ -213,7 +213,7 @@ def estimate_rows(
     Args:
         bounds: of the case, see `bounds_of`.
         estimator: its name; None where the case was only simulated.
-        outcome: its estimate, or why there is none; None where the case was only simulated.
+        outcome: its estimate, or the failure; None where the case was only simulated.
 
     Yields:
         Values of `RESULT_COLUMNS`, in their order: of the runs, then of the campaign.
@@ -223,7 +223,7 @@ def estimate_rows(
     if plan.effects:
         first = plan.effects[0]
         severity = float(first.parameters[effect_class(first.name).parameters()[0].name])
-    parameters = " ".join(  # as ``--effect`` takes them
+    parameters = " ".join(  # in the format of ``--effect``
         f"{effect.name}:" + ",".join(f"{name}={value!r}" for name, value in effect.parameters.items())
         for effect in plan.effects
     )
@@ -243,7 +243,7 @@ def estimate_rows(
         for name, unit in RUN_QUANTITIES.items():
             figures = (nominal.get(name), *_figures(run, name), bounds.runs[place].get(name))
             yield (*head, *given, name, unit, *figures, found, message)
-    # Spring, wind-on speed and release angle of the campaign, each where the campaign has only one.
+    # Spring, wind-on speed and release angle of the campaign, each only if unique.
     kinds = (
         {condition.spring_stiffness for condition in conditions},
         {condition.wind_speed for condition in conditions if condition.wind_speed > 0.0} or {0.0},
@@ -264,7 +264,7 @@ def _figures(owner: Estimate | RunEstimate | None, name: str) -> tuple[float | N
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of one sweep, which has its ``sweep.json``, and the versions that its results are made with."""
+    """The folder of one sweep with its ``sweep.json``, and the versions for its results."""
 
     folder: Path
     sweep: Sweep
@@ -295,7 +295,7 @@ class Store:
         return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
 
     def keep(self, shard: Finished) -> None:
-        """Write a finished shard; a `TunnelError` when it was made with other versions, or cannot be written."""
+        """Write a finished shard; a `TunnelError` when its versions differ, or it cannot be written."""
         wanted = {**self.made_with, "threads": "1"}
         odd = _first_difference(wanted, {name: shard.made_with.get(name) for name in wanted})
         if odd:
@@ -323,7 +323,7 @@ class Store:
 
 
 def begin(sweep: Sweep, folder: Path) -> Store:
-    """The folder of a sweep, which is created where it is missing.
+    """The folder of a sweep, created where missing.
 
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
@@ -355,7 +355,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
             )
     else:
         clear_leftovers(folder)
-        # A sweep that was stopped before its ``sweep.json`` was written may have left empty folders.
+        # A sweep stopped before its ``sweep.json`` was written may have left empty folders.
         for path in folder.iterdir() if folder.is_dir() else ():
             dataset = path.name in (RESULTS, RECORDS, CHECKSUMS) and path.is_dir()
             if not (dataset and not any(path.iterdir())) and not path.name.startswith(f".{MANIFEST}."):
@@ -370,7 +370,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
             "made_with": versions,
             "sweep": json.loads(sweep.to_json()),
         }
-        write_json(folder / MANIFEST, document)  # first: what is stopped afterwards is continued
+        write_json(folder / MANIFEST, document)  # first: a sweep stopped afterwards can be continued
         store = Store(folder, sweep, versions)
     for name in (RESULTS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
         output_folder(folder / name)
@@ -385,7 +385,7 @@ def open_store(folder: Path) -> Store:
     """Open the folder of a sweep, finished or not.
 
     Raises:
-        TunnelError: when it holds no sweep, or one that is malformed or of another version of the format.
+        TunnelError: when it does not hold a sweep, or the sweep is malformed or of another format version.
     """
     path = folder / MANIFEST
     document = read_json(path, remedy="name the folder of a sweep")
@@ -400,7 +400,7 @@ def open_store(folder: Path) -> Store:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a sweep: shards found finished, and the estimates that failed in those done now."""
+    """The outcome of a sweep: the number of shards finished before, and the failed estimates of this run."""
 
     store: Store
     found: int
@@ -408,7 +408,7 @@ class Outcome:
 
 
 def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress | None = None) -> Outcome:
-    """Do the rest of a sweep; all results are then complete.
+    """Do the unfinished shards of a sweep, after which all results are complete.
 
     Args:
         progress: called with the number of finished cases and of all cases, at the start and after each shard.

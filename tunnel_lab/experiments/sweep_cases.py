@@ -1,4 +1,4 @@
-"""The cases of a sweep: the tables of its file, which is checked before anything is simulated, and their product.
+"""The cases of a sweep: the tables of its file, checked before anything is simulated, and their product.
 
 The tables are those of a campaign description, with lists of the values to sweep. Every case is a campaign
 description with a seed computed from its contents.
@@ -61,7 +61,7 @@ STEPS_PER_SHARD = 500_000
 
 
 def _listed(value: object) -> object:
-    """One value, or one table, is a list of one."""
+    """A single value or table as a list of one item."""
     return value if isinstance(value, list) else [value]
 
 
@@ -70,7 +70,7 @@ Many = Annotated[list[T], BeforeValidator(_listed), Field(min_length=1)]
 
 
 class RigTable(StrictModel):
-    """``[[rig]]``: a rig description with changes; the packaged one where no file is named."""
+    """``[[rig]]``: a rig description with changes; the packaged description where no file is named."""
 
     name: OneLine = Field(default="packaged", description="a short name in quotes")
     file: OneLine | None = Field(default=None, description="the path of a rig description in quotes")
@@ -208,7 +208,7 @@ class Sweep:
 
     @classmethod
     def from_json(cls, text: str) -> Sweep:
-        """The inverse of `to_json`; a `TunnelError` when it is not a sweep, or too large."""
+        """The inverse of `to_json`; a `TunnelError` when the text is not a sweep, or is too large."""
         where, remedy = "the sweep as JSON", "start the sweep again"
         document = parse_json(text, where, remedy)
         with as_described("is not a sweep", where, remedy):
@@ -262,7 +262,7 @@ class Sweep:
 
     @property
     def cases_per_shard(self) -> int:
-        """Number of cases in a shard; it depends on the file only, not on the workers."""
+        """Number of cases in a shard; it depends only on the file, not on the workers."""
         return _cases_per_shard(self.document)
 
     @property
@@ -271,12 +271,12 @@ class Sweep:
         return -(-self.size // self.cases_per_shard)
 
     def shard(self, index: int) -> Iterator[SweepCase]:
-        """The cases of a shard, which is counted from 0."""
+        """The cases of a shard; shards are counted from 0."""
         start = index * self.cases_per_shard
         return map(self.case, range(start, min(start + self.cases_per_shard, self.size)))
 
     def case(self, index: int) -> SweepCase:
-        """A case by its place in the product, from 0; it is the same in any sweep of its seed that has it."""
+        """A case by its place in the product, from 0; equal cases of sweeps with the same seed are identical."""
         point, replicate = divmod(index, self.document.replicates)
         places = np.unravel_index(point, tuple(map(len, self.axes)))
         rig, conditions, sensor, truth, scatter, effects = (
@@ -288,9 +288,9 @@ class Sweep:
             "truth": truth,
             "effects": effects,
         }
-        if scatter:  # a case without has the contents, and so the seed, of a file that knows none
+        if scatter:  # without scatter, contents and seed must equal those of a file without the table
             physics["scatter"] = scatter
-        # The seed depends on what the case holds, not on its place in the product; from 0 to 2⁶³ − 1.
+        # The seed, from 0 to 2⁶³ − 1, depends on the contents of the case, not on its place in the product.
         contents = json.dumps({"rig": self.rigs[rig], **physics}, sort_keys=True, allow_nan=False)
         words = np.frombuffer(hashlib.sha256(contents.encode()).digest(), dtype="<u4").tolist()
         sequence = np.random.SeedSequence(self.document.seed, spawn_key=(*words, replicate))
@@ -330,7 +330,7 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
 
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
-    """Refuse a sweep that is too large before it is expanded, with what is too many and the limit."""
+    """Refuse a sweep that is too large before expanding it, naming the excessive number and its limit."""
     lengths = axis_lengths(document)
     for name, length in lengths.items():
         check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")
@@ -358,7 +358,7 @@ def _cases_per_shard(document: SweepDocument) -> int:
 
 
 def _samples(table: ConditionsTable, rate: float) -> float:
-    """Of the longest case of some conditions, at a rate in Hz."""
+    """Number of samples of the longest case of some conditions, at a rate in Hz."""
     return run_count(table) * max(table.duration) * rate
 
 
@@ -367,7 +367,7 @@ def read_sweep(path: Path, estimators: Sequence[str] = ()) -> Sweep:
 
     Args:
         path: a TOML file; paths of rig files are relative to its folder.
-        estimators: names of further ones to estimate with.
+        estimators: names of further estimators.
     """
     content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
     where = shown(path)
@@ -388,11 +388,11 @@ def read_sweep(path: Path, estimators: Sequence[str] = ()) -> Sweep:
         sections = rig_document(None if rig.file is None else path.parent / rig.file)
         for name, changes in rig.changes.items():
             old = sections.get(name, {})
-            # Anything but a table is left for the rig's own check to refuse.
+            # Values other than tables are refused by the check of the rig.
             sections[name] = {**old, **changes} if isinstance(old, dict) else old
         parse_rig(sections, f"{where}, rig '{rig.name}'")
         rigs.append(sections)
-    # Files and changes of the rigs are left out: what they give is stored.
+    # Files and changes of the rigs are left out: the resulting descriptions are stored.
     names = [table.model_copy(update={"file": None, "changes": {}}) for table in document.rig]
     sweep = Sweep(document.model_copy(update={"rig": names}), tuple(rigs))
     _check_cases(sweep, where)
@@ -427,7 +427,7 @@ def _check_names(document: SweepDocument, where: str) -> None:
 
 
 def _check_cases(sweep: Sweep, where: str) -> None:
-    """Refuse a value that occurs twice in an axis, and what the simulator would refuse."""
+    """Refuse duplicate values in an axis, and cases that the simulator would refuse."""
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     lengths = axis_lengths(sweep.document)

@@ -1,8 +1,8 @@
-"""Summary of a sweep: error against noise, speed, spring and severity, per estimator, with intervals.
+"""Summary of a sweep: error against noise, speed, spring and severity, by estimator, with intervals.
 
 Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
-pooled. Lines along noise, speed and spring use the cases without effects and without scatter where the sweep has
-such cases. Without effects is also severity 0.
+pooled. Lines along noise, speed and spring use the cases without effects and without scatter, if the sweep has any.
+Cases of severity 0 count as cases without effects.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ BRACKETS = (
 _TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
 _ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
-_WIDE = 10.0  # ratio of the largest to the least value from which an axis is drawn logarithmic
+_WIDE = 10.0  # ratio of the largest to the least value above which an axis is logarithmic
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Line:
 
     Args:
         axis: a key of `AXES`, ``severity`` or ``all``.
-        effect: the effect whose severity it is; otherwise the pooled effects.
+        effect: the effect for the axis ``severity``; otherwise the pooled effects.
         at: the value on the axis, in its unit; None for ``all``.
         at_unit: unit of the axis.
         quantity: its name; ``omega_n`` and ``zeta`` are those of single runs.
@@ -140,7 +140,7 @@ def summarise(store: Store) -> list[Line]:
 
 
 def unanswered(store: Store) -> dict[str, tuple[str, ...]]:
-    """Quantities by estimator that it gives in no case, without saying that it failed in all of them."""
+    """Quantities by estimator that it gives in no case, unless its status is a failure in all cases."""
     import polars as pl
 
     given = pl.when(pl.col("value").is_not_null()).then(1.0).alias("value")
@@ -167,7 +167,7 @@ def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line
 
 
 def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
-    """The cases whose runs repeat exactly, but for one number that may scatter; all where there are none."""
+    """The cases whose runs repeat exactly, except for the scatter ``but``; all cases where there are none."""
     found = data
     for column in SCATTER_COLUMNS:
         found = found if column == but else found.filter(found[column] == 0.0)
@@ -175,7 +175,7 @@ def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
 
 
 def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
-    """The parts at each value of an axis, ascending; none where it has one value, or rows without."""
+    """The parts at each value of an axis, ascending; none where it has only one value, or rows lack it."""
     values = sorted(set(data[axis].drop_nulls()))
     if len(values) < 2 or data[axis].null_count():
         return []
@@ -183,7 +183,7 @@ def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
 
 
 def _score(data: pl.DataFrame) -> Score:
-    """In % of the truth, or in the quantity's unit where a truth is zero."""
+    """The score in % of the truth, or in the quantity's unit where a truth is zero."""
     truth = data["truth"].to_numpy()
     relative = bool(np.all(truth != 0.0))
     kept = data["value"].is_not_null().to_numpy()
@@ -234,7 +234,7 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
             if not drawn:
                 continue
             at = [float(line.at) for line in drawn if line.at is not None]
-            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # intervals must not hide each other
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # keeps intervals from hiding each other
             if logarithmic:
                 at = [x * (max(at) / min(at)) ** aside for x in at]
             else:
@@ -275,14 +275,14 @@ def _label(line: Line) -> str:
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
-    """Bias, RMSE, coverage and failures of each estimator and quantity over all cases but those of `_repeating`.
+    """Bias, RMSE, coverage and failures of each estimator and quantity over the cases of `_repeating`.
 
-    Its title says which cases these are.
+    The title names these cases.
     """
     every = list(lines)
     kept = [line for line in every if line.axis == OVERALL]
     pooled = "without effects" if all(line.effect == NO_EFFECT for line in kept) else "with effects pooled"
-    # where cases scatter and others do not, only the others are in the table
+    # if only some cases have scatter, the table has only the others
     scattering = {line.at for line in every if line.axis in SCATTER_COLUMNS and line.at is not None}
     repeating = " and without scatter" if 0.0 in scattering else ""
     result = table(

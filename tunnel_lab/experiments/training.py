@@ -43,21 +43,21 @@ from tunnel_sim.vocabulary.record import Array
 FALSE_ALARMS = 0.01
 """Share of calibration samples, like those of the training, that are called unlike them."""
 _KEPT_EVERY = 250  # steps between checkpoints
-_SHRINK = 0.05  # of the context's covariance towards its mean variance
+_SHRINK = 0.05  # shrinkage of the context's covariance towards its mean variance
 _LETTERS = {"record": "r", "campaign": "c"}
 Progress = Callable[[str, int, int], None]
 INPUTS = ("rivals", "runs", "valid", "shifts")
 """The network's arguments, by their names among the samples."""
 FAR = 3e4
 """Standard deviations beyond which a sample is left out: the nominal fit is of another oscillation."""
-_EFFECTS_WEIGHT = 0.1  # of the effects' cross entropy beside the posterior's
-_LEAST_STD = 0.05  # of an input over the training set
+_EFFECTS_WEIGHT = 0.1  # weight of the effects' cross entropy against the posterior's
+_LEAST_STD = 0.05  # least standard deviation of an input over the training set
 _GREATEST_GRADIENT = 5.0
 
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """Everything that a training depends on: shards of two hundred campaigns each, and batches of each network."""
+    """The specification of a training: shards of two hundred campaigns each, and batches of each network."""
 
     seed: int = 1
     shards: int = 15
@@ -71,11 +71,11 @@ class TrainingSpec:
 def train(
     spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
+    """Simulate the missing shards, and fit both networks; finished work in the folder is kept and used.
 
     Args:
-        jobs: processes that simulate; the result does not depend on their number.
-        progress: called with what is done, how much of it is finished, and of how much.
+        jobs: number of simulating processes; the result does not depend on it.
+        progress: called with the name of the step, the amount finished, and the total.
 
     Returns:
         The safetensors file, and the record of the training as JSON.
@@ -84,7 +84,7 @@ def train(
         TunnelError: when the folder belongs to another seed, or cannot be written.
     """
     output_folder(folder)
-    path = folder / "sizes.json"  # of the forms; it also marks the folder as one of this seed
+    path = folder / "sizes.json"  # sizes of the forms; the file also identifies the seed of the folder
     if not path.exists():
         write_json(path, {"seed": spec.seed, "sizes": sizes_at_unit_excess(spec.seed)})
     document = read_json(path, remedy="remove the folder")
@@ -145,7 +145,7 @@ def train(
 def _fitted(
     kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
 ) -> dict[str, Array]:
-    """The weights of one network, from the checkpoint of the same training on, where there is one."""
+    """The weights of one network; the fit continues from the checkpoint of the same training, if any."""
     mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in samples.items())])
     path = folder / f"{kind}.part.safetensors"
     state = None
@@ -172,7 +172,7 @@ def _fitted(
 
 
 def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Array:
-    """What the score of unlikeness uses, shape (samples, c)."""
+    """The contexts for the score of unlikeness, shape (samples, c)."""
     output = forward(np, weights, *(samples[name] for name in INPUTS))
     return np.asarray(output.context, dtype=np.float64)
 
@@ -180,7 +180,7 @@ def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Arra
 def judged(
     weights: dict[str, Array], samples: Mapping[str, Array], apart: Mapping[str, Array]
 ) -> TrainedPosterior:
-    """The network with its threshold, from samples it was not fitted to."""
+    """The network with its threshold, from held-out samples."""
     seen = contexts(weights, samples)
     covariance = np.cov(seen.T)
     covariance += _SHRINK * float(np.trace(covariance)) / len(covariance) * np.eye(len(covariance))
@@ -193,11 +193,11 @@ def judged(
 
 @dataclass(frozen=True)
 class FitSpec:
-    """How a network is fitted.
+    """Settings of a network's fit.
 
     Args:
         steps: number of batches.
-        rate: greatest learning rate, dimensionless; it falls to zero as a cosine.
+        rate: greatest learning rate, dimensionless; a cosine schedule reduces it to zero.
     """
 
     seed: int = 1
@@ -208,7 +208,7 @@ class FitSpec:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Progress of a fit, on which the next step depends: weights, moments of the gradients by Adam, steps done."""
+    """State of a fit: weights, Adam's moments of the gradients, number of steps done."""
 
     weights: dict[str, Array]
     moments: dict[str, Array]
@@ -216,7 +216,7 @@ class State:
 
 
 def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
-    """The samples of a kind whose target is not absurdly far from the nominal fit, without the kind's prefix."""
+    """The samples of a kind without its prefix, except those with targets very far from the nominal fit."""
     mine = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
     if not all(np.all(np.isfinite(values)) for values in mine.values()):
         raise ValueError("internal error: a training sample is not finite")
@@ -253,7 +253,7 @@ def fit(
     progress: Callable[[int, float], None] = lambda _step, _loss: None,
     until: int | None = None,
 ) -> State:
-    """Continue a fit until a step, the last one where None; progress is called with the step and its loss."""
+    """Continue a fit until a step (None: the last); progress is called with the step and its loss."""
     import torch
 
     torch.set_num_threads(1)
@@ -295,7 +295,7 @@ def fit(
 
 
 def losses(xp: Any, weights: Mapping[str, Any], batch: Mapping[str, Any]) -> tuple[Any, Any]:
-    """What the fit lowers, means over the samples, in numpy or torch.
+    """The losses of the fit, means over the samples, in numpy or torch.
 
     Returns:
         The negative logarithm of the posterior's density at the truth, per quantity, and the cross entropy of the

@@ -1,7 +1,7 @@
 """Training samples: features of simulated campaigns and of their runs with the truth, in shards on disk.
 
-A shard is simulated together and depends on the seed, its part and its number only, so its bits do not depend on
-the number of processes.
+A shard is simulated together and depends only on the seed, its part and its number; it is bit-identical for any
+number of processes.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ VARIANTS = 3
 """Readings of each campaign: of other noise levels, lengths and numbers of runs."""
 MOST_RUNS = 16
 _SUBSTEPS = 2
-_NOISE = (0.3, 8.0)  # noise over the drawn one, in the variants after the first
+_NOISE = (0.3, 8.0)  # factor on the drawn noise, in the variants after the first
 SAMPLE_RATE = 250.0
 """Hz; the noise is reduced in proportion to the root of the rate, so that as much is known as at 1000 Hz."""
 DURATION = 10.0
 KINDS: Mapping[str, float] = {"none": 0.25, "single": 0.4, "pair": 0.15, "three": 0.12, "four": 0.08}
 _MIXTURE = Mixture(textbook=0.4, rare=0.0)
-_UNIT = 3.0  # excess at which the forms are scaled
+_UNIT = 3.0  # excess to which the forms are scaled
 _ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class ShardSpec:
-    """What a shard depends on; its part is one of `PARTS`."""
+    """The specification of a shard; its part is one of `PARTS`."""
 
     seed: int
     part: str
@@ -61,7 +61,7 @@ class ShardSpec:
 
 
 def write_shard(spec: ShardSpec, folder: Path) -> Path:
-    """Write the samples of a shard: names begin with ``c.`` for campaigns, with ``r.`` for records."""
+    """Write the samples of a shard; names begin with ``c.`` for campaigns and ``r.`` for records."""
     samples = [
         sample
         for campaign, conditions, families, number in readings_of(spec)
@@ -82,7 +82,7 @@ def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
 
 
 def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
-    """Draw and simulate the campaigns of a shard: each reading of each campaign.
+    """Draw and simulate the campaigns of a shard, and yield each reading of each campaign.
 
     Yields:
         A reading with its true conditions, the families of its effects and its number in the campaign.
@@ -95,7 +95,7 @@ def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[st
         if not np.all(np.isfinite(motion.angle)) or np.abs(motion.angle).max() > 1.0:
             continue
         for number in range(VARIANTS):
-            # variants after the first have another level of noise, and may lose their end and some runs
+            # variants after the first have another noise level, and may be shorter and lack some runs
             read, first = draw, number == 0
             if not first:
                 factor, c = float(np.exp(rng.uniform(*np.log(_NOISE)))), draw.conditions
@@ -136,8 +136,8 @@ def reduced(
 
     Args:
         truth: coefficients by name, SI.
-        families: effects that act.
-        first_run: its number is that of the record, modulo the number of runs.
+        families: families of the acting effects.
+        first_run: number of the record's run, modulo the number of runs.
     """
     labels = np.array([float(name in families) for name in FAMILIES])
     seen = [(run, demodulate(run.record)) for run in campaign.runs]
@@ -204,7 +204,7 @@ def _sample(kind: str, features: Features, truth: Array, labels: Array) -> dict[
 
 
 def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> CampaignDraw:
-    """Draw one campaign; sizes are the magnitude of every form's parameter at the unit excess, by `label`."""
+    """Draw one campaign; sizes are the magnitudes of the forms' parameters at the unit excess, by `label`."""
     kind = str(rng.choice(np.array(list(KINDS)), p=list(KINDS.values())))
     draw = draw_campaign(rng, kind=kind, mixture=_MIXTURE)
     while any(e.form.family == ROD for e in draw.effects) and len(draw.effects) > 1:
@@ -239,7 +239,7 @@ def label(form: Form) -> str:
 
 
 def at_low_rate(c: Conditions) -> Conditions:
-    """The campaign at the sample rate of training: white noise carries as much information as before."""
+    """The campaign at the sample rate of training, with white noise of unchanged information."""
     share = SAMPLE_RATE / c.sample_rate
     white = (1.0 - c.coloured_share) * c.noise_std**2 * share
     coloured = c.coloured_share * c.noise_std**2
@@ -251,7 +251,7 @@ def at_low_rate(c: Conditions) -> Conditions:
         coloured_share=coloured / (white + coloured),
         noise_corner=min(c.noise_corner, 0.3 * SAMPLE_RATE),
         resolution=c.resolution * float(np.sqrt(share)),
-        air_density=round(float(np.mean(c.air_density)), 4),  # as the campaign will state it
+        air_density=round(float(np.mean(c.air_density)), 4),  # rounded as in the campaign's statement
         stamp_step=0.0,
         time_scale=1.0,
         moment_scale=1.0,
@@ -259,7 +259,7 @@ def at_low_rate(c: Conditions) -> Conditions:
 
 
 def sizes_at_unit_excess(seed: int) -> dict[str, float]:
-    """The magnitude at which each common form has about the unit excess, in one campaign."""
+    """The magnitude of each common form that gives about the unit excess in one campaign."""
     forms = [form for form in FORMS if form.group is not Group.RARE and not form.driven]
     root = np.random.SeedSequence(seed)
     draws = []
@@ -285,29 +285,29 @@ def sizes_at_unit_excess(seed: int) -> dict[str, float]:
 
 
 def nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
-    """A draw whose one effect is nearer to the unit excess.
+    """A draw with its one effect nearer to the unit excess.
 
     Args:
-        excess: of the draw, in noise powers (a ratio); infinite where the motion grows without bound.
+        excess: of the draw, in noise variances (a ratio); infinite where the motion grows without bound.
     """
     effect = draw.effects[0]
     if np.isfinite(excess):
         factor = float(np.sqrt(_UNIT / max(excess, 0.03)))
-    else:  # too much of an effect, or so small a lag that the steps do not resolve it
+    else:  # too large an effect, or a lag too small for the steps
         factor = 3.0 if effect.value < effect.form.start else 0.1
     value = _clipped(effect.form, effect.value * float(np.clip(factor, 0.2, 10.0)))
     return replace(draw, effects=(replace(effect, value=value),))
 
 
 def _clipped(form: Form, value: float) -> float:
-    # At the low rate a sample is the least time that can be lost.
+    # At the low rate one sample is the shortest possible loss.
     lost = LOST_SAMPLES.get(label(form))
     least = form.limits[0] if lost is None else lost / SAMPLE_RATE
     return float(np.clip(value, least, form.limits[1]))
 
 
 def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
-    """Integrate campaigns together; those with a flexible rod, which act alone, in closed form."""
+    """Integrate campaigns together; campaigns with a flexible rod, always a single effect, in closed form."""
     bound = [bind_effects(draw) for draw in draws]
     rigid = [place for place, (c, _) in enumerate(bound) if c.rod is None]
     terms = [[term for term in bound[place][1] if isinstance(term, Term)] for place in rigid]

@@ -61,12 +61,12 @@ SOFTENING = (
     parse_effect("cubic_stiffness:coefficient=-0.39"),
     parse_effect("quadratic_damping:coefficient=0.0038"),
 )
-# N m s/rad: what Tables III and IV leave, and what is left beside a quadratic damping that does part of it.
+# N m s/rad: the damping of Table III beyond Table IV's Cnr, alone and beside a quadratic damping.
 _MECHANICAL_DAMPING, _DAMPING_BESIDE_QUADRATIC = 0.0095, 0.0035
 
 
 def figure_3(folder: Path) -> Section:
-    """Errors of both networks on responses that were not trained on."""
+    """Errors of both networks on held-out responses."""
     errors = fig3_errors(shipped_networks(), np.random.default_rng(3))
     save_both(error_figure(errors), folder / "network-errors.png")
     zeta, omega = (float(np.abs(e).max()) for e in (errors.zeta_percent, errors.omega_percent))
@@ -93,7 +93,7 @@ def figure_3(folder: Path) -> Section:
 
 
 def table_3(folder: Path) -> Section:
-    """Windows of three cycles: the paper's run, and simulated ones."""
+    """Windows of three cycles: the paper's run, and simulated runs."""
     from tunnel_sim import simulate_campaigns
 
     plans = {"linear": paper_run_plan(_SEED), "softening": paper_run_plan(_SEED, effects=SOFTENING)}
@@ -173,7 +173,7 @@ def table_4(_: Path) -> Section:
     spring = infer_springs()[0]
     beta = paper_derivatives()[0].cn_beta_per_rad * (spring.wind_speed / _SPEED) ** 2
     again = (f"from Table III's mean ωn, spring {spring.spring} at {_SPEED:g} m/s", f"{beta:.3f}", "–", "–")
-    closer = []  # which of the paper's two methods has the smaller error of Cnβ
+    closer = []  # the paper's method with the smaller error of Cnβ
     for name in ("linear, noise", "softening, noise"):
         found = closeness_of[name]
         errors = {method: abs(found[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in found}
@@ -236,7 +236,7 @@ def figures_4_to_6(folder: Path) -> Section:
 
 @styled
 def error_figure(errors: HeldOutErrors) -> Figure:
-    """Fig. 3: the error of ζ against ζ and of ωn against ωn, in %, on responses that were not trained on."""
+    """Fig. 3: the error of ζ against ζ and of ωn against ωn, in %, on held-out responses."""
     fig = figure(WIDTH, 2.9)
     left, right = fig.subplots(1, 2)
     left.plot(errors.zeta, errors.zeta_percent, ".", ms=1.5, color=BLUE)
@@ -261,7 +261,7 @@ def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[Window
     panels[1].plot(number, [row.omega_n_rad_per_s for row in rows], "o-", color="black", ms=4)
     for place, (label, windows) in enumerate(shown.items()):
         kept = list(windows)[: number.size]
-        aside = 0.14 * (place - 0.5 * (len(shown) - 1))  # intervals must not hide each other
+        aside = 0.14 * (place - 0.5 * (len(shown) - 1))  # keeps intervals from hiding each other
         for axes, name in zip(panels, ("zeta", "omega_n"), strict=True):
             values = [getattr(window, name) for window in kept]
             axes.errorbar(
@@ -286,7 +286,7 @@ def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[Window
 def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple[float, float]) -> Figure:
     """Figs 4 to 6: the record and the responses regenerated from each method's ζ and ωn.
 
-    The whole record is above, a stretch of it (from and to, s) in the middle, what is left of it below.
+    The whole record is at the top, a magnified interval (from and to, s) in the middle, residuals at the bottom.
     """
     fig = figure(WIDTH, 6.4)
     whole, part, residual = fig.subplots(3, 1)
@@ -316,7 +316,7 @@ def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple
 
 @dataclass(frozen=True, eq=False)
 class HeldOutErrors:
-    """Fig. 3: errors on responses that were not trained on.
+    """Fig. 3: errors on held-out responses.
 
     Args:
         zeta: true damping ratios, shape (n,).
@@ -332,7 +332,7 @@ class HeldOutErrors:
 
 
 def fig3_errors(networks: Networks, rng: np.random.Generator) -> HeldOutErrors:
-    """Put responses over the training range through both networks, noise-free."""
+    """Evaluate both networks on noise-free responses over the training range."""
     zeta, omega = held_out_points(networks.spec, rng)
     estimates = networks.zeta(network_inputs(zeta))
     omega_found = networks.omega_n(estimates, cycles_time(zeta, omega))
@@ -341,13 +341,13 @@ def fig3_errors(networks: Networks, rng: np.random.Generator) -> HeldOutErrors:
 
 @dataclass(frozen=True)
 class SpringInference:
-    """What one spring of Table II would imply for the run behind Table III.
+    """The implications of one spring of Table II for the run behind Table III.
 
     Args:
         spring: number.
-        wind_speed: V at which the printed Cnβ brings the spring's wind-off frequency down to the table's
+        wind_speed: V at which the printed Cnβ reduces the spring's wind-off frequency to the table's
             mean, m/s.
-        mechanical_damping: Cr left of the table's mean damping once the printed Cnr is taken off, N m s/rad;
+        mechanical_damping: Cr, the table's mean damping minus the part of the printed Cnr, N m s/rad;
             negative is impossible.
     """
 
@@ -357,13 +357,13 @@ class SpringInference:
 
 
 def infer_springs() -> tuple[SpringInference, ...]:
-    """Which springs can be the one behind Table III: an inference, not a statement of the paper.
+    """The possible springs behind Table III: an inference, not a statement of the paper.
 
-    Each spring's own inertia is Kr/ω0², as in the paper's eqs 10 and 11; Cnβ and Cnr are Table IV's of the
-    neural network, which the paper took from the means of Table III.
+    The inertia of each spring is Kr/ω0², as in the paper's eqs 10 and 11; Cnβ and Cnr are the neural network's in
+    Table IV, which the paper took from the means of Table III.
 
     Returns:
-        One row per spring whose wind-off frequency lies above the table's mean, as a positive Cnβ demands.
+        One row per spring whose wind-off frequency is above the table's mean, as a positive Cnβ requires.
     """
     rows = paper_windows()
     omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))
@@ -383,10 +383,10 @@ def infer_springs() -> tuple[SpringInference, ...]:
 
 
 def paper_run_plan(seed: int, *, noisy: bool = True, effects: tuple[EffectSetting, ...] = ()) -> CampaignPlan:
-    """Spring 5 with the wind off and on, released at 20°: what Table III's run may have been, an inference.
+    """Spring 5 with the wind off and on, released at 20°: possibly the run of Table III, an inference.
 
     Args:
-        noisy: noise of 0.0005 rad and 12 bits; else neither.
+        noisy: whether to add noise of 0.0005 rad and 12-bit quantisation.
     """
     plan = paper_plan()
     off = next(
@@ -403,7 +403,7 @@ def paper_run_plan(seed: int, *, noisy: bool = True, effects: tuple[EffectSettin
 
 @dataclass(frozen=True)
 class Closeness:
-    """How close a method comes on one campaign.
+    """The errors of a method on one campaign.
 
     Args:
         cn_beta: error of Cnβ, % of the truth.

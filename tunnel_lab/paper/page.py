@@ -1,4 +1,4 @@
-"""The page on the paper: its sections, each computed once, so that an interrupted run continues."""
+"""The page on the paper: its sections, each computed once; an interrupted run can be continued."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG in the page's folder, beside which a PDF stands for figures, and its caption."""
+    """A PNG in the page's folder, for figures with a PDF beside it, and its caption."""
 
     __pydantic_config__ = _STRICT
 
@@ -37,7 +37,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """What a table or figure of the paper says and what is found here: theirs and ours in a line each."""
+    """A table or figure of the paper and our result: theirs and ours in a line each."""
 
     __pydantic_config__ = _STRICT
 
@@ -53,7 +53,7 @@ class Section:
 
 
 def signed(value: float, digits: int) -> str:
-    """A number with its sign; zero has none.
+    """A number with its sign, except zero.
 
     Args:
         value: in any unit.
@@ -67,7 +67,7 @@ def scaled(quantity: Quantity | None, factor: float) -> Quantity | None:
     """An estimate in another unit.
 
     Args:
-        factor: the old unit in new ones.
+        factor: the old unit in the new unit.
     """
     return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.std, "")
 
@@ -83,16 +83,16 @@ def write_paper(
     *,
     progress: Callable[[int, int, str], None] = lambda *_: None,
 ) -> tuple[Path, dict[str, Section]]:
-    """Compute what is missing, and write the page.
+    """Compute the missing parts, and write the page.
 
     Args:
         folder: of the page, its pictures and finished parts; made where it does not exist.
         parts: all parts by name, in the order of the page.
-        names: parts to compute where they are not finished; finished ones stay in the page.
-        progress: called with the number finished, of how many, and the next part's name.
+        names: parts to compute unless finished; finished parts remain in the page.
+        progress: called with the number finished, the total, and the next part's name.
 
     Raises:
-        TunnelError: when the folder cannot be written to, or a kept part is damaged.
+        TunnelError: when the folder cannot be written to, or a finished part is damaged.
     """
     kept = output_folder(output_folder(folder) / _PARTS)
     for place in (folder, kept):
@@ -122,7 +122,7 @@ def write_paper(
 
 
 def render(sections: Mapping[str, Section]) -> str:
-    """The page as HTML; its pictures stand beside it."""
+    """The page as HTML, with its pictures in the same folder."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(

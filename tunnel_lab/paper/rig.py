@@ -128,7 +128,7 @@ def table_2(folder: Path) -> Section:
 
 
 def equations(_: Path) -> Section:
-    """The slips of the printed equations, and what they give where the truth is known."""
+    """The slips of the printed equations, and their results where the truth is known."""
     known = known_run()
     beta = known.cn_beta_of(eq7(known.on, known.off))
     right, wrong = (known.cn_r_of(eq8(known.on, known.off, printed=printed)) for printed in (False, True))
@@ -209,7 +209,7 @@ def figure_2(folder: Path) -> Section:
 
 @styled
 def springs_figure(springs: Sequence[SpringRow], fit: SpringFit, stated: float) -> Figure:
-    """The springs and their line, and how far each is from it.
+    """The springs with the fitted line, and the deviation of each.
 
     Args:
         springs: of Table II.
@@ -244,7 +244,7 @@ def springs_figure(springs: Sequence[SpringRow], fit: SpringFit, stated: float) 
 
 @styled
 def impulse_figure() -> Figure:
-    """Fig. 2: impulse responses over ωn t, the largest value 1; and eq. 12 as printed for one of them."""
+    """Fig. 2: impulse responses over ωn t, the largest value 1; one of them also by eq. 12 as printed."""
     fig = figure(WIDTH, 3.0)
     axes = fig.add_subplot()
     time = np.linspace(0.0, 6.6 * np.pi, 1200)
@@ -318,7 +318,7 @@ class KnownRun:
 
 
 def known_run() -> KnownRun:
-    """Spring 5 at 10 m/s with the paper's coefficients: the run that Table III may be of, an inference."""
+    """Spring 5 at 10 m/s with the paper's coefficients: possibly the run of Table III, an inference."""
     plan, rig = paper_run_plan(1), load_rig()
     truth, on = plan.truth, plan.conditions[1]
     air = rig.body.flow(rig.air.density, on.wind_speed)
@@ -339,7 +339,7 @@ def eq7(on: Oscillation, off: Oscillation) -> float:
 
 
 def eq8(on: Oscillation, off: Oscillation, *, printed: bool) -> float:
-    """N̂r, 1/s; as printed its first term is squared, which is not of that unit."""
+    """N̂r, 1/s; as printed, its first term is squared and has the wrong unit."""
     first = on.half_time**-2 if printed else 1.0 / on.half_time
     return -2.0 * LN2 * (first - 1.0 / off.half_time)
 

@@ -52,7 +52,7 @@ ONE_RIG = 1.5
 """Frequencies within this factor share one plot in absolute units."""
 MOST_PANELS = 24
 _COLUMNS = 3
-_POINTS = 2000  # least and greatest readings of as many stretches are drawn
+_POINTS = 2000  # number of intervals whose least and greatest readings are drawn
 _GREY = "0.6"
 
 
@@ -88,7 +88,7 @@ def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
                 axes.set_ylabel("angle β [rad]")
             if place > len(runs) - columns:
                 axes.set_xlabel("time [s]")
-            if run.drive is not None:  # on an axis of its own at the right, behind the response
+            if run.drive is not None:  # on a separate axis at the right, behind the response
                 beside = axes.twinx()
                 beside.plot(*with_breaks(time, run.drive.values), color=_GREY, linewidth=0.5)
                 beside.set_ylabel(f"{run.drive.kind.noun} [{unit_mark(run.drive.kind.unit)}]", color="0.4")
@@ -135,8 +135,8 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
 def spectrum(run: Run) -> tuple[Array, Array]:
     """Power spectral density of a run's angle, averaged over sixtieths of a decade.
 
-    Frequencies below two cycles in the record are left out: there a Hann window passes the mean and the trend of
-    the decay, and not a motion.
+    Frequencies below two cycles in the record are left out, because there a Hann window passes the mean and the
+    trend of the decay.
 
     Returns:
         Frequency in Hz and density in rad²/Hz, shape (n,) each.
@@ -160,8 +160,8 @@ def spectrum(run: Run) -> tuple[Array, Array]:
 def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
     """Estimates of each estimator against the injected values, a row for each quantity.
 
-    On the left is the error in reported standard deviations with the interval that holds 95 % of them, on the right
-    the standard deviations in % of the truth, on a logarithmic scale.
+    On the left is the error in reported standard deviations, with the interval expected to contain 95 % of the
+    errors. On the right are the standard deviations in % of the truth, on a logarithmic scale.
 
     Args:
         truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that name.
@@ -200,9 +200,9 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
 def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
-    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs past the sixth
-    and those with fewer than two windows are left out. Where the runs differ in frequency, a quantity is shown as
-    its deviation from the weighted mean of its run, so that only its change with the amplitude is seen.
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs after the sixth
+    and runs with fewer than two windows are left out. Where the runs differ in frequency, each quantity is shown as
+    its deviation from the weighted mean of its run, to show only the change with the amplitude.
     """
     runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]
     centres = [window.omega_n.value for run in runs for window in run.windows]
@@ -249,9 +249,9 @@ def windows_figure(estimate: Estimate) -> Figure:
 
 
 def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
-    """Each value less the weighted mean of all; they are independent and of one unit.
+    """Deviations of independent values of the same unit from their weighted mean.
 
-    The variance of a deviation is that of the value less that of the mean, which has the value in it.
+    The variance of a deviation is the value's variance minus the mean's, because the mean includes the value.
     """
     stds = np.array([quantity.std for quantity in quantities])
     least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
@@ -263,7 +263,7 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
 
 @styled
 def import_picture(imported: Imported) -> bytes:
-    """Draw what was read as PNG: left-out samples are grey, a vertical line marks where a run begins."""
+    """Draw imported records as PNG: left-out samples are grey, vertical lines mark the beginning of runs."""
     from matplotlib.figure import Figure
 
     raws = {id(part.raw): part.raw for part in imported.parts}
@@ -310,14 +310,14 @@ def import_picture(imported: Imported) -> bytes:
 
 
 def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
-    """A curve with few points that looks the same, and that breaks where samples are missing.
+    """A curve with few points that looks the same, broken where samples are missing.
 
     Args:
         time: shape (n,), s.
         reading: shape (n,).
 
     Returns:
-        Times and readings, shape (m,): the least and the greatest reading of each stretch; NaN within a gap.
+        Times and readings, shape (m,): the least and the greatest reading of each interval; NaN within a gap.
     """
     size = time.size // _POINTS
     if size > 1:

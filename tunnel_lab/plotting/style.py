@@ -1,4 +1,4 @@
-"""What all figures have in common, and how they are written. matplotlib is imported inside the functions.
+"""The common style of all figures, and their output. matplotlib is imported inside the functions.
 
 The colours follow Okabe and Ito (2008), which colour-blind readers can distinguish.
 """
@@ -54,7 +54,7 @@ _STYLE = RLock()
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """A function that draws in the style of `figures.mplstyle`, without changing the settings of the process."""
+    """A function drawing in the style of `figures.mplstyle`, without changing the settings of the process."""
 
     @wraps(draw)
     def drawn(*args: P.args, **named: P.kwargs) -> R:
@@ -68,7 +68,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 
 
 def figure(width: float, height: float) -> Figure:
-    """An empty figure; made without pyplot, so that no global state is touched.
+    """An empty figure, made without pyplot to avoid global state.
 
     Args:
         width: inches.
@@ -80,7 +80,7 @@ def figure(width: float, height: float) -> Figure:
 
 
 def text_width(text: str, points: float) -> float:
-    """Width of a text in inches, of its longest line.
+    """Width of the longest line of a text, inches.
 
     Args:
         text: without formulas.
@@ -98,18 +98,18 @@ def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
 
 
 def log_axis(axes: Axes, which: Literal["x", "y"], room: float = inf) -> None:
-    """Make an axis logarithmic, with labels that are few enough not to touch.
+    """Make an axis logarithmic, with labels few enough not to touch.
 
-    Matplotlib labels the ticks between the powers of ten as well, as 6×10⁰, where an axis is short.
+    On a short axis Matplotlib also labels ticks between the powers of ten, such as 6×10⁰.
 
     Args:
-        axes: whose data are drawn, because the labels depend on the limits.
-        room: length of a horizontal axis, inches, where it may be too short for the labels.
+        axes: with their data already drawn, because the labels depend on the limits.
+        room: length of a horizontal axis, inches, if it may be too short for the labels.
     """
     from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
     least = axes.dataLim.minposx if which == "x" else axes.dataLim.minposy
-    if not np.isfinite(least):  # nothing is drawn that a logarithmic axis could show
+    if not np.isfinite(least):  # no drawn value can be shown on a logarithmic axis
         return
     axis: Axis
     if which == "x":
@@ -151,10 +151,10 @@ def _fit(steps: Sequence[float], limits: tuple[float, float], room: float) -> bo
 
 
 def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
-    """Limit the vertical axis to the values that are known as well as most, with their 95 % intervals.
+    """Limit the vertical axis to values of usual uncertainty, with their 95 % intervals.
 
-    The few that are known far worse, such as those of the last cycles of a decay, would set the scale otherwise.
-    Their intervals cross the axis.
+    Otherwise a few very uncertain values, such as those of the last cycles of a decay, would determine the scale.
+    Their intervals extend beyond the axis.
 
     Args:
         values: shape (n,), in the axis' unit; NaN where there is none.
@@ -170,14 +170,14 @@ def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
 
 
 def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
-    """Curves that break where samples are missing, instead of crossing the gap in a straight line.
+    """Curves broken where samples are missing, instead of a straight line across the gap.
 
     Args:
         time: shape (n,), s, increasing.
-        readings: against it, shape (n,) each.
+        readings: at these times, shape (n,) each.
 
     Returns:
-        The time and the readings, shape (m,) each: in the middle of every gap stands a time whose readings are NaN.
+        The time and the readings, shape (m,) each, with a time in the middle of every gap whose readings are NaN.
     """
     after = np.flatnonzero(gaps(time)) + 1
     middles = 0.5 * (time[after - 1] + time[after])
@@ -185,17 +185,17 @@ def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
 
 
 def figure_text(text: str) -> str:
-    """A text of the user's, such as the id of a run, as matplotlib has to be given it to show it as it is.
+    """A text from the user, such as the id of a run, escaped so that matplotlib shows it unchanged.
 
-    Dollar signs, which would begin a formula, are escaped. A blank goes before a leading underscore, with which a
-    legend would leave the text out.
+    Dollar signs, which would begin a formula, are escaped. A leading underscore, which would hide the text in a
+    legend, is preceded by a blank.
     """
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 @styled
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as ``.png`` or ``.pdf``, completely or not at all; the same figure gives the same file."""
+    """Write a figure as ``.png`` or ``.pdf``, completely or not at all; files are reproducible."""
     form = path.suffix[1:]
     dates = {"CreationDate": None} if form == "pdf" else None
     return write_encoded(path, lambda stream: figure.savefig(stream, format=form, metadata=dates))

@@ -37,9 +37,9 @@ KINDS = {
     "withheld": "withheld from the vocabulary",
     "all": "all",
 }
-_RIGHT_ANSWER = {"withheld": "unknown"}  # the others are answered by their name
-_CELL, _NAMES, _RIGHT = 0.19, 1.6, 1.0  # inches: a cell, the names beside the rows, the shares
-_DARK = 0.55  # share of the colour from which white text is legible
+_RIGHT_ANSWER = {"withheld": "unknown"}  # the right answer of the others is their name
+_CELL, _NAMES, _RIGHT = 0.19, 1.6, 1.0  # inches: a cell, the row names, the shares
+_DARK = 0.55  # share of the colour above which white text is legible
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def _section(
 
 
 def _answer_sections(score: Score) -> list[ScoreSection]:
-    """Whether answers are right, and as often as they state."""
+    """Correctness of the answers, and calibration of their probabilities."""
     alarms = {
         "a cause named where none acts": score.false_alarms(),
         "no cause named where one acts": score.missed(),
@@ -138,7 +138,7 @@ _OF_SCATTER = {
 
 
 def _scatter_sections(score: Score) -> list[ScoreSection]:
-    """What is found of the scatter between runs; none where there is none."""
+    """Findings on the scatter between runs; empty where there are none."""
     found = score.scatter()
     if found is None:
         return []
@@ -174,7 +174,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
 
 
 def _other_sections(score: Score) -> list[ScoreSection]:
-    """How far the gaps close, the coefficients, the answers by truth, and the time taken."""
+    """The explained parts of the gaps, the coefficients, the answers by truth, and the time taken."""
     closed, median, low = score.closure()
     pairs, (middle, high, longest) = score.pairs(), score.seconds()
     right, answers = score.right_by_truth(), []
@@ -228,7 +228,7 @@ def _other_sections(score: Score) -> list[ScoreSection]:
 
 
 def origin_lines(score: Score) -> list[str]:
-    """The scored set, and the hashes that seal it."""
+    """The scored set, and its sealing hashes."""
     lines = [counted(len(score.cases), "campaign")]
     if score.excluded:
         lines.append(f"Withheld from the vocabulary: {', '.join(score.excluded)}")
@@ -244,7 +244,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
     """The page in Markdown, with all tables and the full confusion matrix.
 
     Args:
-        figures: addresses of the calibration and of the confusion, relative to the page; empty: not drawn.
+        figures: addresses of the calibration and confusion figures, relative to the page; empty: not drawn.
     """
     withheld = "".join(f" --exclude {name}" for name in score.excluded)
     drawn = f" --figure docs/{figures[0]}" if figures[0] else ""
@@ -336,7 +336,7 @@ def _order(name: str) -> tuple[int, str]:
 
 
 def _brief(share: Proportion) -> str:
-    """Count, number of all, share and interval in one cell; a dash of none."""
+    """Count, total, share and interval in one cell; a dash for no cases."""
     if not share.total:
         return "–"
     count, total, value, interval = _share(share)
@@ -351,10 +351,10 @@ def _share(share: Proportion) -> tuple[str, str, str, str]:
 
 @styled
 def calibration_figure(score: Score) -> Figure:
-    """How often statements are true, against the probability stated.
+    """The share of correct statements against their stated probability.
 
-    A panel of the answers, in bins with Wilson's intervals of 95 %; and, where the answers state them, one of the
-    probabilities that each effect is among the causes, without bins.
+    One panel shows the answers, in bins with Wilson's intervals of 95 %. Another shows the probabilities of each
+    effect being among the causes, without bins, where the answers state these.
     """
     error, bins = score.calibration()
     inclusion = score.inclusion()
@@ -368,7 +368,7 @@ def calibration_figure(score: Score) -> Figure:
     label = f"{number} answers, 95 %"
     panels[0].errorbar(mean, share, yerr=spans, fmt="o-", color=AFTER, ms=4, lw=0.8, label=label)
     for bin_of, x, y in zip(bins, mean, share, strict=True):
-        beside = (5, -5 if y > x else 5)  # below the points that lie high, where the interval is short
+        beside = (5, -5 if y > x else 5)  # below high points, whose intervals are short
         text = str(bin_of.right.total)
         panels[0].annotate(text, (x, y), beside, textcoords="offset points", fontsize=7, va="center")
     panels[0].set(xlabel="stated probability of the answer", ylabel="share of answers that are right")
@@ -395,16 +395,15 @@ def calibration_figure(score: Score) -> Figure:
 
 @styled
 def confusion_figure(score: Score) -> Figure:
-    """What was answered, by the true causes: truths in rows and answers in columns, by the same numbers.
+    """The answers by true causes: truths in rows and answers in columns, numbered alike.
 
-    The colour is the share of the row and the number a count. What is answered as it is stands on the diagonal, in
-    blue.
+    The colour is the share of the row and the number a count. Correct answers are on the diagonal, in blue.
     """
     from matplotlib.patches import Rectangle
 
     truths, columns, counts = confusion(score)
     right = score.right_by_truth()
-    rows = [*columns, *(name for name in truths if name not in columns)]  # to name the columns
+    rows = [*columns, *(name for name in truths if name not in columns)]  # rows name the columns
     fig = figure(_NAMES + _CELL * len(columns) + _RIGHT, 0.9 + _CELL * len(rows))
     axes = fig.add_subplot()
     for name, own_counts in zip(truths, counts.tolist(), strict=True):

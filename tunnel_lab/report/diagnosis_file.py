@@ -1,4 +1,4 @@
-"""The JSON document of a diagnosis: what ``tunnel compare`` reads of it, and its schema."""
+"""The JSON document of a diagnosis: its schema, and the fields that ``tunnel compare`` reads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1
 
 
 class Part(StrictModel):
-    """A part of the document; fields that are not compared are left alone."""
+    """A part of the document; fields that are not compared are not checked."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -94,12 +94,12 @@ class Document(Part):
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
-    """The fields that are compared, of a file that ``tunnel diagnose --json`` wrote, in JSON's types."""
+    """The compared fields of a file from ``tunnel diagnose --json``, in JSON's types."""
     return validate(Document, read_document(path), path).model_dump()
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """The whole document of a diagnosis, of which only the fields that are compared are checked."""
+    """The whole document of a diagnosis; only the compared fields are checked."""
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
     validate(Document, document, path)
@@ -107,7 +107,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 class DiagnosisDocument(Document):
-    """What ``tunnel diagnose --json`` writes; excesses are in noise variances of a sample."""
+    """The document of ``tunnel diagnose --json``; excesses are in noise variances of a sample."""
 
     credible: list[Table] = Field(
         description="effect and probability of the fewest answers that have 0.9 together"
@@ -154,7 +154,7 @@ class DiagnosisDocument(Document):
 
 
 def read_whole(path: Path) -> dict[str, Any]:
-    """The whole document of a diagnosis, of which all fields are checked."""
+    """The whole document of a diagnosis; all fields are checked."""
     document = read_document(path)
     validate(DiagnosisDocument, document, path)
     return document

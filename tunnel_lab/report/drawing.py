@@ -34,12 +34,12 @@ NARROW = 4.4  # inches: legible on a phone without scrolling
 SIGMAS = 3.0
 """Standard deviations within which values count as noise in the figures."""
 _FAINTEST = 0.12
-_STEPS = 48  # of a colour map: an eye sees no steps between them, and a colour bar has as many areas
+_STEPS = 48  # of a colour map: too fine to be visible; a colour bar has the same number of areas
 _NOT_HTML = (
-    re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which name an address
+    re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which contain an address
     re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
 )
-_TAG = re.compile(r"<[^>]+>")  # text between tags may hold any names of runs
+_TAG = re.compile(r"<[^>]+>")  # text between tags may contain any names of runs
 _NAMES = re.compile(r'\s+xmlns(:\w+)?="[^"]*"')  # HTML needs no namespace for SVG
 _OPENING = re.compile(r"<svg[^>]*>")
 _SIZE = re.compile(r' (width|height)="[^"]*"')
@@ -49,14 +49,14 @@ _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
 def array(values: Sequence[float | None]) -> Array:
-    """Numbers of a JSON list, NaN where it says null, shape (n,)."""
+    """Numbers of a JSON list, NaN for null, shape (n,)."""
     return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
 
 def faded(*colours: str) -> Colormap:
-    """A colour map that fades out instead of becoming white, so that it suits a light and a dark page.
+    """A colour map that fades out instead of becoming white, which suits light and dark pages.
 
-    It is of one colour, from faint to opaque; or of two, opaque at the ends and transparent in the middle.
+    It has one colour, from faint to opaque, or two, opaque at the ends and transparent in the middle.
     """
     from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
@@ -70,16 +70,16 @@ def faded(*colours: str) -> Colormap:
 
 
 def colour_bar(figure: Figure, shown: ScalarMappable, axes: Axes, **given: Any) -> None:
-    """A colour bar of single areas, in colours that follow the page's theme; arguments of ``Figure.colorbar``."""
+    """A colour bar of separate areas in the colours of the page's theme; arguments of ``Figure.colorbar``."""
     bar = figure.colorbar(shown, ax=axes, **given)
-    if bar.solids is not None:  # an image otherwise, in the colours of the light page
+    if bar.solids is not None:  # otherwise an image, in the colours of the light page
         bar.solids.set_rasterized(False)
 
 
 def run_labels(maps: Document) -> list[str]:
     """The runs of ``maps`` with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
 
-    A spring is named where there is one, and the wind where any run had some.
+    A spring is named where stated, and the wind speed where any run had wind.
     """
     windy = any(run["wind_speed"] > 0.0 for run in maps["runs"])
     labels = []
@@ -94,9 +94,10 @@ def run_labels(maps: Document) -> list[str]:
 
 
 def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
-    """The unit in which gaps are drawn, and the function from an excess in noise variances to the misfit in it.
+    """The unit in which gaps are drawn, and the function from an excess in noise variances to this unit.
 
-    It is degrees where the readings are angles, standard deviations of the noise for a document without ``misfit``.
+    The unit is degrees for readings of angles, and standard deviations of the noise for a document without
+    ``misfit``.
     """
     misfit = misfit_of(document) or Misfit(1.0, 0.0, "rad")
     unit, factor = unit_shown(misfit.unit) if document["gap"].get("misfit") else ("noise std", 1.0)
@@ -105,15 +106,15 @@ def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
 
 @styled
 def inline_svg(figure: Figure, name: str, description: str) -> str:
-    """A figure as an SVG element, always the same for the same figure, without an address outside the page.
+    """A figure as an SVG element, deterministic and without addresses outside the page.
 
     Args:
-        figure: drawn by matplotlib; its text stays text. Colours of `THEMED` become the style sheet's.
-        name: unique in the page; every id in the element begins with it.
+        figure: drawn by matplotlib; its text remains text. Colours of `THEMED` become the style sheet's.
+        name: unique in the page; the prefix of every id in the element.
     """
     from matplotlib import rc_context
 
-    # Ids are numbered: matplotlib's are hashes of places, which the layout finds to rounding only.
+    # Ids are numbered: matplotlib's are hashes of positions, which the layout reproduces only up to rounding.
     ids: dict[str, str] = {}
 
     def own(given: str) -> str:
@@ -137,5 +138,5 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def shown_text(svg: str) -> str:
-    """The characters that elements of `inline_svg` show, each once, in order."""
+    """The distinct characters in elements of `inline_svg`, in order."""
     return "".join(sorted(set(unescape(_TAG.sub("", svg)))))

@@ -1,4 +1,4 @@
-"""All figures of a diagnosis, by name: its answer, how far the gap closes, and the coefficients."""
+"""All figures of a diagnosis, by name: its answer, the explained part of the gap, and the coefficients."""
 
 from __future__ import annotations
 
@@ -58,15 +58,18 @@ SHOWN = 8
 """Most answers drawn."""
 _LOW = 2.1  # inches: a map on the printed summary
 _STEP_LABEL, _LABEL = 20, 24  # characters in a line of a label
-_LEAST_EXCESS, _LEAST_NOISE = 1e-3, 0.03  # of an excess and of three of it: where the document has no maps
-_VISIBLE = 0.01  # of the axis: a band narrower than this is not seen, and has no key
+_LEAST_EXCESS, _LEAST_NOISE = (
+    1e-3,
+    0.03,
+)  # of an excess and of three standard deviations: for a document without maps
+_VISIBLE = 0.01  # of the axis: a narrower band is invisible, and has no key
 _BESIDE = 7.0  # points between a mark and its text
-_MARK = 5.0  # points: the size of the mark of what is left without a cause alone
-_BEFORE_ZERO = 0.03  # of the axis: a mark at zero is clear of the labels
+_MARK = 5.0  # points: the mark of the residual gap without one cause
+_BEFORE_ZERO = 0.03  # of the axis: keeps a mark at zero clear of the labels
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
-#: By what a law is over: the label of its axis, and the factor on places in radians or seconds.
+#: By independent variable of a law: the label of its axis, and the factor on radians or seconds.
 _AXES = {
     "angle": ("angle [°]", degrees(1.0)),
     "rate": ("rate [°/s]", degrees(1.0)),
@@ -75,7 +78,7 @@ _AXES = {
 
 
 def diagnosis_figures(document: Document) -> dict[str, Figure]:
-    """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where it has them."""
+    """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
     figures: dict[str, Figure | None] = dict(_first_figures(document))
     if document.get("maps"):
         figures |= {
@@ -99,12 +102,12 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
 
 
 def summary_figures(document: Document) -> dict[str, Figure]:
-    """The figures of the printed summary; the fit over the data in several heights, of which the page shows one."""
+    """The figures of the printed summary; the fit over the data in several heights, one of which is shown."""
     return _first_figures(document, _LOW) | where.fit_sheets(document)
 
 
 def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure]:
-    """Where the gap is, in a map of some height in inches, and how far it closes."""
+    """A map of the gap, ``height`` inches high, and the explained part of the gap."""
     located = document.get("maps") and document["causes"]
     place = where.place_figure(document, height) if located else None
     figures = {"place": place, "waterfall": waterfall_figure(document)}
@@ -113,10 +116,10 @@ def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> di
 
 @styled
 def waterfall_figure(document: Document) -> Figure | None:
-    """What is left of the gap as the causes are added one after another; None where no cause is named.
+    """The residual gap as the causes are added one after another; None where no cause is named.
 
-    A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot for
-    the rest, on a linear scale of the root mean square misfit.
+    A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a dot
+    for the rest, on a linear scale of the root mean square misfit.
     """
     steps = document.get("waterfall", [])
     if len(steps) < 2:
@@ -153,13 +156,13 @@ def waterfall_figure(document: Document) -> Figure | None:
         shown[-1] = WITHIN_THE_NOISE
     elif rest:
         shown[-1] += ", material" if rest.get("material") else ", immaterial"
-    # The last cause leaves the rest, which is said in the row of the rest.
+    # The residual after the last cause is given in the row of the rest.
     words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
     _place_texts(axes, words, [left[0], *upper, left[-1]], [*alone, np.nan])
     noise = size(SIGMAS * (excess_std(document) or _LEAST_EXCESS))
     seen = noise > _VISIBLE * axes.get_xlim()[1]
     axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)
-    if seen or np.isfinite(alone).any():  # a key in line with the axis above it
+    if seen or np.isfinite(alone).any():  # a key aligned with the axis above it
         axes.legend(
             loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.0, borderaxespad=0.3,
             handlelength=1.2, columnspacing=1.4,
@@ -168,14 +171,14 @@ def waterfall_figure(document: Document) -> Figure | None:
 
 
 def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks: Sequence[float]) -> None:
-    """Texts to the right of what they belong to, clear of the marks, on an axis that holds them all.
+    """Write texts to the right of their bars or dots, clear of the marks, and extend the axis to hold all texts.
 
     Args:
         words: the text of each row.
         ends: right end of each row's bar or dot, in data units.
         marks: another mark in the row, in data units; NaN: none.
     """
-    axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # sizes are known after the layout only
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # sizes are known only after the layout
     points = 72.0 / axes.figure.dpi
     whole = points * axes.get_window_extent().width
     texts = [
@@ -183,7 +186,7 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
         for row, (text, end) in enumerate(zip(words, ends, strict=True))
     ]
     widths = [_BESIDE + points * text.get_window_extent().width for text in texts]
-    beside = np.fmax(ends, marks)  # where a text stands that has to clear the mark
+    beside = np.fmax(ends, marks)  # position of a text that has to clear the mark
     free = (1.0 + _BEFORE_ZERO) * (1.0 - np.array(widths) / whole) - _BEFORE_ZERO
     reach = float(max(np.max(beside / free), 1.05 * np.max(beside))) or 1.0
     axes.set_xlim(-_BEFORE_ZERO * reach, reach)
@@ -195,7 +198,7 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 
 @styled
 def candidates_figure(document: Document) -> Figure | None:
-    """The answers that are not improbable; None where there are fewer than two, which words say better."""
+    """The answers that are not improbable; None for fewer than two, where words suffice."""
     least = settings_of(document).words.answer_drawn
     shown = [c for c in ranked(document)[:SHOWN] if c["probability"] >= least]
     if len(shown) < 2:
@@ -217,7 +220,7 @@ def candidates_figure(document: Document) -> Figure | None:
 
 @styled
 def closure_figure(document: Document) -> Figure:
-    """Misfit of every run before and after the causes are added; filled where it was held out of the fit."""
+    """Misfit of every run before and after the causes are added; filled marks for runs held out of the fit."""
     runs = document["gap"]["runs"]
     fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
@@ -247,7 +250,7 @@ def closure_figure(document: Document) -> Figure:
 
 @styled
 def coefficients_figure(document: Document) -> Figure | None:
-    """The coefficients that the runs determine, before and after, with 95 % intervals; None where there is none."""
+    """The coefficients that the runs determine, before and after, with 95 % intervals; None without any."""
     before, after = (document["coefficients"][key] for key in ("before", "after"))
     both = [name for name in before if name in after]
     names = [n for n in both if all(given[n].get("determined", True) for given in (before, after))]
@@ -275,7 +278,7 @@ def backbone_figure(document: Document) -> Figure:
     maps = document["maps"]
     curves = [curve for curve in maps["backbones"] if len(curve["time_s"]) > 1]
     named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
-    # the runs that show the gap first, in the campaign's order, and then the rest for comparison
+    # first the runs that show the gap, in the campaign's order, then the others for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
     labels = {
         run["id"]: figure_text(label) for run, label in zip(maps["runs"], run_labels(maps), strict=True)

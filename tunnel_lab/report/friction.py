@@ -14,13 +14,13 @@ from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER, Document
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ROOM = 1.15  # of the axis over the greatest friction drawn
-_MOST = 1.6  # times the law's greatest friction: a point that is known far worse lies beyond the axis
+_ROOM = 1.15  # length of the axis over the greatest friction drawn
+_MOST = 1.6  # times the law's greatest friction: very uncertain points lie beyond the axis
 
 
 @styled
 def friction_figure(document: Document) -> Figure | None:
-    """Friction against rate with 95 % intervals; None where the answer has none."""
+    """Friction against rate with 95 % intervals; None for an answer without friction."""
     found = (document.get("maps") or {}).get("friction")
     if found is None:
         return None

@@ -83,7 +83,7 @@ _TIMEOUT = 120.0  # s
 
 @dataclass(frozen=True)
 class Byline:
-    """What the page states and the document leaves out, because it would differ each time; empty: not shown.
+    """Statements on the page that are not in the document, because they would differ each time; empty: not shown.
 
     Args:
         date: of the diagnosis, such as 2026-05-31.
@@ -116,7 +116,7 @@ def render_report(
 ) -> str:
     """The page as HTML that needs no other file and no network; the same for the same document and byline.
 
-    With ``summary`` it is only what fits one printed page.
+    With ``summary`` the page is limited to one printed page.
     """
     (answer, kind), hidden = headline(document), hidden_table(document)
     provenance = document.get("provenance") or {}
@@ -177,7 +177,7 @@ def render_report(
 
 
 def render_fit(document: Document) -> str:
-    """The fit over the data as an HTML page of its own; without a chart where the document has no ``maps``."""
+    """The fit over the data as a separate HTML page; without a chart where the document has no ``maps``."""
     drawn = fit_figure(document)
     parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
     return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
@@ -188,7 +188,7 @@ def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
 
     Args:
         what: name of the figure, as in `DESCRIPTIONS`.
-        runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+        runs: ids of the runs for ``fit``; two of them are drawn. Empty: those with the largest gap.
 
     Raises:
         TunnelError: for a figure or a run that the diagnosis does not have.
@@ -222,12 +222,12 @@ def _parts(
     sheets: Sequence[str] = ("vendor/uPlot.min.css", "style.css"),
     script: str = "page.js",
 ) -> dict[str, Any]:
-    """Figures, styles and scripts: text that is part of the page as it is."""
+    """Figures, styles and scripts: text included in the page unchanged."""
     from markupsafe import Markup
 
     figures = {}
     for name, figure in drawn.items():
-        # A figure in another height has the text of the first, as ``fit-near-1``. The SVG is already escaped.
+        # A figure in another height, such as ``fit-near-1``, has the text of the first. The SVG is already escaped.
         text = DESCRIPTIONS.get(name) or DESCRIPTIONS[name.partition("-")[0]]
         figures[name] = Markup(inline_svg(figure, name, text))
     font = font_face(shown_text("".join(figures.values())))
@@ -242,7 +242,7 @@ def _parts(
 
 
 def test_rows(document: Document) -> list[tuple[str, str, str]]:
-    """The tests of the gap: name, what each looks at, and its p-value."""
+    """The tests of the gap: name, tested property, and p-value."""
     tests = document["gap"]["tests"].items()
     return [(name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests]
 
@@ -269,7 +269,7 @@ def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
 
 
 def noise_rows(document: Document) -> list[tuple[str, str]]:
-    """The noise that the gap is measured against, and the model behind the excesses."""
+    """The reference noise of the gap, and the model behind the excesses."""
     noise, confirmation = document["noise"], document["confirmation"]
     stated, unit = noise["stated_std"], unit_of(document)
     rows = [
@@ -296,7 +296,7 @@ def noise_rows(document: Document) -> list[tuple[str, str]]:
 def font_face(characters: str) -> str:
     """A rule of a style sheet with the font in WOFF, reduced to the characters that the figures show.
 
-    It is always the same for the same characters; what the font lacks is left to the browser's fonts.
+    The rule is deterministic. Characters that the font lacks are left to the browser's fonts.
     """
     import matplotlib
     from fontTools.subset import Options, Subsetter, load_font

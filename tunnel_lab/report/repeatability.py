@@ -1,4 +1,4 @@
-"""The figure of how the runs repeat: frequency and damping of every run against the model of all."""
+"""The figure of repeatability: frequency and damping of every run against the model of all."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _NUMBERS = {"frequency": "frequency", "damping": "damping ratio"}
 
 @styled
 def repeatability_figure(document: Document) -> Figure | None:
-    """Every run's frequency and damping minus the model's, in per cent; None of a single run.
+    """Every run's frequency and damping minus the model's, in per cent; None for a single run.
 
-    The runs are in their order. The band of a run holds 95 % of what the scatter between runs gives under its wind
+    The runs are in their order. The band of a run is the 95 % interval of the scatter between runs under its wind
     and spring. Error bars are the noise's 95 % intervals.
     """
     found = document.get("repeatability")
@@ -56,7 +56,7 @@ def repeatability_figure(document: Document) -> Figure | None:
 
 
 def _draw_runs(axes: Axes, runs: Sequence[Mapping[str, Any]], name: str, outlier: str) -> None:
-    """One number of every run against the model's, with its band and its error bar."""
+    """One quantity of every run against the model's, with its band and error bar."""
     rows = np.arange(len(runs))
     value, std, band = (
         100.0 * np.array([one[key] for one in runs], np.float64)

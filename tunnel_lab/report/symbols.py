@@ -1,4 +1,4 @@
-"""What the symbols of a report mean, for a reader who does not know the field."""
+"""Meanings of the symbols in a report, for a reader who does not know the field."""
 
 from __future__ import annotations
 

@@ -95,12 +95,12 @@ def facts(document: Document) -> list[Fact]:
 
 
 def _calm(document: Document) -> bool:
-    """Whether what remains is stated to be within the noise."""
+    """Whether the residual gap is stated to be within the noise."""
     return (document.get("rest") or {}).get("significant") is False
 
 
 def _misfit_fact(document: Document, label: str, value: float, powers: str) -> Fact:
-    """A gap in the units that people use, and its power beside them."""
+    """A gap in customary units, with its power."""
     misfit = misfit_of(document)
     if misfit is None:
         return Fact(label, powers)
@@ -108,10 +108,10 @@ def _misfit_fact(document: Document, label: str, value: float, powers: str) -> F
 
 
 def causes_found(document: Document) -> list[dict[str, Any]]:
-    """Every cause of the answer with its size, and the scatter between runs as the last one.
+    """Every cause of the answer with its size, and the scatter between runs last.
 
     Returns:
-        Name, what it acts on, its parameters, what it does to a swing, and what its addition closes.
+        Name, object acted on, parameters, effect on a swing, and the part of the gap explained by adding it.
     """
     if document["causes"] in ([], ["unknown"]):
         return []
@@ -160,7 +160,7 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
 
 
 def typeset(text: str) -> str:
-    """A text in which numbers have a minus sign in place of a leading hyphen, and powers of ten."""
+    """A text whose numbers have minus signs instead of leading hyphens, and powers of ten."""
     text = re.sub(r"(?<![\w.])-(?=\d)", "−", text)
     return _POWER.sub(lambda found: f" × 10{str(int(found[1])).translate(_RAISED)}", text)
 
@@ -217,7 +217,7 @@ def _number(values: Document) -> str:
 
 
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
-    """What the vocabulary says of every cause and its rivals."""
+    """The vocabulary's descriptions of every cause and its rivals."""
     known = {kind.name: kind for kind in known_effects()}
     return [
         {
@@ -239,7 +239,7 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
     rows = []
     for name in dict.fromkeys([*before, *after]):
         values, interval = after.get(name) or before[name], "–"
-        if values["std"]:  # to as many digits as its width deserves
+        if values["std"]:  # digits according to its width
             reach = 1.96 * values["std"]
             width = with_std(values["value"], reach).partition("± ")[2]
             places = len(width.partition(".")[2]) if width.replace(".", "").isdigit() else None
@@ -259,7 +259,7 @@ def coefficient_rows(document: Document) -> list[dict[str, str]]:
 
 
 def place_rows(document: Document) -> list[tuple[str, str]]:
-    """Where the gap is, field by field."""
+    """The place of the gap, field by field."""
     where, degree = document["where"], unit_shown("rad")[1]
     rows = [("Runs that show it", ", ".join(where["runs"]) or "–")]
     for label, key, factor, unit in (
@@ -277,7 +277,7 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
 
 
 def step_rows(document: Document) -> list[dict[str, str]]:
-    """What is added, what is left, and what is left without it alone; none where no cause is named."""
+    """Each added cause, the residual gap after it, and that without this cause alone; empty without causes."""
     steps, without = document.get("waterfall", []), document.get("without", {})
     return [
         {

@@ -1,4 +1,4 @@
-"""Where the gap is, and the fit over the data: figures, and the charts that replace them on a screen."""
+"""The place of the gap, and the fit over the data: figures, and the charts that replace them on a screen."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 TIME = "time since the start of the record [s]"
 _ANGLE, _RATE = "angle β [°]", "rate β̇/ω [°]"
 Chart = dict[str, Any]
-_LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
+_LEAST_POWER = 0.3  # of the noise: smaller values are drawn at the edge of the axis
 PLACE_HEIGHT = 2.7
 """Height of the map of where the gap is, inches."""
 _COLUMNS = 2  # runs in a figure
@@ -51,9 +51,9 @@ _MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 
 @styled
 def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | None:
-    """Misfit by amplitude and by wind speed, or by time where there is one speed; None for maps without it.
+    """Misfit by amplitude and by wind speed, or by time where there is one speed; None where the maps lack it.
 
-    Cells within the noise stay empty.
+    Cells within the noise are empty.
 
     Args:
         height: of the figure, inches; small enough for a phone.
@@ -82,7 +82,7 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
 
 @styled
 def runs_figure(document: Document) -> Figure:
-    """Excess of every run over time on a logarithmic scale; cells within the noise stay empty."""
+    """Excess of every run over time on a logarithmic scale; cells within the noise are empty."""
     from matplotlib.colors import LogNorm
 
     maps = document["maps"]
@@ -104,7 +104,7 @@ def runs_figure(document: Document) -> Figure:
 
 
 def _run_cells(maps: Document) -> tuple[Array, float, float]:
-    """Excess by run and bin of time, shape (runs, n), NaN within the noise; and the ends of its scale."""
+    """Excess by run and bin of time, shape (runs, n), NaN within the noise; and the limits of its scale."""
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
     times = array(maps["time"]["edges_s"])
     run = min(maps["runs"], key=lambda entry: entry["std"])
@@ -115,9 +115,9 @@ def _run_cells(maps: Document) -> tuple[Array, float, float]:
 
 @styled
 def profiles_figure(document: Document) -> Figure:
-    """Excess over time and amplitude, all runs together, and when a moment is missing.
+    """Excess over time and amplitude, all runs together, and the times at which a moment is missing.
 
-    The shaded intervals hold four fifths of the gap.
+    The shaded intervals contain four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
     swings = None if where["amplitude_rad"] is None else np.degrees(where["amplitude_rad"]).tolist()
@@ -136,7 +136,7 @@ def profiles_figure(document: Document) -> Figure:
         axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
         grid(axes)
     by_time.tick_params(labelbottom=False)
-    # The missing moment's energy shows when a moment acts, not how long the motion after it lasts.
+    # The missing moment's energy shows when a moment acts, not the duration of the motion after it.
     edges, share = array(maps["time"]["edges_s"]), 100.0 * array(maps["time"]["moment_share"])
     moment.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
     moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
@@ -150,7 +150,7 @@ def profiles_figure(document: Document) -> Figure:
 def spectrum_figure(document: Document) -> Figure:
     """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
-    The shaded interval holds four fifths of the gap.
+    The shaded interval contains four fifths of the gap.
     """
     values, interval = document["maps"]["frequency"], document["where"]["frequency_hz"]
     fig = figure(NARROW, 3.0)
@@ -177,7 +177,7 @@ def spectrum_figure(document: Document) -> Figure:
 
 
 def _spectrum_axis(values: Document) -> tuple[Array, Array]:
-    """Edges of the bins for a logarithmic scale, the first one half the second instead of zero; and centres, Hz."""
+    """Edges of the bins for a logarithmic scale, the first half the second instead of zero; and centres, Hz."""
     edges = array(values["edges_hz"])
     positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
     return positive, np.sqrt(positive[:-1] * positive[1:])
@@ -185,7 +185,7 @@ def _spectrum_axis(values: Document) -> tuple[Array, Array]:
 
 @styled
 def phase_plane_figure(document: Document) -> Figure | None:
-    """The missing moment over angle and rate; None where the maps hold none."""
+    """The missing moment over angle and rate; None where the maps lack it."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
@@ -204,7 +204,7 @@ def phase_plane_figure(document: Document) -> Figure | None:
 
 @styled
 def moment_figure(document: Document) -> Figure | None:
-    """Means of the missing moment over all rates and over all angles; None where the maps hold none."""
+    """Means of the missing moment over all rates and over all angles; None where the maps lack it."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
@@ -226,8 +226,8 @@ def moment_figure(document: Document) -> Figure | None:
 def _plane_cells(plane: Document) -> tuple[Array, float, str, float]:
     """The missing moment by rate (rows) and angle (columns), NaN within three standard deviations of zero.
 
-    Also the greatest value of its scale, a unit in which the values are neither thousands nor thousandths, and the
-    factor from the document's unit to that one.
+    Also the greatest value of its scale, a unit that suits the size of the values, and the factor from the
+    document's unit to it.
     """
     moment = np.stack([array(row) for row in plane["moment"]])
     std = np.stack([array(row) for row in plane["std"]])
@@ -300,14 +300,14 @@ def charts(document: Document) -> dict[str, list[Chart]]:
 
 
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
-    """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
+    """A view of the bins with a value; the others are left out, because a null would break the curves."""
     filled = np.any(np.isfinite(excesses), axis=0)
     power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
     return {"label": label, "run": run, "data": [_rounded(centre[filled]), *power]}
 
 
 def _rounded(values: Array, digits: int = 4) -> list[float | None]:
-    """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
+    """Numbers for JSON with the digits of a screen; null for unknown values."""
     return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
 
 
@@ -358,8 +358,8 @@ def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
 def fit_figure(document: Document, ids: Sequence[str] = ()) -> Figure | None:
     """The fit over the data of the first two of `fitted_runs`; None without runs.
 
-    A column for each run: the whole record, in which the cycles are marked where the models differ most; these
-    cycles with the reading and what both models predict; and the residuals there.
+    A column for each run: the whole record, with the cycles marked in which the models differ most; the reading in
+    these cycles with the predictions of both models; and their residuals.
     """
     runs = fitted_runs(document, ids)[:_COLUMNS]
     return _drawn(runs) if runs else None
@@ -372,9 +372,9 @@ def fit_pages(document: Document, ids: Sequence[str] = ()) -> list[Figure]:
 
 
 def fit_sheets(document: Document) -> dict[str, Figure]:
-    """The fit over the data of the two runs with the largest gap, in the heights that a printed page may have left.
+    """The fit over the data of the two runs with the largest gap, in several heights to fill a printed page.
 
-    The highest comes first; the lower ones show the cycles where the models differ most and not the whole record.
+    The highest comes first; lower ones omit the whole record and show the cycles where the models differ most.
     """
     runs = fitted_runs(document)[:_COLUMNS]
     sheets = _SHEETS.items() if runs else ()
@@ -421,7 +421,7 @@ def _curves(axes: Axes, run: Curves, measured: Array | None, before: Array, afte
 def fit_charts(document: Document) -> dict[str, list[Chart]]:
     """The readings of every run and, below them on the same axis, the residuals, under the name ``fit``.
 
-    They show the cycles first in which the models differ most; there are none without ``maps``.
+    They first show the cycles in which the models differ most; there are none without ``maps``.
     """
     runs = fitted_runs(document)
     if not runs:
@@ -450,7 +450,7 @@ def fit_charts(document: Document) -> dict[str, list[Chart]]:
 
 
 def _view(run: Curves, *curves: Array) -> Chart:
-    """Curves over time, which break where samples are missing, and the stretch that is shown first."""
+    """Curves over time, broken where samples are missing, and the interval shown first."""
     time, *values = with_breaks(run.time, *curves)
     data = [_rounded(time, 6), *(_rounded(one, 5) for one in values)]
     return {"label": run.label, "run": run.id, "data": data, "range": list(run.differ)}

@@ -1,8 +1,8 @@
-"""The run that is shown, from a plan or from a few options, and its film: the model beside the trace of its angle.
+"""A run from a plan or from a few options, and its film: the model beside the trace of its angle.
 
-Frames are rendered off-screen. This needs an OpenGL back end, which many machines lack, and a missing back end may
-end the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn twice,
-faint and full; every frame shows the full one up to its time.
+Frames are rendered off-screen with OpenGL. Many machines lack some of its back ends, and a missing back end may end
+the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn twice,
+faint and full; every frame shows the full trace up to its time.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ BODY_SHARE = 0.52
 """Share of the width for the picture of the model."""
 FIRST_FRAME_S = 60.0
 """Time limit of a back end for its first frame, s."""
-_SHADOW, _SAMPLES = 2048, 4  # for a film: a quarter of the time of a still, without visible difference
+_SHADOW, _SAMPLES = 2048, 4  # for a film: a quarter of a still's time, without visible difference
 
 REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to get the picture"
 _DPI = 100
@@ -69,8 +69,8 @@ class Request:
         wind_speed: m/s.
         release_angle_deg: degrees.
         duration: s.
-        effects: ``NAME:PARAMETER=VALUE``, beyond the plan's.
-        seed: of the sensor's noise and of what effects draw; None takes the plan's, or 1.
+        effects: ``NAME:PARAMETER=VALUE``, in addition to the plan's.
+        seed: of the sensor's noise and of random effects; None takes the plan's, or 1.
     """
 
     plan: str | None = None
@@ -106,7 +106,7 @@ class ShownRun:
         return follow_fastest(self.rig, self.chain.physics())
 
     def record(self) -> Record:
-        """The potentiometer's reading, simulated at each call with the same bits."""
+        """The potentiometer's reading; each call simulates it with bit-identical results."""
         from tunnel_sim.effects.chain import read_motion
         from tunnel_sim.engine.model import build_model
         from tunnel_sim.engine.simulate import simulate_motion
@@ -187,8 +187,8 @@ def _number(option: str, given: float | None, plan: float, low: float, high: flo
 def backends() -> tuple[str, ...]:
     """The OpenGL back ends to try, best first: values for ``MUJOCO_GL``.
 
-    Only the user's own choice where that variable is set, and an empty string (MuJoCo's default) where the platform
-    has only one.
+    Where that variable is set, only its value; where the platform has only one back end, an empty string (MuJoCo's
+    default).
     """
     chosen = os.environ.get("MUJOCO_GL")
     if chosen:
@@ -199,7 +199,7 @@ def backends() -> tuple[str, ...]:
 
 
 def checked_camera(name: str) -> str:
-    """A name of a camera; a `TunnelError` with the closest name when the rig has no such camera."""
+    """The name of a camera; a `TunnelError` with the closest name when the rig does not have this camera."""
     if name not in CAMERAS:
         raise TunnelError(
             f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
@@ -268,7 +268,12 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
     import threading
 
     environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
-    arguments = [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)]  # our own module, no shell
+    arguments = [
+        sys.executable,
+        "-m",
+        "tunnel_lab.show.film",
+        json.dumps(order),
+    ]  # a module of this package, without a shell
     silent = threading.Event()
     with (
         tempfile.TemporaryFile("w+") as errors,
@@ -291,7 +296,7 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
                 if progress is not None and total.strip().isdigit():
                     progress(int(done), int(total))
             child.wait()
-        finally:  # also when interrupted; `Popen` itself would then wait for a quarter of a second only
+        finally:  # also when interrupted: `Popen` would then wait for only a quarter of a second
             patience.cancel()
             child.kill()
             child.wait()
@@ -341,8 +346,8 @@ class Trace:
     """Two drawings of the same axes, and the positions of the samples.
 
     Args:
-        faint: all of the trace in grey, shape (height, width, 3).
-        full: all of it in colour, of the same shape.
+        faint: the whole trace in grey, shape (height, width, 3).
+        full: the whole trace in colour, shape (height, width, 3).
         time: of the samples, shape (n,), s.
         columns: of the samples, shape (n,), pixels from the left.
         rows: of the samples, shape (n,), pixels from the top.
@@ -377,7 +382,7 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
 
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     figure.set_layout_engine("constrained", w_pad=0.15, h_pad=0.1)  # inches
-    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
+    canvas: Any = FigureCanvasAgg(figure)  # only partly typed by matplotlib
     axes = figure.add_subplot()
     time, angle = record.time_s - record.time_s[0], record.yaw_rad
     (line,) = axes.plot(*with_breaks(time, angle), color="0.85", linewidth=1.2)

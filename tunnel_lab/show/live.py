@@ -1,4 +1,4 @@
-"""A run in real time, in a window; it is released again when it is over."""
+"""A run in real time, in a window; at its end the model is released again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NO_DISPLAY = "use tunnel render for a film"
 class LiveRun:
     """A run of the rig with its full physics, including the plugin.
 
-    Its history is that of the physics, not of the frames that a viewer shows: a viewer may take a second for one.
+    Its history follows the physics, not the frames: a viewer may take a second for a frame.
     """
 
     def __init__(self, run: ShownRun) -> None:
@@ -39,17 +39,17 @@ class LiveRun:
         self.release()
 
     def release(self) -> None:
-        """Hold the model at its release angle and release it again."""
+        """Return the model to its release angle and release it again."""
         mujoco.mj_copyData(self.data, self.model.mj, self._released)
         mujoco.mj_forward(self.model.mj, self.data)
         self._record()
 
     def advance(self, seconds: float) -> None:
-        """Advance by seconds of the run; a run that is over is released again."""
+        """Advance by seconds of the run; a finished run is released again."""
         if self.data.time >= self.run.settings.duration:
             self.release()
         steps, apart = self._steps(seconds), self._steps(self.history.interval) or 1
-        for done in range(0, steps, apart):  # a stop for every point of the history
+        for done in range(0, steps, apart):  # stops at every point of the history
             mujoco.mj_step(self.model.mj, self.data, min(apart, steps - done))
             self._record()
 
@@ -99,7 +99,7 @@ class History:
 
 
 def missing_display() -> str:
-    """Why no window can be opened; empty where the environment shows no reason."""
+    """The reason why a window cannot be opened; empty where the environment shows none."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -123,7 +123,7 @@ class Controls:
             self.released = True
 
     def advance(self, seconds: float) -> None:
-        """Advance by the seconds since the last call, as the keys demand."""
+        """Advance by the seconds since the last call, according to the keys."""
         if self.released:
             self.released = False
             self._live.release()

@@ -1,4 +1,4 @@
-"""Standard output that cannot hold every character: others are replaced by what is read the same way."""
+"""Standard output with a limited encoding: other characters are replaced by readable equivalents."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ def replace_what_cannot_be_encoded() -> None:
     """Let standard output and error replace characters beyond their encoding, instead of raising an error."""
     codecs.register_error(_HANDLER, _alike)
     for stream in (sys.stdout, sys.stderr):
-        reconfigure = getattr(
-            stream, "reconfigure", None
-        )  # a stream that a test or a notebook puts there has none
+        reconfigure = getattr(stream, "reconfigure", None)  # streams of tests and notebooks lack this method
         if reconfigure is not None:
             reconfigure(errors=_HANDLER)
 
@@ -43,7 +41,7 @@ def _escaped(character: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """JSON with escapes where standard output cannot hold its characters; read again, it is the same document."""
+    """JSON with escapes for characters that standard output cannot encode; it parses to the same document."""
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     try:
         text.encode(encoding)

@@ -1,4 +1,4 @@
-"""What commands are given: a campaign or an effect, and options that several commands share."""
+"""Inputs of commands: a campaign or an effect, and options that several commands share."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _FORM = "write NAME:PARAMETER=VALUE, with a comma before each further PARAMETER=
 def given_campaign(path: Path) -> Campaign:
     """Read a campaign's folder, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
 
-    What was made of a file of a data logger is printed on standard error.
+    A summary of an imported file of a data logger is printed on standard error.
     """
     from tunnel_lab.terminal.outputs import bar, say
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
@@ -53,7 +53,7 @@ def given_campaign(path: Path) -> Campaign:
     if path.suffix.lower() == ".toml":
         remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
         raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
-    from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+    from tunnel_sim.files.importing.records import read_records  # only here: a campaign does not need it
     from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     try:
@@ -69,7 +69,7 @@ def given_campaign(path: Path) -> Campaign:
 
 
 def file_hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of the files that a campaign was read from, as for `given_campaign`, which has read it.
+    """SHA-256 of the files that `given_campaign` read a campaign from.
 
     Returns:
         Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
@@ -153,8 +153,8 @@ def estimator_option(what: str, more: str = "") -> Any:
     """The option ``--estimator`` of a command, which takes a name or a class.
 
     Args:
-        what: the command does with it, for the help.
-        more: sentences after that.
+        what: the use of the estimator in the command, for the help.
+        more: further sentences.
     """
     text = f"{what}: a name, or module:Class of your own.{more and ' '}{more}"
     return Option("--estimator", "-e", metavar="NAME", help=text)
@@ -166,9 +166,9 @@ def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def chosen_estimator(word: str) -> str:
-    """The name of an estimator from what ``--estimator`` was given: its name, or ``module:Class`` of one's own.
+    """The name of an estimator from the value of ``--estimator``: its name, or ``module:Class`` of the user's.
 
-    A module is looked for in the current folder too, and its class is registered.
+    The module is also looked for in the current folder, and its class is registered.
 
     Raises:
         TunnelError: for an unknown name, suggesting the closest one, and for a class that cannot be used.
@@ -177,7 +177,7 @@ def chosen_estimator(word: str) -> str:
 
     if ":" in word:
         if not {"", str(Path.cwd())} & set(sys.path):
-            sys.path.insert(0, str(Path.cwd()))  # worker processes take it over
+            sys.path.insert(0, str(Path.cwd()))  # worker processes inherit it
         return register_from(word)
     known = known_estimators()
     if word not in known:
@@ -187,7 +187,7 @@ def chosen_estimator(word: str) -> str:
 
 
 def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
-    """The same of repeated options, each perhaps a list with commas."""
+    """The names of estimators from repeated options, each perhaps a list with commas."""
     return tuple(dict.fromkeys(map(chosen_estimator, split_names(words))))
 
 
@@ -195,7 +195,7 @@ def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
 def own_code(estimators: Sequence[str]) -> Iterator[None]:
     """End the command with status 1 where an estimator raises an exception or returns no valid estimate.
 
-    The traceback of an exception of one's own is printed.
+    The traceback of an exception in the user's code is printed.
     """
     from identification.returned import WrongReturn
     from tunnel_lab.terminal.outputs import say
@@ -220,7 +220,7 @@ def own_code(estimators: Sequence[str]) -> Iterator[None]:
 
 
 def refuse_unwritable_files(*paths: Path | None) -> None:
-    """Refuse the first file that cannot be written before the work is done; None is left out."""
+    """Before the work is done, refuse the first file that cannot be written; None is left out."""
     from tunnel_sim.files.writing import refuse_unwritable
 
     for path in filter(None, paths):
@@ -228,17 +228,17 @@ def refuse_unwritable_files(*paths: Path | None) -> None:
 
 
 def ending(*known: str) -> Callable[[Path | None], Path | None]:
-    """A callback of an option that takes a file: one with another ending than these is refused, such as ``.html``.
+    """A callback of an option that takes a file; it refuses endings other than these, such as ``.html``.
 
-    What is written has one format, so that another ending would name it wrongly. ``-`` and devices pass.
+    The output has one format, so another ending would be wrong. ``-`` and devices pass.
     """
 
     def checked(path: Path | None) -> Path | None:
         if (
             path is None or str(path) == "-" or path.resolve().suffix.lower() in known
-        ):  # of a link: its target's
+        ):  # the target's ending for a link
             return path
-        if path.exists() and not path.is_file():  # a folder is refused where it is written to
+        if path.exists() and not path.is_file():  # a folder is refused when it is written
             return path
         remedy = f"name a file that ends in {' or '.join(known)}, the format that is written"
         raise TunnelError(f"does not end in {' or '.join(known)}", where=shown(path), remedy=remedy)
@@ -247,7 +247,7 @@ def ending(*known: str) -> Callable[[Path | None], Path | None]:
 
 
 class TableFormat(StrEnum):
-    """How tables are printed."""
+    """Format of printed tables."""
 
     TEXT = "text"
     CSV = "csv"
@@ -281,7 +281,7 @@ def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
 def _with_option(
     run: Callable[..., None], name: str, kind: Any, variable: ContextVar[Any]
 ) -> Callable[..., None]:
-    """A command with one more option, whose value a variable has while it runs."""
+    """A command with one more option, whose value is in a variable while the command runs."""
     default = variable.get()
 
     @wraps(run)
@@ -293,7 +293,7 @@ def _with_option(
             variable.reset(token)
 
     option = Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-    given = signature(run, eval_str=True)  # Typer finds its own annotations only where they are not texts
+    given = signature(run, eval_str=True)  # Typer finds its annotations only where they are not strings
     vars(wider)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
     wider.__annotations__ = {**run.__annotations__, name: kind}
     return wider

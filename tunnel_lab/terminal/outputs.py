@@ -1,4 +1,4 @@
-"""What commands print: lines, progress, and estimates, imports and budgets as tables with units and deviations."""
+"""Output of commands: lines, progress, and tables of estimates, imports and budgets with units and deviations."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def say(line: str, *, stderr: bool = False) -> None:
 
 
 def say_written(*paths: Path | None) -> None:
-    """Name the files that were written; None is left out."""
+    """Print the paths of the files that were written; None is left out."""
     for path in filter(None, paths):
         say(f"Written: {path}")
 
@@ -89,7 +89,7 @@ def show_tables(*tables: Table) -> None:
         if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
             out.print(stacked(table, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
-            for column in table.columns:  # so wide that only headings and sentences are wrapped
+            for column in table.columns:  # wide enough that only headings and sentences are wrapped
                 column.min_width = _least_width(column)
             out.print(table)
         else:
@@ -99,7 +99,7 @@ def show_tables(*tables: Table) -> None:
 
 
 def rendered(table: Table, kind: TableFormat) -> str:
-    """A table of texts as CSV, Markdown or JSON, which has numbers where a cell is one; with a final line feed."""
+    """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
     heads = [_plain(column.header) for column in table.columns]
     rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
     title = _plain(table.title or "")
@@ -234,7 +234,7 @@ def _status(status: Status) -> str:
 
 
 def is_too_wide(table: Table, width: int) -> bool:
-    """Whether cells other than sentences, or words of a heading, would be broken in so many columns."""
+    """Whether cells other than sentences, or words of a heading, would be broken at this width."""
     needed = sum(_least_width(column) + _PADDING for column in table.columns)
     return needed + _BETWEEN * (len(table.columns) - 1) > width
 
@@ -268,7 +268,7 @@ def stacked(table: Table, width: int) -> str:
 
 
 def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
-    """Lines of a text after a prefix, the later ones indented as far."""
+    """Lines of a text after a prefix; later lines are indented by the length of the prefix."""
     room = max(width - cell_len(prefix), PROSE)
     lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
     for number, line in enumerate(lines or [""]):
@@ -281,7 +281,7 @@ def show_estimate(
     """Print an estimate.
 
     Args:
-        source: what the campaign was read from, for commands to copy; None: nowhere.
+        source: the path of the campaign, for commands to copy; None: there is no path.
     """
     document = estimate.to_json_dict()
     show_tables(rich_table(printing.coefficients_table(document)), runs_table(campaign, estimate))
@@ -298,7 +298,7 @@ def show_estimate(
 
 
 def parts_table(imported: Imported) -> TextTable:
-    """The runs of an import: file where there are several, samples, rate, stretch, swing and conditions."""
+    """The runs of an import: samples, rate, begin and end, swing, conditions, and the file where several."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
     used = [part.run for part in imported.parts if part.run is not None]
     windless = all(run.drive is not None and run.wind_speed == 0.0 for run in used)  # a joint
@@ -369,8 +369,8 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
         total: number of items, where it is known beforehand.
 
     Yields:
-        A function to call with the number finished, the total and, where it has one, the name of the last item. The
-        first call gives the number finished before, which does not count for the speed.
+        A function to call with the number finished, the total and, if any, the name of the last item. The first
+        call gives the number finished before, which does not count for the speed.
     """
     from rich.progress import (
         BarColumn,
@@ -392,7 +392,7 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
         task = progress.add_task(what, total=total)
 
         def advance(done: int, count: int, name: str = "") -> None:
-            # Rich leaves the first change out of the speed: what was finished before needs no treatment of its own.
+            # Rich leaves the first change out of the speed: items finished before need no special treatment.
             progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
 
         yield advance
@@ -402,7 +402,7 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
 def bar_or_lines(
     what: str, total: int | None = None, *, every: float = 30.0
 ) -> Iterator[Callable[..., None]]:
-    """A progress bar, or, where no terminal shows it, a line on standard error now and then: for work of minutes.
+    """A progress bar for work of minutes; without a terminal, an occasional line on standard error.
 
     Args:
         total: number of items, where it is known beforehand.
@@ -453,14 +453,14 @@ _sets_every: float | None = None
 
 
 def print_sets(every: float) -> None:
-    """From now on, print tried sets of effects too where no terminal shows them, at most one in so many seconds."""
+    """From now on, without a terminal, also print tried sets of effects, at most one in ``every`` seconds."""
     global _sets_every
     _sets_every = every
 
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with step, effect tried, time so far and time left, or a line per step where no terminal shows it.
+    """A spinner with step, effect tried, elapsed and remaining time; without a terminal, a line per step.
 
     Yields:
         The function to call with each step.
@@ -492,7 +492,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
             if text in STEPS:
                 again, step, reached = STEPS[text] == step, STEPS[text], Reached(text, now)
                 progress.update(task, description=step)
-                if not again and not terminal.is_terminal:  # a step that is taken twice is one to people
+                if not again and not terminal.is_terminal:  # a repeated step is one step to the user
                     terminal.print(f"{now:.1f} s: {step}", markup=False)
             else:
                 progress.update(task, description=f"{step}: {text}")

@@ -1,8 +1,8 @@
-"""How long a diagnosis still takes, from the stage that it has reached and the time that it took to get there.
+"""The remaining time of a diagnosis, from its stage and the elapsed time.
 
-Nobody knows beforehand how many sets of effects will be fitted, so that the answer is a range. At the start of a
-stage the time left is taken as lognormal in units of the time so far, with the percentiles of recorded diagnoses.
-While the stage goes on, the times that have already passed are ruled out.
+The number of sets of effects to fit is not known beforehand, so the answer is a range. At the start of a stage the
+ratio of remaining to elapsed time is taken as lognormal, with the percentiles of recorded diagnoses. During the
+stage, times that have already passed are ruled out.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Reached:
     begun: float = 0.0
 
     def left(self, now: float) -> tuple[float, float] | None:
-        """The range of the time left, s, with a probability of 80 % where campaigns are like the recorded ones.
+        """The range of the remaining time, s, with a probability of 80 % for campaigns like the recorded ones.
 
         Args:
             now: s since the start.
@@ -65,7 +65,7 @@ class Reached:
         return max(least, 0.0), most
 
     def words(self, now: float) -> str:
-        """The time left in words, such as ``about 20 to 60 s left``."""
+        """The remaining time in words, such as ``about 20 to 60 s left``."""
         found = self.left(now)
         if found is None:
             return "time left not known" if self.stage in LEFT else "time left not known yet"

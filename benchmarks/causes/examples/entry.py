@@ -1,6 +1,6 @@
-"""The smallest entry: `python entry.py CAMPAIGNS ANSWERS`. It needs nothing of this project.
+"""The smallest entry: `python entry.py CAMPAIGNS ANSWERS`. It does not depend on this project.
 
-It says "coulomb_friction" where the decay of the first run speeds up towards its end, and nothing otherwise.
+It answers "coulomb_friction" where the decay of the first run accelerates towards its end, and no cause otherwise.
 """
 
 import json

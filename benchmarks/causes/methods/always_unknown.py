@@ -1,4 +1,4 @@
-"""Always `unknown`: what a method scores that looks at nothing."""
+"""Always `unknown`: the score of a method that ignores the data."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ABOUT = About(
 )
 
 
-def answer(folder: Path) -> dict[str, Any]:  # noqa: ARG001 — as every method has it
+def answer(folder: Path) -> dict[str, Any]:  # noqa: ARG001 — the signature of all methods
     """The same answer to every campaign.
 
     Args:

@@ -1,7 +1,7 @@
 """Evidence with the model's error integrated out, on the sets of causes that the project's diagnosis grows.
 
-Every set has its log evidence beside an error of the model of rms η; η has a half-Cauchy prior; every cause after
-the first has the same prior odds. Where the error of the model takes more than a fifth of the gap, the cause is
+Every set has its log evidence under a model error of rms η; η has a half-Cauchy prior; every cause after
+the first has the same prior odds. Where the model error explains more than a fifth of the gap, the cause is
 unknown.
 """
 
@@ -18,7 +18,7 @@ from benchmarks.causes.discrepancy import ETA, Discrepancy, Evidence, linear
 from benchmarks.causes.entry import UNKNOWN, About, answer_of, main
 
 SCALE, ODDS, LEFT = 0.05, 0.1, 0.2
-RANDOM_NUMBERS = 9.0  # nats, of the three numbers of a random moment
+RANDOM_NUMBERS = 9.0  # nats, for the three numbers of a random moment
 ABOUT = About(
     "discrepancy evidence",
     f"on all sets that `tunnel diagnose` fits, with its test of the gap; half-Cauchy η of scale {SCALE:g} of the "
@@ -72,8 +72,8 @@ def weigh(
     Args:
         nominal: evidence of the nominal model.
         sets: evidence by names of the causes.
-        random: by the names of the causes with a random moment among them: the evidence of those beside it, and
-            the fall of −2 ln L by it.
+        random: by names of the causes, for sets with a random moment: the evidence of the other causes, and the
+            decrease of −2 ln L by the moment.
     """
     hyper = np.log(ETA) - np.log1p((ETA / SCALE) ** 2)  # density of log η
     hyper -= logsumexp(hyper)

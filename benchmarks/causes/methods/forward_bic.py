@@ -1,4 +1,4 @@
-"""Forward selection by BIC on the project's own fits: what most people would do."""
+"""Forward selection by BIC on the project's own fits: the most common approach."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def weighed(
     """The 40 likeliest sets with their BIC weights, and the inclusion probability of each cause by name.
 
     Args:
-        fitted: names and BIC of every set that was fitted.
+        fitted: names and BIC of every fitted set.
     """
     scores = np.array([score for _, score in fitted])
     weights = np.exp(-0.5 * (scores - scores.min()))
@@ -73,7 +73,7 @@ def bic(chi2: float, numbers: int, rows: int) -> float:
 
     Args:
         chi2: sum of squared residuals, noise variances.
-        numbers: number of parameters beyond those of the nominal model.
+        numbers: number of parameters in addition to the nominal model.
         rows: number of residuals.
     """
     return chi2 + numbers * float(np.log(rows))

@@ -1,9 +1,9 @@
 """LISDD's recipe (arXiv 2606.23215) from a summary of it, on the residual moment.
 
-Localise: the regimes of the motion in which the residual exceeds the noise. Identify: among the terms that
-act there, the set of up to three that predicts a held-out third best, by trying all. Decide: F-tests of its
-terms on a third that neither chose them nor fitted them, with the false-discovery rate controlled (Benjamini and
-Hochberg 1995). What the summary leaves open is chosen here and said in `ABOUT`.
+Localise: the regimes of the motion in which the residual exceeds the noise. Identify: by exhaustive search among
+the terms that act there, the set of up to three that best predicts a held-out third. Decide: F-tests of its terms
+on another third, not used for selection or fit, with the false-discovery rate controlled (Benjamini and Hochberg
+1995). Details missing from the summary are chosen here and stated in `ABOUT`.
 """
 
 from __future__ import annotations
@@ -71,12 +71,12 @@ def localised(where: Equations, data: Regression) -> list[str]:
 
 
 def exhaustive(data: Regression, names: Sequence[str], third: NDArray[np.int64]) -> tuple[str, ...]:
-    """The set that predicts the second third best when fitted to the first; a larger one only where it pays.
+    """The set that best predicts the second third after a fit to the first; larger sets need a sufficient gain.
 
     Args:
         data: the regression.
         names: of the candidates.
-        third: to which third each row belongs, shape (rows,).
+        third: number of each row's third, shape (rows,).
     """
     fit, held = third == 0, third == 1
     owner = np.array([n for n in names for _ in range(data.causes[n].shape[1])])
@@ -105,13 +105,13 @@ def exhaustive(data: Regression, names: Sequence[str], third: NDArray[np.int64])
 
 
 def f_test(data: Regression, chosen: Sequence[str], name: str, rows: Array) -> float:
-    """p-value of a term beside the others, on rows that neither chose nor fitted it.
+    """p-value of a term beside the others, on rows not used for its selection or fit.
 
     Args:
         data: the regression.
         chosen: names of the terms.
-        name: of the one tested.
-        rows: which rows, shape (rows,).
+        name: of the tested term.
+        rows: selection of the rows, shape (rows,).
     """
     others = [n for n in chosen if n != name]
     target = data.target[rows]
@@ -126,7 +126,7 @@ def f_test(data: Regression, chosen: Sequence[str], name: str, rows: Array) -> f
 
 
 def benjamini_hochberg(p: dict[str, float]) -> list[str]:
-    """Terms whose false-discovery rate is below the level.
+    """Terms with a false-discovery rate below the level.
 
     Args:
         p: p-values by name.

@@ -59,7 +59,7 @@ def score(fit: Fit) -> float:
 
 
 def ranked(rig: Rig, best: Fit) -> list[tuple[tuple[str, ...], tuple[str, ...], Array]]:
-    """Fits to make, those first that the linear model expects to have the lowest BIC.
+    """Fits to make, in increasing order of the BIC that the linear model predicts.
 
     Args:
         rig: the campaign.
@@ -78,7 +78,7 @@ def ranked(rig: Rig, best: Fit) -> list[tuple[tuple[str, ...], tuple[str, ...], 
         columns = np.column_stack((best.jacobian, new))
         step = np.linalg.lstsq(columns, -best.left, rcond=1e-10)[0]
         if BOUNDS.get(cause, (-1.0,))[0] == 0.0 and step[-1] <= 0.0:
-            continue  # it could only act the other way
+            continue  # only the opposite sign, which is excluded, would improve the fit
         rest = best.left + columns @ step
         x[which] = np.clip(step[best.x.size :], -10.0, 10.0)
         expected = bic(float(rest @ rest), len(names) - len(NOMINAL), rest.size)

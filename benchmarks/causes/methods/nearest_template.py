@@ -1,8 +1,8 @@
 """The nearest template on the backbones: frequency and damping ratio against amplitude.
 
 Every run is cut into windows of three cycles, each with an amplitude, a frequency and a decay. A cause's
-template is what its moment does to them by equivalent linearisation. What the nominal model can fit of both
-is taken out.
+template is the effect of its moment on them by equivalent linearisation. The part of both that the nominal model
+can fit is projected out.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def backbones(campaign: Campaign) -> tuple[Array, Array, Array, dict[str, Array]]:
-    """Stiffness and damping per inertia against amplitude, and what the nominal model and the causes do to them.
+    """Stiffness and damping per inertia against amplitude, and the influences of nominal model and causes on them.
 
     Args:
         campaign: the runs.
@@ -102,7 +102,7 @@ def backbones(campaign: Campaign) -> tuple[Array, Array, Array, dict[str, Array]
 
 
 def _windows(run: Run) -> list[tuple[float, float, float, float, float]]:
-    """Of every window: amplitude (rad), frequency (rad/s), decay (1/s), their noise, time over the length."""
+    """For every window: amplitude (rad), frequency (rad/s), decay (1/s), their noise, time over the length."""
     record = run.record
     length = round(CYCLES * 2.0 * np.pi / (frequency(run) * record.sample_interval))
     noise = float(np.std(np.diff(record.yaw_rad, 2))) / np.sqrt(6.0)

@@ -45,7 +45,7 @@ def _names(effect: str) -> tuple[str, ...]:
 
 
 def _stated(values: dict[str, Any]) -> dict[str, Any]:
-    """The coefficients that are stated with a standard deviation."""
+    """The coefficients stated with a standard deviation."""
     given = {name: values.get(name) for name in ("cn_beta", "cn_r")}
     return {
         n: {"value": v["value"], "std": v["std"]} for n, v in given.items() if v and (v["std"] or 0.0) > 0.0

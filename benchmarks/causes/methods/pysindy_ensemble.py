@@ -57,10 +57,10 @@ def inclusion_of(data: Regression) -> dict[str, float]:
     )  # fmt: skip
     np.random.seed(0)  # noqa: NPY002 — PySINDy draws its bags from NumPy's global generator
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # models of a bag that keep nothing
+        warnings.simplefilter("ignore")  # some models of a bag keep no term
         optimiser.fit(columns, (data.target / np.sqrt(data.gap))[:, None])
     kept = np.array([np.ravel(c) != 0.0 for c in optimiser.coef_list])
-    # a model from which a column was dropped says nothing of it: one in every number of columns
+    # each model drops one column, and gives no information about it
     drawn = 1.0 - (1.0 / columns.shape[1] if columns.shape[1] > 2 else 0.0)
     return {
         n: min(float(np.mean(np.any(kept[:, owner == i], axis=1))) / drawn, 1.0) for i, n in enumerate(names)

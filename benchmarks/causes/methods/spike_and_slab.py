@@ -1,7 +1,7 @@
 """Spike-and-slab regression of the residual moment (Nayek, Fuentes, Worden and Cross 2021; BINDy).
 
-The residual is Σ columns of the causes that are included, with a unit-information slab on their sizes and an
-unknown variance of the noise, so that every set has a closed marginal likelihood; Gibbs sampling visits the sets.
+The residual is the sum of the included causes' columns, with a unit-information slab on their sizes and an unknown
+noise variance. Every set therefore has a closed-form marginal likelihood; Gibbs sampling visits the sets.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def sample(data: Regression, rng: np.random.Generator) -> Counter[tuple[str, ...]]:
-    """How often Gibbs sampling visits each set of causes.
+    """Number of visits of Gibbs sampling to each set of causes.
 
     Args:
         data: the regression.
@@ -77,14 +77,14 @@ def sample(data: Regression, rng: np.random.Generator) -> Counter[tuple[str, ...
 
 
 def log_marginal(gram: Array, load: Array, power: float, size: int, which: Array) -> float:
-    """Log of the marginal likelihood of a set over that of none, up to a common constant.
+    """Log of the marginal likelihood of a set relative to the empty set, up to a common constant.
 
     Args:
         gram: products of the columns, shape (k, k).
         load: products with the target, shape (k,).
         power: sum of squares of the target, in noise variances.
         size: number of rows.
-        which: columns that are included, shape (k,).
+        which: included columns, shape (k,).
     """
     if not np.any(which):
         return -0.5 * size * float(np.log(power))
