@@ -42,7 +42,7 @@ _FINITE = ConfigDict(allow_inf_nan=False)
 Statuses = Annotated[
     tuple[Annotated[Status, BeforeValidator(lambda name: Status[name.upper()])], ...], Field(min_length=1)
 ]
-"""In JSON the names of the statuses, in small letters."""
+"""In JSON: the names of the statuses, in lower case."""
 
 
 @dataclass(frozen=True)

@@ -9,27 +9,27 @@ from __future__ import annotations
 # --- False-alarm rates: how often a correct campaign is called wrong. ---
 
 REFUSAL_RATE = 1e-6
-"""Of refusing a run or its labels. An estimate is withheld, so it must not happen in a lifetime of campaigns."""
+"""Rate of refusing correct runs or labels. It withholds an estimate, so it must not happen in a lifetime."""
 
 REFUSAL_DEVIATIONS = 4.75
 """`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
 
 MISFIT_RATE = 1e-3
-"""Of saying that a record, a line or a set of runs departs from its model. A false alarm only widens intervals."""
+"""Rate of false departures of a record, a line or a set of runs from its model; they only widen intervals."""
 
 MISFIT_DEVIATIONS = 3.29
 """`MISFIT_RATE` in two-sided standard deviations of a normal distribution."""
 
 DIFFERENCE_RATE = 0.01
-"""Of saying that two scores differ, that an input moves a result, that the runs scatter more than stated
-uncertainties explain, or that two springs disagree which are as well known as `SPRING_AT_BEST`."""
+"""Rate of false differences: between two scores, by an input of a result, in scatter of runs beyond stated
+uncertainties, or between two springs as well known as `SPRING_AT_BEST`."""
 
 DIFFERENCE_DEVIATIONS = 2.58
 """`DIFFERENCE_RATE` in two-sided standard deviations of a normal distribution."""
 
 SPRING_FLAG_RATE = 0.10
-"""Of flagging a correct set of springs. A flag costs one weighing, hence not 5 %. The choice was made with Table II
-of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this rate and would not be at 5 %."""
+"""Rate of flagging a correct set of springs. A flag costs one weighing, hence not 5 %. The rate was chosen knowing
+Table II of the paper, whose p-value is 0.06: springs 4 and 7 are flagged at this rate but not at 5 %."""
 
 # --- Uncertainty of the rig's inputs. ---
 
@@ -37,19 +37,19 @@ SPRING_TOLERANCE = 0.01
 """Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
 
 SPRING_AT_BEST = 0.003
-"""The same of a spring that is calibrated with care: a few parts in a thousand. Two springs are said to disagree
-where even such springs would not."""
+"""Relative standard uncertainty of a carefully calibrated spring: a few parts in a thousand. Two springs disagree
+only where even such springs would."""
 
 INERTIA_FACTOR = 1.5
-"""Factor by which a nominal inertia may be off: it comes from a drawing, without the support and the air that moves
-with the body. Confusing one spring with two makes 2. Judgement."""
+"""Greatest relative error of a nominal inertia, as a factor: it comes from a drawing, without the support and the
+added mass of air. Confusing one spring with two makes 2. Judgement."""
 
 SAME_PRESSURE = 0.1
-"""Dynamic pressures that differ by a smaller share are of one setting: speeds are read to a few per cent."""
+"""Relative difference below which dynamic pressures are one setting: speeds are measured to a few per cent."""
 
 LEAST_SPRING_SPREAD = 0.01
-"""Relative difference above which two stiffnesses count as different: a spring is known to a few parts in a
-thousand at best."""
+"""Relative difference above which two stiffnesses are different: a spring is known to a few parts in a thousand at
+best."""
 
 LEAST_SPRING_RESOLUTION = 10.0
 """Rise of ωn² over the springs, in its standard deviations, that a wind-off line needs. Noise in the abscissa
@@ -57,84 +57,84 @@ attenuates the gradient by the inverse square: here 1 %, a tenth of its standard
 
 SPRING_DEPARTURE = 0.25
 """Relative departure of a spring from its statement that an effect may cause: calibration, gravity, a flexible rod.
-A slip is looked for beyond it. Judgement."""
+Greater departures may be slips. Judgement."""
 
 SPEED_DEPARTURE = 0.03
-"""The same of a wind speed: calibration, an offset, the stream's unevenness. Judgement."""
+"""Relative departure of a wind speed by an effect: calibration, an offset, the stream's unevenness. Judgement."""
 
 SLIP_AGREES = 0.1
-"""Rate at which runs with right labels, of departures as large as the two above, would be said not to agree.
-Another label is offered only where all agree better."""
+"""False-alarm rate of disagreement for runs with right labels and departures as large as the two above. Another
+label is offered only where all agree better."""
 
 SCATTER_OF_STIFFNESS = 0.002
-"""Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped
-anew to a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
+"""Relative scatter of ωn² between runs of equal statements, besides its change along the run: a spring clamped anew
+repeats to a few parts in ten thousand, and the amplitude of the release may change it. Judgement."""
 
 SCATTER_OF_DAMPING = 0.02
-"""Relative scatter of the decay rate between runs of equal statements: bearings come back to a per cent or two."""
+"""Relative scatter of the decay rate between runs of equal statements: bearings repeat to a per cent or two."""
 
 LEAST_OF_WIND = 0.005
-"""Relative change of ωn² by the wind that a campaign is made to measure, at least. Judgement."""
+"""Least relative change of ωn² by the wind that a campaign is designed to measure. Judgement."""
 
 LEAST_DAMPING_OF_WIND = 0.1
-"""The same of the decay rate: air that passes a body adds to its damping. Judgement."""
+"""Least relative change of the decay rate by the wind: air that passes a body adds to its damping. Judgement."""
 
 ZERO_STEADINESS = 0.03
-"""Share of a sensor's zero by which the zeros of runs may differ where they are called one zero of two signs."""
+"""Relative difference of the zeros of runs up to which they are one zero of two signs."""
 
 LEAST_STEPS = 4.0
-"""Steps of the resolution in a swing, at least: a coarser sensor would not have been chosen. Judgement."""
+"""Least number of resolution steps in a swing: a coarser sensor would not have been chosen. Judgement."""
 
 FINER_THAN_STATED = 0.03
-"""Noise over the resolution: rounding alone makes 0.29, so that a tenth of it contradicts the resolution."""
+"""Ratio of noise to resolution: rounding alone makes 0.29, so a tenth of that contradicts the resolution."""
 
 OTHER_SPRING = 1.2
-"""Ratio of ωn² of runs of equal statements and swings that only another spring makes: scatter and wear stay below
-a few per cent. Judgement."""
+"""Ratio of ωn² of runs of equal statements and swings that only another spring explains: scatter and wear remain
+below a few per cent. Judgement."""
 
 OTHER_WIND = (1.02, 1.3)
-"""Ratios of ωn² and of the decay rate, both at once, that only another wind speed makes. Judgement."""
+"""Ratios of ωn² and of the decay rate, both at once, that only another wind speed explains. Judgement."""
 
 NOISE_RATIO = 0.15
-"""Tolerance of the ratio of two runs' noise, where one sensor made both."""
+"""Tolerance of the ratio of two runs' noise from one sensor."""
 
 LEAST_DRIFT = 5e-4
-"""Change of a clock's rate along a run that is called a drift: quartz keeps 1e-4, and a rig's temperature moves a
-spring by a few times that."""
+"""Relative change of a clock's rate along a run that is a drift: quartz keeps 1e-4, and a rig's temperature changes
+a spring by a few times that."""
 
 RELEASE_AS_STATED = (0.5, 1.5)
-"""A record's first angle over the stated release angle, where it begins at the release: the angle is nominal, and
-the body is let go by hand. Judgement."""
+"""Ratio of a record's first angle to the stated release angle, where it begins at the release: the angle is
+nominal, and the body is released by hand. Judgement."""
 
 CLEAR_RELEASE = 0.8
 """Share of the amplitude at which a record must begin for the side of its release to be known."""
 
 GREATEST_YAW_MOMENT = 10.0
-"""|Cnβ|, 1/rad. With the frontal area and the length of the body it is 0.1 to 2 for vehicles and slender bodies."""
+"""Greatest |Cnβ|, 1/rad. By frontal area and length of the body, vehicles and slender bodies have 0.1 to 2."""
 
 BODY_DENSITIES = (5.0, 30_000.0)
-"""kg/m³: a body as light as four times its air, or denser than lead, is more likely a slip of units."""
+"""kg/m³: a body as light as four times its air, or denser than lead, is more likely a wrong unit."""
 
 NOISE_TOLERANCE = 0.05
 """Relative uncertainty of a stated or measured noise level, as on data sheets."""
 
 LEAST_NOISE = 1e-7
-"""Noise over the largest reading: no sensor and no integrator does better, so no smaller noise is claimed."""
+"""Least ratio of noise to the largest reading: no sensor and no integrator does better."""
 
 LEAST_STIFFNESS_STD = 1e-5
-"""Relative standard deviation of k: no clock and no fit is trusted further."""
+"""Least relative standard deviation of k: no clock and no fit is more accurate."""
 
 # --- Evidence that a record must give. ---
 
 LEAST_SAMPLES = 8
-"""Samples of a run: five unknowns describe it, and three more samples are the least that show how well they do."""
+"""Samples of a run: five unknowns describe it, and at least three more samples test the description."""
 
 LEAST_ENERGY = 56.0
 """Energy of the decay over the noise variance. Noise alone reaches it, at the best of all frequencies of a record
 of 1e6 samples, less than once in 1e6 runs: 2 ln(1e12)."""
 
 LEAST_WINDOW_ENERGY = 400.0
-"""The same of a window, N(A/S)²/2: its amplitude is then known to 5 %."""
+"""Energy of a window over the noise variance, N(A/S)²/2: its amplitude is then known to 5 %."""
 
 LEAST_PROMINENCE = 40.0
 """Power of a spectral peak over the median's; white noise alone reaches it less than once in 1e6 records."""
@@ -147,8 +147,8 @@ LEAST_PEAK_HEIGHT = 10.0
 not symmetric."""
 
 LEAST_PEAK_SHARE = 0.1
-"""Height of a peak over the first one, for the conventional method, which does not know the
-noise; for the same reason."""
+"""Height of a peak over the first one, for the conventional method, which does not know the noise; for the same
+reason."""
 
 LEAST_ENVELOPE = 4.0
 """Amplitude of the Hilbert envelope over its standard deviation: averages of half a cycle need less than peaks."""
@@ -158,19 +158,19 @@ GREATEST_NETWORK_DISTANCE = 0.1
 are not used: they were trained on damped oscillations."""
 
 CLEAR_SWING = 0.2
-"""Share of a run's largest swing from which its peaks show the centre: smaller swings may end off it, held by dry
-friction. Judgement."""
+"""Share of a run's largest swing down to which its peaks show the centre: smaller swings may end off it, where dry
+friction stops the body. Judgement."""
 
 EQUAL_SWINGS = 0.8
-"""Ratio of two swings that count as equal when centres are compared: what depends on the amplitude changes by less
-than half. Judgement."""
+"""Ratio of two swings that are equal when centres are compared: effects of the amplitude change by less than half.
+Judgement."""
 
 GROSS_MISFIT = 0.01
 """Share of a reading's power in the residual beyond which a fit misses the motion itself: a tenth of the swing.
-Judgement, and that of `tunnel diagnose`."""
+Judgement, also used by `tunnel diagnose`."""
 
 LEAST_FOR_SCATTER = 3
-"""Values whose scatter is taken for their uncertainty."""
+"""Number of values whose scatter is used as their uncertainty."""
 
 SCATTER_TOLERANCE = 1.2
 """Factor on χ² of the networks' windows: their propagated standard deviations are good to a tenth."""
@@ -182,7 +182,7 @@ LEAST_GROWTH_WINDOWS = 4
 for its scatter."""
 
 LEAST_STEADY_CYCLES = 20.0
-"""Cycles of a record that holds its amplitude. With `STEADY_CHANGE`, a free decay would need ζ below 0.0008, less
+"""Cycles of a record of constant amplitude. With `STEADY_CHANGE`, a free decay would need ζ below 0.0008, less
 than the wind alone adds to any rig. Judgement."""
 
 STEADY_CHANGE = 0.1
@@ -190,20 +190,20 @@ STEADY_CHANGE = 0.1
 Judgement."""
 
 SETTLED_SHARE = 0.9
-"""Share of the last amplitude from which a growing motion counts as settled: windows scatter by a few per cent.
+"""Share of the last amplitude from which a growing motion has settled: windows scatter by a few per cent.
 Judgement."""
 
 LINEAR_SHARE = 0.3
-"""Amplitude over that of the limit cycle, up to which a growth counts as linear: a saturation that grows as the
-square of the amplitude reduces the growth rate there by 9 %, and by some 2 % on average."""
+"""Amplitude over that of the limit cycle, up to which a growth is linear: a saturation that grows as the square of
+the amplitude reduces the growth rate there by 9 %, and by some 2 % on average."""
 
 # --- When a random moment is assumed. ---
 
 LEAST_MOMENT_DROP = 1.0
-"""Drop of −2 ln L: a smaller one is no sign of a random moment."""
+"""Drop of −2 ln L: a smaller one is not evidence of a random moment."""
 
 MOMENT_DROP_FOR_CORNER = 20.0
-"""Drop of −2 ln L from which the spectrum of the moment is looked at: the moment must stand out first."""
+"""Drop of −2 ln L from which the spectrum of the moment is estimated: the moment must be clear first."""
 
 LEAST_CORNER_DROP = 4.0
 """Further drop of −2 ln L, two standard deviations, that a corner frequency must bring."""
@@ -211,17 +211,17 @@ LEAST_CORNER_DROP = 4.0
 # --- When two parameters trade off. ---
 
 TRADE_OFF_CORRELATION = 0.95
-"""Absolute correlation of two parameters from which they are said to trade off: the variance of each is then ten
-times what it would be with the other known, the customary sign of collinearity in regression (a variance inflation
-factor 1/(1 − r²) of 10)."""
+"""Absolute correlation from which two parameters trade off: the variance of each is then ten times what it would be
+with the other known, the customary sign of collinearity in regression (a variance inflation factor 1/(1 − r²) of
+10)."""
 
 # --- When the scatter of the runs is significant, and when two scores differ. ---
 
 LEAST_WIDTH_FREEDOM = 1.0
-"""Degrees of freedom of a variance with estimated widths, at least: two runs show one difference."""
+"""Least degrees of freedom of a variance with estimated widths: two runs show one difference."""
 
 LEAST_CHANGE = 0.02
-"""Change of a bias or of a spread that matters, over the spread, where both trials use the same records."""
+"""Relevant change of a bias or a spread, over the spread, where both trials use the same records."""
 
 OUTLIER_MEDIANS = 6.0
 """Size of an outlier in medians of the errors' sizes: four standard deviations where errors are normal."""

@@ -23,7 +23,7 @@ SYMBOLS: Mapping[str, str] = {
     "yaw_inertia": "Izz",
     "mechanical_damping": "Cr",
 }
-"""How the paper writes the quantities of an estimate, by their name in its JSON."""
+"""Symbols of the paper for the quantities of an estimate, by their name in its JSON."""
 
 COEFFICIENTS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -42,7 +42,7 @@ COEFFICIENTS: Mapping[str, str] = {
     "moment_offset": "constant moment",
     "servo_kp": "kp",
 }
-"""Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
+"""Symbols of the coefficients of a diagnosis, also of coefficients multiplied by sizes that are not stated."""
 
 FIXED_DECIMALS = 9
 """A number with more decimals than this, above a million or below a ten-thousandth has a power of ten."""
@@ -336,7 +336,7 @@ DEVIATIONS: Mapping[str, str] = {
     "spring_stiffness": "spring stiffness",
     "mechanical_damping": "mechanical damping",
 }
-"""How the deviations of runs are written, by their name in an estimate's JSON."""
+"""Words for the deviations of runs, by their name in an estimate's JSON."""
 
 
 def repeatability_lines(document: Document) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 ItemT = TypeVar("ItemT")
 Progress = Callable[[int, int], None]
-"""Called with the number of runs that are finished, and of all."""
+"""Called with the number of finished runs, and of all runs."""
 _shown: ContextVar[Progress | None] = ContextVar("shown", default=None)
 
 

@@ -41,7 +41,7 @@ class WrongReturn(TunnelError):
 
 
 Fault = tuple[str, str]
-"""What is wrong, and the remedy."""
+"""The fault, and the remedy."""
 _SAME_STD = 1e-3  # relative: a standard deviation may be rounded to three digits or more
 _ROUNDING = 1e-6  # of a correlation: a covariance is a product of matrices
 

@@ -69,7 +69,7 @@ ROLES: Mapping[str, Role] = {
     "moment_offset": Role(amplitude=0.0),
     "zero": Role(amplitude=0.0, reading=True),
 }
-"""Of the parameters of the nominal models, by name."""
+"""Roles of the parameters of the nominal models, by name."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ _RUNS: Sequence[tuple[Callable[[Role], object], Callable[[Setting], str]]] = (
     (lambda role: role.amplitude, _at_other_amplitudes),
     (lambda role: role.frequency, _at_other_frequencies),
 )
-"""What can be changed, the surest first, and the run that changes it."""
+"""Conditions that can be changed, the surest first, and the run that changes each."""
 
 
 def separating(first: Role, second: Role, rig: Setting) -> str:

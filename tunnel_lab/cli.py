@@ -117,7 +117,7 @@ GROUPS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "blind": blind.app,
     },
 }
-"""Every command by its name, in groups as the help shows them; one that has commands of its own comes last."""
+"""Every command by its name, in the groups of the help; a command with subcommands comes last."""
 COMMANDS = {
     name: command
     for group in GROUPS.values()
@@ -137,7 +137,7 @@ for _group, _members in GROUPS.items():
 
 
 _MARKUP = re.compile(r"\[(?=[a-z#/@])(?!/?bold\])")
-"""A bracket that Rich would take for markup; of markup the help has headings only."""
+"""A bracket that Rich would take for markup; the only markup in the help is its headings."""
 
 
 def _with_plain_brackets(command: Any) -> None:

@@ -115,7 +115,7 @@ FORMS: Mapping[str, tuple[Group, Draw]] = {
     "random_walk": (Group.RARE, _walk),
     "drifting": (Group.RARE, _drifting),
 }
-"""How the deviations of the runs are distributed, by name."""
+"""Distributions of the runs' deviations, by name."""
 
 
 def draw_scatter(

@@ -145,7 +145,7 @@ LINEAR_IN_A_RECORD = frozenset(
         "wind_speed_drift",
     }
 )
-"""One record of these is another damped oscillation: what it shows is its own decay, not that of the stated rig."""
+"""One record of these is another damped oscillation: it shows its own decay, not the stated rig's."""
 
 LOST_SAMPLES: Mapping[str, int] = {"dropped_samples/one_instant": 1, "dropped_samples/three_instants": 3}
-"""Least number of samples that a form loses, by family and name."""
+"""Least number of samples lost by a form, by family and name."""

@@ -208,4 +208,4 @@ DEPARTURES: Mapping[str, Change] = {
     "air_restores": _air_restores,
     "damping_is_other": _damping_is_other,
 }
-"""What breaks an assumption, by the name of what is broken."""
+"""Departures by the name of the broken assumption."""

@@ -94,7 +94,7 @@ KINDS = (*NUMBERS, *BEYOND)
 DEFAULT_SHARES = {"single": 0.3, "pair": 0.17, "three": 0.14, "four": 0.11, "none": 0.14, "outside": 0.14}
 _STRONG_SHARE = 0.2
 _SMALL = (0.03, 0.3)
-"""Excess of a small effect: seen in 10⁵ samples, but less than a third of the noise power."""
+"""Excess of a small effect: detectable in 10⁵ samples, but less than a third of the noise variance."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ _MODULES = [
 FORMS: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
 FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS if not form.driven}))
 DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
-"""Of driven runs."""
+"""Forms for driven runs."""
 
 
 def forms_of(family: str) -> tuple[Form, ...]:

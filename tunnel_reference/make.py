@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1
 FEW_RUNS = 6
-"""The ordinary plans have at least as many runs."""
+"""Least number of runs of the ordinary plans."""
 
 
 def plan_kinds(count: int, shares: dict[str, float]) -> list[str]:

@@ -302,4 +302,4 @@ LAW_FORMS: tuple[Form, ...] = (
     Form(UNKNOWN, "reading_kink", C, "g", 5e-3,
          reading(reading_kink, Order.CURVE, lambda p, _e, _c: {"gain": p}), _BOTH),
 )  # fmt: skip
-"""Drawn for the kind ``law`` of campaigns."""
+"""Forms for the kind ``law`` of campaigns."""

@@ -195,7 +195,7 @@ def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
 
 
 OWN_EXCESS = 0.5
-"""Least excess of an effect that the others cannot imitate, noise powers: a hundred deviations in 10⁵ samples."""
+"""Least excess of an effect that the others cannot imitate, noise variances: 100 deviations in 10⁵ samples."""
 OWN_SHARE = 0.1
 """That excess as a share of the whole: signatures of large effects are not exactly proportional to their size."""
 ATTEMPTS = 4

@@ -45,7 +45,7 @@ _LEAST_TO_SEE_CHANGE = 5
 _LEAST_SAMPLES = 16
 _TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
 NO_WINDOWS = 10**6
-"""As periods in a window: longer than any record, so that a run has none."""
+"""Cycles per window longer than any record, so that a run has no windows."""
 _UNKNOWNS = 5
 _NEAR = 1e-6  # relative tolerance of the fit to block means that gives the start
 

@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.turning_points import TurningPoints
 
 _RATE = 0.01
-"""Rate at which scatter beyond what is stated, or a bend of the period or of the decrement, is chance."""
+"""False-alarm rate for scatter beyond the stated, and for a change of the period or the decrement."""
 
 
 @dataclass(frozen=True)

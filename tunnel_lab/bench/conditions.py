@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 Cells = dict[str, dict[str, str]]
 """Texts by run and key; those of the rig under `RIG`."""
 Words = dict[tuple[str, str], str]
-"""A line for each cell, by row and key."""
+"""Faults by row and key: one line for each cell."""
 RIG = ""
 """The row of the rig's sizes: no run has an empty name."""
 WORDS = {
@@ -44,7 +44,7 @@ MISSING = {
     "frontal_area": "needed for Cnβ and Cnr",
     "reference_length": "needed for Cnβ and Cnr",
 }
-"""What is missing without these; the others are optional, or required (`faults`)."""
+"""Consequences of missing values; the other keys are optional, or required (`faults`)."""
 _OF_JOINT = "0 for a joint without a spring"
 """The stiffness of a driven run in still air."""
 _MOST_ROWS = 20  # in a table without a scroll bar

@@ -34,7 +34,7 @@ from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 _FIRST = (ESTIMATOR, "conventional", "matrix_pencil")
-"""Estimators that are chosen at first: quick ones."""
+"""Estimators chosen initially: quick ones."""
 _INPUTS = {
     "spring_stiffness": "stiffness Kr",
     "wind_speed": "wind speed V",

@@ -40,7 +40,7 @@ FIELDS = {
     "decimal": "Decimal sign of a text file",
     "no-cut": "Cut records at releases",
 }
-"""The label of the field, without its example and unit, by the option that states the same."""
+"""Labels of fields, without example and unit, by the equivalent option."""
 _OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"([^\"]*)\"))?")
 
 _NAMED = ("answer", "effect", "parameter", "added")  # columns of the names of effects and parameters

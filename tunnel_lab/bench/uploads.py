@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fastapi import FastAPI
 
 NEW = "/upload"
-"""Address that takes the files of a new session."""
+"""Address for the files of a new session."""
 _MOST_FILES = 1000  # of a request
 _one_at_a_time = Lock()  # two requests must not take the same new name
 

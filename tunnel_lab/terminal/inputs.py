@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 NO_EFFECT = "none"
-"""How the nominal model is written where an effect may be named."""
+"""The name of the nominal model where an effect may be named."""
 HELP = (
     "Folder of the campaign: campaign.toml and its runs. Or one file of a data logger, as for tunnel import."
 )
@@ -116,7 +116,7 @@ def parse_effect(text: str) -> EffectSetting:
 
 
 EVERY = "As for every command"
-"""Where the help lists what every command takes."""
+"""The part of the help that lists the options common to all commands."""
 quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 """Whether this command prints errors only."""
 

@@ -44,10 +44,10 @@ BRACKETS = (
 )
 """Printed once below tables in the short notation."""
 PROSE = 30
-"""Columns: a longer cell is a sentence, which may go over several lines."""
+"""Columns: a longer cell is a sentence, which may be wrapped."""
 _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 DIAGNOSE = "run the diagnosis"
-"""How notes end whose remedy is the diagnosis."""
+"""The ending of notes whose remedy is a diagnosis."""
 Document = Mapping[str, Any]
 _DOMINANT = 0.5  # of the variance: more than all others together
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")

@@ -20,13 +20,13 @@ LEFT = {
     "how far it closes": (0.12, 1.3),
     "what no effect explains": (0.04, 0.54),
 }
-"""Time left over the time so far at the start of each stage: the 10th and the 90th percentile of the 248 diagnoses
+"""Remaining over elapsed time at the start of each stage: the 10th and the 90th percentile of the 248 diagnoses
 of the blind check that found a gap, by the times in their documents and of their files. At other instants the range
-held 86 % of them, and 84 % of the 100 of a later blind set (seed 20271126). Before a gap is found nothing can be
-said: without one the answer follows at once."""
+covered 86 % of them, and 84 % of the 100 diagnoses of a later blind set (seed 20271126). Before a gap is found
+there is no estimate: without a gap the answer follows at once."""
 _SPREAD = NormalDist().inv_cdf(0.9)
 _UNUSUAL = 0.98
-"""Share of the times that have passed, beyond which nothing is said about the time left."""
+"""Share of the times that have already passed, above which no estimate is given."""
 
 
 @dataclass(frozen=True)

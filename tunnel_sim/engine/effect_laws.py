@@ -40,7 +40,7 @@ WIND_ON = RunSettings(
 WIND_OFF = replace(WIND_ON, wind_speed=0.0)
 _TIME = np.arange(0.0, WIND_ON.duration, 1.0 / SENSOR.sample_rate)
 DRIVE = DriveMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
-"""Of the runs of an effect that acts on driven runs only: a chirp over the resonance, N m."""
+"""Input for an effect that acts on driven runs only: a chirp over the resonance, N m."""
 
 
 @dataclass(frozen=True)

@@ -185,7 +185,7 @@ _UNITS = {
     "release_angle": "rad",
     "sensor_zero": "rad",
 }
-"""Of the numbers of a run."""
+"""Keys of the numbers of a run."""
 STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the greatest Ka
 
 
