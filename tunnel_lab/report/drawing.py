@@ -121,7 +121,8 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
         return ids.setdefault(given, f"{name}-{len(ids)}")
 
     def in_page(tag: re.Match[str]) -> str:
-        text = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", tag[0]))
+        drawn = tag[0].replace('<g id="QuadMesh', '<g shape-rendering="crispEdges" id="QuadMesh')  # no seams
+        text = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", drawn))
         text = _REFERENCE.sub(lambda match: match[1] + own(match[2]), text)
         return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", text)
 

@@ -56,3 +56,4 @@ def test_a_colour_bar_has_the_colours_of_the_theme(of_two: bool) -> None:
     svg = inline_svg(drawn, "map", "A map.")
     assert "<image" not in svg  # an image keeps the colours of the light page
     assert "var(--before)" in svg
+    assert 'shape-rendering="crispEdges"' in svg  # no seams between the areas
