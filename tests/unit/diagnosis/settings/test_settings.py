@@ -185,8 +185,11 @@ def test_the_probabilities_are_those_of_the_decision(motion, moved):
     chosen = Settings().changed({f"weighing.{name}": value for name, value in moved.items()}).weighing
     least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
     common = max(min(left[c] for left, _ in SETS.values()) for c in range(6))
-    error = min(max(chosen.form_error**2 * sum(GAP), common), chosen.model_error**2 * motion)
-    scale = [chosen.needless_chi2 + error] * 6
+    gap_by_channel = [x + chosen.leak * (sum(GAP) - x) for x in GAP]
+    errors = [
+        min(max(chosen.form_error**2 * x, common), chosen.model_error**2 * motion) for x in gap_by_channel
+    ]
+    scale = [chosen.needless_chi2 + error for error in errors]
     weights = {
         key: exp(
             -chosen.steepness
@@ -196,7 +199,9 @@ def test_the_probabilities_are_those_of_the_decision(motion, moved):
         )
         for key, (left, numbers) in SETS.items()
     }
-    by_chance = [chosen.chance_stds * (2.0 * n) ** 0.5 + error for n in COUNT]
+    by_chance = [
+        chosen.chance_stds * (2.0 * n) ** 0.5 + error for n, error in zip(COUNT, errors, strict=True)
+    ]
     gap = misfit(GAP, by_chance, chosen)
     odds = {}
     for key, (left, _) in SETS.items():
