@@ -209,6 +209,10 @@ class Between:
         away = self.found.deviations / self.widths
         seen = np.einsum("rk,rkl,rl->", away, one - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
+        if given is None:
+            given = np.zeros(self.found.common.size, bool)
+        for one in (self.found, self.most):  # a parameter that the runs do not determine has no variance
+            given = given & (np.diag(one.covariance) > 0.0)
         information = self.found.log_information_given(given) - self.most.log_information_given(given)
         return width + self.prior_cost + information
 
