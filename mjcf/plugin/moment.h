@@ -85,12 +85,10 @@ typedef struct {
 // Time constant of the aerodynamic lag, s (a l/V); 0 without lag, negative for a phase lead.
 double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 
-// x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at 0.2 rad; x^2, or another power that
-// equals it at 2 rad/s. An exponent of 0 selects the textbook power.
+// x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at the reference.
 #define VWT_ANGLE_REFERENCE 0.2  // rad
 #define VWT_RATE_REFERENCE 2.0   // rad/s
-double vwt_power_of_angle(double x, double textbook, double exponent);
-double vwt_power_of_rate(double x, double exponent);
+double vwt_power(double x, double textbook, double exponent, double reference);
 
 // Aerodynamic yaw moment on the body, N m.
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
