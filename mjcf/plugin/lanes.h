@@ -23,6 +23,7 @@ typedef struct {
   Coefficients law;
   Air air;    // in a constant wind
   int rubs;   // whether any lane has Coulomb friction
+  Mask dry;   // the lanes that have
   int count;  // of the lanes that are runs; the others repeat the first one's start
   const vwt_run* run[VWT_LANES];
   Lane step, whole_step, half_step, body, inertia, damping, rod, friction, least_rate;
@@ -42,7 +43,8 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   set_wake(&c->law, k, p, wind);
   set_air(&c->air, k, p, wind);
   c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0);
-  c->rubs |= p->friction_moment > 0;
+  c->rubs |= vwt_rubs(p);
+  c->dry[k] = -vwt_rubs(p);
   c->run[k] = run;
   c->step[k] = run->step;
   c->whole_step[k] = stride * run->step;
@@ -86,14 +88,15 @@ INLINE Air air_at(const Lanes* c, int features, Lane time) {
 INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
                          Lane lagged, Powers* powers) {
   const Coefficients* law = &c->law;
-  const Lane air = air_moment(law, flow, features, c->body * angle, c->body * rate, shed, lagged, powers);
-  Lane moment = mechanism_moment(law, features, angle, angle, rate, powers);
+  const Lane air = moment_of_air(law, flow, features, c->body * angle, c->body * rate, shed, lagged, powers);
+  Lane moment = moment_of_mechanism(law, features, angle, angle, rate, powers);
   moment = moment - law->spring * angle - c->damping * rate;
   moment = moment + c->body * air - c->rod * angle;
   Lane friction = c->friction;
   if (features & RATE) {
     for (int k = 0; k < VWT_LANES; k++) {
-      friction[k] = vwt_friction_level(law->p[k], c->least_rate[k], slip[k] * rate[k]);
+      const double load = vwt_load(law->p[k], angle[k], 0);
+      friction[k] = vwt_friction_level(law->p[k], c->least_rate[k], slip[k] * rate[k], load);
     }
   }
   return (moment - slip * friction) / c->inertia;
@@ -120,7 +123,7 @@ INLINE Lane lagged_at(const Lanes* c, const State* s, const double weights[][4],
 // The lanes that have Coulomb friction and do not slide on throughout a step: the others have moved as the step says.
 INLINE Mask turning(const Lanes* c, const State* before, Lane rate) {
   const Mask slides = (before->rate != 0) & (rate * before->slip > 0);
-  return (c->friction > 0) & ~slides;
+  return c->dry & ~slides;
 }
 
 // A step of one lane that reverses or sticks under Coulomb friction. Where it changes nothing in a steady law, the lane
@@ -152,7 +155,7 @@ static void release(int count, const vwt_parameters* parameters, const vwt_run* 
     s->angle[k] = alone[k].from.angle;
     s->rate[k] = alone[k].from.rate;
     s->lagged[k] = alone[k].lagged;
-    s->slip[k] = parameters[i].friction_moment > 0 ? alone[k].slip : 0;
+    s->slip[k] = vwt_rubs(&parameters[i]) ? alone[k].slip : 0;
   }
 }
 

@@ -37,7 +37,7 @@ INLINE Lane with_sign(Lane size, Lane x) { return copysign(size, x); }
 INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : other; }
 #endif
 
-// What a law has that needs a function of the library, or a loop. RATE: friction that depends on the rate; WIND: of
+// What a law has that needs a function of the library, or a loop. RATE: friction that depends on rate or load; WIND: of
 // samples, where a run has them
 enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16, WIND = 32, ANY = 63 };
 
@@ -75,7 +75,9 @@ INLINE int features_of(const vwt_parameters* p, double wind) {
   return (powers ? POWERS : 0) | (p->gravity_stiffness != 0 ? GRAVITY : 0) |
          (p->shedding_amplitude != 0 && p->width > 0 && wind > 0 ? SHEDDING : 0) |
          (vwt_lag_time(p, wind) != 0 ? LAG : 0) |
-         (p->friction_exponent != 0 || p->friction_saturation != 0 || p->friction_peak != 0 ? RATE : 0);
+         (p->friction_exponent != 0 || p->friction_saturation != 0 || p->friction_peak != 0 || p->friction_load != 0
+              ? RATE
+              : 0);
 }
 
 INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
@@ -152,8 +154,8 @@ INLINE Lane shed_at(const Coefficients* c, Lane time) {
 
 // Moment of the air on the body, with the powers in it; `shed` and `lagged` are read only with the features they belong
 // to.
-INLINE Lane air_moment(const Coefficients* c, const Air* air, int features, Lane body, Lane rate, Lane shed, Lane lagged,
-                       Powers* powers) {
+INLINE Lane moment_of_air(const Coefficients* c, const Air* air, int features, Lane body, Lane rate, Lane shed,
+                       Lane lagged, Powers* powers) {
   Lane steepening = (Lane){0} + 1, thickening = steepening;
   if (ACTS(c->moment_cubic)) {
     powers->steepening = power_of_angle(c, features, size_of(body), 2, VWT_INDEX_moment_cubic_exponent);
@@ -186,7 +188,7 @@ INLINE Lane gravity_moment(const Coefficients* c, Lane angle) {
 
 // Moment of the mechanism on the rod's upper end, without friction and without the linear spring and damper, and the
 // powers in it.
-INLINE Lane mechanism_moment(const Coefficients* c, int features, Lane angle, Lane deflection, Lane rate,
+INLINE Lane moment_of_mechanism(const Coefficients* c, int features, Lane angle, Lane deflection, Lane rate,
                              Powers* powers) {
   const Lane size = size_of(deflection);
   Lane moment = {0};

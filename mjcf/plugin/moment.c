@@ -36,18 +36,26 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   set_wake(&c, 0, p, s->wind_speed);
   set_air(&air, 0, p, s->wind_speed);
   const double shed = shed_at(&c, s->time), forcing = flow_at(p, s->wind_speed) * s->wind_speed * s->forcing;
-  return air_moment(&c, &air, ANY, s->angle, s->rate, shed, s->lagged, &powers) + forcing;
+  return moment_of_air(&c, &air, ANY, s->angle, s->rate, shed, s->lagged, &powers) + forcing;
 }
 
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate) {
   Coefficients c;
   Powers powers;
   set_coefficients(&c, 0, p);
-  return mechanism_moment(&c, ANY, angle, deflection, rate, &powers);
+  return moment_of_mechanism(&c, ANY, angle, deflection, rate, &powers);
 }
 
-double vwt_friction_level(const vwt_parameters* p, double least, double along) {
-  double level = p->friction_moment;
+double vwt_load(const vwt_parameters* p, double angle, double drive) {
+  if (p->friction_load == 0) {
+    return 0;
+  }
+  const double gravity = p->gravity_stiffness * sin(angle - p->gravity_angle);
+  return fmax(fabs(gravity + p->load_stiffness * sin(angle - p->load_angle)), fabs(drive));
+}
+
+double vwt_friction_level(const vwt_parameters* p, double least, double along, double load) {
+  double level = p->friction_moment + p->friction_load * load;
   if (p->friction_exponent != 0) {
     level *= pow(fabs(along) / VWT_RATE_REFERENCE, p->friction_exponent);
   }
@@ -88,17 +96,22 @@ void vwt_friction_slopes(const vwt_parameters* p, double least, double along, do
   slopes[4] = level * power * turn * shape;
 }
 
-double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
-  return p->friction_moment * (1 + p->friction_peak) * duration / inertia;  // 1 rad in a step
+// Under the greatest load of gravity.
+static double greatest_friction(const vwt_parameters* p) {
+  return p->friction_moment + p->friction_load * (fabs(p->gravity_stiffness) + fabs(p->load_stiffness));
 }
 
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration,
-                           double now) {
-  if (!(p->friction_moment > 0)) {
+double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
+  return greatest_friction(p) * (1 + p->friction_peak) * duration / inertia;  // 1 rad in a step
+}
+
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double load,
+                           double duration, double now, double load_now) {
+  if (!vwt_rubs(p)) {
     return 0;
   }
-  const double least = vwt_friction_least_rate(p, inertia, duration), limit = vwt_friction_level(p, least, 0);
-  const double level = vwt_friction_level(p, least, fabs(now));
+  const double least = vwt_friction_least_rate(p, inertia, duration), limit = vwt_friction_level(p, least, 0, load);
+  const double level = vwt_friction_level(p, least, fabs(now), load_now);
   if (limit == 0) {  // it vanishes where the rate does, and needs no care there
     return -copysign(level, now);
   }
@@ -107,7 +120,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
   if (rate == 0) {
     return fabs(other) <= limit ? -other : other > 0 ? -level : level;
   }
-  const double start = vwt_friction_level(p, least, fabs(rate));
+  const double start = vwt_friction_level(p, least, fabs(rate), load);
   const double slip = rate > 0 ? -start : start;
   const double acceleration = (other + slip) / inertia;
   const double stop = -rate / acceleration;  // time at which the rate passes zero
@@ -121,7 +134,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
 }
 
 double vwt_presliding_range(const vwt_parameters* p, double inertia, double duration) {
-  return fmax(p->presliding, p->friction_moment * duration * duration / (2 * inertia));  // 2 rad in a step
+  return fmax(p->presliding, greatest_friction(p) * duration * duration / (2 * inertia));  // 2 rad in a step
 }
 
 // Deflection after a motion over `distance` in the direction `side`, 1 or -1.

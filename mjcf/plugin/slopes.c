@@ -223,7 +223,7 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
     const Lane none = {0}, shed = features & SHEDDING ? shed_at(&law->c->law, s->start) : none;
     const Air air = air_at(law->c, features, s->start);
     const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
-    const Mask rests = (law->c->friction > 0) & (s->rate == 0);
+    const Mask rests = law->c->dry & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);
   }
@@ -272,9 +272,11 @@ INLINE void between(Lane h, double u, Lane angle0, Lane rate0, Lane angle1, Lane
   *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
 }
 
-// Whether a run's motion has derivatives: friction as a root of the rate is infinitely steep at a reversal.
+// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, and
+// friction that depends on the load has none by gravity's terms.
 static int is_smooth(const vwt_parameters* p) {
-  return !(p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1);
+  const int root = p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1;
+  return !root && p->friction_load == 0;
 }
 
 // Whether a term of one lane has a derivative.
@@ -283,6 +285,8 @@ static int exists(const Lanes* c, int k, int term) {
   switch (term) {
     case VWT_TERM_friction:
       return p->friction_moment > 0;
+    case VWT_TERM_friction_load:  // exists on one side only
+      return 0;
     case VWT_TERM_friction_exponent:
       return p->friction_moment > 0 && p->friction_exponent >= 1;
     case VWT_TERM_friction_saturation:

@@ -123,7 +123,7 @@ INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
     if (moment > 0 && slip[k] != 0) {
       vwt_friction_slopes(c->law.p[k], c->least_rate[k], along, slopes);
     }
-    at->level[k] = moment > 0 ? vwt_friction_level(c->law.p[k], c->least_rate[k], along) / moment : 1;
+    at->level[k] = moment > 0 ? vwt_friction_level(c->law.p[k], c->least_rate[k], along, 0) / moment : 1;
     by_rate[k] = slopes[0];
     for (int n = 0; n < 4; n++) {
       at->by_friction[n][k] = -slip[k] * slopes[n + 1] * law->inverse[k];
@@ -354,6 +354,7 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_friction_saturation] = p->friction_saturation != 0 ? fmax(p->friction_saturation, c->least_rate[k]) : 0;
   out[VWT_TERM_friction_peak_rate] = p->friction_peak_rate != 0 ? fmax(p->friction_peak_rate, c->least_rate[k]) : 0;
   out[VWT_TERM_friction_peak] = p->friction_peak;
+  out[VWT_TERM_friction_load] = p->friction_load;
   out[VWT_TERM_lag] = c->law.lag[k];
   out[VWT_TERM_turn] = c->law.turn[k];
   out[VWT_TERM_pace] = log(run->step);
