@@ -58,6 +58,7 @@ def friction_curve(fit: Fit, own: Similarity) -> FrictionCurve | None:
             )
             for one in _binned(passed, effects[place])
         ),
+        sum(getattr(effects[place], info.name) for info in effects[place].parameters() if info.of_load),
     )
 
 

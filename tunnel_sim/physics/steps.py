@@ -45,7 +45,7 @@ _FIT_STEP = 8.75e-3  # s: a body at the 2 Hz to which the fits scale time turns 
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
 _FIT_MOST_STRIDE = 3  # block means per step
 #: Parameters of moments that a long step of a fit does not resolve: kinks, and a nonlinear spring.
-_ROUGH = ("friction_moment", "free_play", "gravity_stiffness")
+_ROUGH = ("friction_moment", "friction_load", "free_play", "gravity_stiffness")
 _FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, whose error is of second order
 _FIT_SHORTEST = 2e-4  # s, for any stiffness of the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
@@ -149,6 +149,10 @@ def for_contact(run: RunSettings) -> RunSettings:
     reach, friction, peak = (
         run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
     )
+    if share := run.parameters.get("friction_load", 0.0):
+        weight = sum(abs(run.parameters.get(name, 0.0)) for name in ("gravity_stiffness", "load_stiffness"))
+        driven = run.drive.greatest[0] if run.drive is not None and run.drive.on_body else 0.0
+        friction += share * max(weight, driven)
     names = ("friction_saturation", "friction_peak_rate")
     rates = [rate for name in names if (rate := run.parameters.get(name, 0.0)) > 0.0]
     if friction == 0.0 or (reach == 0.0 and not rates):
