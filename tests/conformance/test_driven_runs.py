@@ -232,7 +232,7 @@ MODE = (
         slow("moment", *RUBS),
         slow("rates", *RUBS),
         slow("uneven", *RUBS),
-        slow("turning base", "coulomb_friction", Planted(friction=0.004), {"friction_moment": 0.004}),
+        ("turning base", "coulomb_friction", Planted(friction=0.004), {"friction_moment": 0.004}),
         ("unknown gain", "input_delay", Planted(delay=0.005), {"delay": 0.005}),
         slow("moment", *MODE),
         slow("unknown gain", *MODE),

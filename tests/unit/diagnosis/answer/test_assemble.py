@@ -248,6 +248,7 @@ def test_progress_is_reported_and_steps_are_timed():
     assert all(seconds >= 0.0 for seconds in answer.seconds.values())
 
 
+@pytest.mark.usefixtures("causes_alone")
 def test_effects_that_are_withheld_are_not_answered_with():
     data = campaign(added=hum(1e-3))
     answer = diagnose(data, kinds=vocabulary(["quadratic_damping", "coulomb_friction"]))

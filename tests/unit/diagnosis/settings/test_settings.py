@@ -2,11 +2,12 @@
 
 import ast
 from dataclasses import fields
+from functools import cache
 from typing import get_args
 
 import pytest
 
-from diagnosis import Settings, diagnose
+from diagnosis import Settings, diagnose, vocabulary
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
@@ -58,12 +59,15 @@ KNOWN_IN_SEVERAL = {
 VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py"}
 
 
+@cache
 def sources():
-    """Every module that may read a setting, by its path."""
-    for package in ("diagnosis", "tunnel_lab"):
-        for path in sorted((settings_page.ROOT / package).rglob("*.py")):
-            if path.parent.name != "settings":
-                yield path, ast.parse(path.read_text("utf-8"))
+    """Every module that may read a setting, with its path."""
+    return [
+        (path, ast.parse(path.read_text("utf-8")))
+        for package in ("diagnosis", "tunnel_lab")
+        for path in sorted((settings_page.ROOT / package).rglob("*.py"))
+        if path.parent.name != "settings"
+    ]
 
 
 def reads(tree, names, owner=""):
@@ -142,7 +146,10 @@ def test_the_settings_given_decide_and_are_in_the_document():
     )  # the tests share it, and no p-value is above 1
     assert investigate(data, (), settings=everything).gap.test.detected
     given = {"words.runs_without_caution": len(data.runs) + 1}
-    usual, changed = (diagnose(data, settings=Settings().changed(one)).to_json_dict() for one in ({}, given))
+    kinds = vocabulary(["quadratic_damping"])
+    usual, changed = (
+        diagnose(data, kinds=kinds, settings=Settings().changed(one)).to_json_dict() for one in ({}, given)
+    )
     assert (usual["provenance"]["settings"], changed["provenance"]["settings"]) == ({}, given)
     assert not any(said.startswith("There are") for said in usual["cautions"])
     assert any(said.startswith(f"There are {len(data.runs)} runs only") for said in changed["cautions"])
