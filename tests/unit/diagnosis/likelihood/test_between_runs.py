@@ -60,3 +60,15 @@ def test_runs_show_by_themselves_what_greatest_differences_cannot_hide(
     """Twelve runs know their common deviation to a third of the greatest width, which is 20 widths."""
     between = columns(0.03 * WIDTH, within=within).likeliest(PRIOR)
     assert between.shown(np.array([size * WIDTH]), 4.0).tolist() == [shown]
+
+
+def test_a_parameter_that_single_runs_show_costs_nothing_for_being_compared() -> None:
+    """One parameter that acts as a deviation does: its variance is the runs' mean, a² + w² for the width w."""
+    found = columns(0.03 * WIDTH).likeliest(PRIOR)
+    known = columns(0.03 * WIDTH).products.own
+    given, free = found.cost(known, np.array([True])), found.cost(known, np.array([False]))
+    assert free == found.cost(known)
+    accuracy, most = 0.03 * WIDTH, PRIOR.most[0]
+    gain = np.log((accuracy**2 + most**2) / (accuracy**2 + found.widths[0] ** 2))
+    assert free - given == pytest.approx(gain, rel=1e-6)
+    assert gain > 5.0

@@ -14,6 +14,8 @@ from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import nominal_study
 from diagnosis.search.scatter import scattered
 from tunnel_sim.effects import effect_class, known_effects
@@ -30,12 +32,16 @@ BODY = load_rig().body
 
 
 @cache
-def blown(*, offset: float = 0.0, shedding: float = 0.0) -> Campaign:
+def blown(
+    *, offset: float = 0.0, shedding: float = 0.0, lead: float = 0.0, sensor_error: float = 0.0
+) -> Campaign:
     """Decays by SciPy's integrator in winds that differ from what is stated.
 
     Args:
         offset: by which the true wind is faster, m/s.
         shedding: coefficient of the moment of vortices.
+        lead: time constant by which the moment leads the angle, in l/V.
+        sensor_error: cubic error of the readings, 1/rad².
     """
     rng, time = np.random.default_rng(7), np.arange(0.0, 8.0, 1.0 / RATE)
     runs = []
@@ -51,12 +57,17 @@ def blown(*, offset: float = 0.0, shedding: float = 0.0) -> Campaign:
             k: float = spring - pressure * CN_BETA,
             c: float = DAMPING - pressure * lever * CN_R,
             forcing: tuple[float, float, float] = (pressure * shedding, turn, phase),
+            ahead: tuple[float, float] = (pressure * CN_BETA, lead * lever),
         ) -> list[float]:
             size, rate, start = forcing
-            return [y[1], (-k * y[0] - c * y[1] + size * np.sin(rate * t + start)) / INERTIA]
+            stiffness, constant = ahead
+            behind = (y[0] - y[2]) if constant else 0.0
+            moment = -k * y[0] - c * y[1] + size * np.sin(rate * t + start) + stiffness * behind
+            return [y[1], moment / INERTIA, behind / constant if constant else 0.0]
 
-        swing = solve_ivp(rates, (0.0, time[-1]), (0.3, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
-        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        start = (0.3, 0.0, 0.3)
+        swing = solve_ivp(rates, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
+        record = Record(time, swing + sensor_error * swing**3 + rng.normal(0.0, NOISE, time.size))
         runs.append(
             Run(
                 f"r{number}", record, stated, air_density=DENSITY if stated else None, spring_stiffness=spring
@@ -117,8 +128,27 @@ def test_vortices_keep_time_with_the_true_speed(monkeypatch: pytest.MonkeyPatch)
     assert followed.excess < 0.1 * stated.excess
 
 
+def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Cnr absorbs its first order, and the deviations of the runs most of a prediction from there."""
+    _, base = beside_scatter(blown(lead=0.3, sensor_error=-0.07), "sensor_nonlinearity")
+    lag = effect_class("unsteady_aero_lag")
+    (start,) = starting_points(base, lag)
+    assert start.predicted_drop < base.settings.search.least_drop
+    assert sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag]) == []
+    monkeypatch.setattr(Hypothesis, "explains_runs", True)
+    (child,) = sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag])
+    assert base.unlikelihood - child.fit.unlikelihood > 1.2 * start.predicted_drop
+    assert abs(child.fit.value("unsteady_aero_lag.lag") + 0.3) < 3.0 * child.fit.std("unsteady_aero_lag.lag")
+
+
 def test_which_effects_only_the_comparison_of_runs_shows() -> None:
     """A speed that is off does to every run what a deviation does; the vortices' line is in each of them."""
     assert off()[1].compared == 1
+    assert not off()[1].shown.any()
     base, shed = beside_scatter(blown(shedding=0.05), "vortex_shedding")
     assert (base.compared, shed.compared) == (0, 0)
+    of_effect = [name.startswith("vortex_shedding.") for name in shed.problem.names]
+    assert any(of_effect)
+    assert shed.shown.tolist() == of_effect

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from diagnosis import diagnose
-from diagnosis.answer.assemble import assemble, localise
 from diagnosis.facts.found import as_stated
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
@@ -130,5 +129,5 @@ def test_a_rival_of_ones_own_is_weighed_counts_for_unknown_and_is_said():
     before, after = (study.of(UNKNOWN).probability for study in (without, with_rival))
     assert before < 0.05  # the other springs explain the gap as well
     assert 0.4 < after < 0.6
-    said = assemble(with_rival, *localise(with_rival)).in_words()
+    said = diagnose(one_run_off(), kinds=kinds, rivals=(OneRunOff(),))
     assert said.verdict.endswith("The spring of r4 would explain the gap: measure it again.")
