@@ -212,7 +212,7 @@ SERVO = '<position name="motor" joint="elbow" kp="60" kv="4"/>'
     ("axis", "start", "actuators", "peaks", "damping"),
     [
         pytest.param(UPRIGHT, 0.0, MOTOR, (0.3, 0.2, 0.25), 0.4, marks=pytest.mark.slow),
-        slow(LEVEL, math.pi / 2, MOTOR, (0.3, 0.2, 0.25), 0.4),  # test_cli_own_model.py has it, too
+        slow(LEVEL, math.pi / 2, MOTOR, (0.3, 0.2, 0.25), 0.4),  # so has test_diagnose_own_model.py
         pytest.param(LEVEL, 0.0, SERVO, (0.8, 0.5, 0.6), 4.4, marks=pytest.mark.slow),
     ],
 )
