@@ -19,7 +19,6 @@ from diagnosis.result import Diagnosis
 from diagnosis.search.views.by_moment import by_moment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.usefixtures("causes_alone")
@@ -89,14 +88,6 @@ def within(found: Diagnosis, stds: float) -> bool:
     )
 
 
-def test_a_joint_that_is_as_the_model_has_no_gap() -> None:
-    found = diagnose(campaign(joint(0.0, 0), joint(0.0, 1), inertia=1.2 * INERTIA))
-    assert found.causes == ()
-    assert within(found, 4.0)
-    # the local polynomial method measures the noise beside the response to the input
-    assert abs(found.noise.std / NOISE - 1.0) < 0.1
-
-
 def test_dry_friction_is_named_and_what_vanishes_without_a_spring_is_said() -> None:
     found = diagnose(campaign(joint(FRICTION, 2)))
     assert found.causes == ("coulomb_friction",)
@@ -158,18 +149,3 @@ def test_a_random_moment_is_found_as_the_noise_that_it_is() -> None:
     white = run.scaled(before.unscaled(walked.residuals[0]))[10:]
     assert abs(np.mean(white**2) - 1.0) < 5.0 * np.sqrt(2.0 / white.size)
     assert abs(np.mean(white[1:] * white[:-1])) < 5.0 / np.sqrt(white.size)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"spring_stiffness": 5.0}, "runs with a spring and without one"),
-        ({"wind_speed": 3.0, "air_density": 1.2}, "no spring, and the wind blows"),
-        ({"drive": Drive("drive", moment(1))}, "cannot be identified when the gain is unknown"),
-        ({"drive": Drive("moment_nm", -moment(1))}, "does not follow the moment"),
-    ],
-)
-def test_what_cannot_be_diagnosed_is_refused_in_one_line(change: dict[str, object], said: str) -> None:
-    other = replace(joint(0.0, 1), **change)  # type: ignore[arg-type]
-    with pytest.raises(TunnelError, match=said):
-        diagnose(campaign(joint(0.0, 0), other))

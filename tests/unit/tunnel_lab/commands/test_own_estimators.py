@@ -16,6 +16,7 @@ from identification import estimators, identify, make_estimator, register_estima
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
+from tests.support.driven_runs import driven
 from tests.support.small_sweep import SMALL
 from tunnel_lab.experiments import breakdown, runner, score_trials
 from tunnel_lab.experiments.runner import processes
@@ -356,8 +357,6 @@ def test_a_class_that_no_process_can_import_is_said(folder: Path) -> None:
 
 
 def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
-    from tests.unit.identification.signal.test_driven import campaign as driven_campaign
-
     class Plain:
         name = "plain"
 
@@ -372,7 +371,7 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
         name = "driven"
         takes_driven = True
 
-    given = driven_campaign(("moment_nm", None))
+    given = driven("moment, then released")
     with pytest.raises(TunnelError, match=r"plain takes free decays only; .* states takes_driven = True"):
         identify(given, Plain())
     assert identify(given, Driven()).runs[0].omega_n is not None

@@ -219,7 +219,7 @@ def test_an_estimator_that_crashes_is_a_status(
     rows = outcome.store.scan().collect()
     assert set(rows["status"]) == {"raised"}
     (message,) = set(rows["message"])
-    assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep_engine\.py line \d+", message)
+    assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep\.py line \d+", message)
     assert failed.first.startswith("Traceback (most recent call last):")
     assert failed.first.endswith("ZeroDivisionError: planted")
 
