@@ -1,4 +1,4 @@
-"""The input of a driven run: its column, found by name, unit and correlation with the motion."""
+"""The input of a driven run: its column, found by name and unit, and by a test that it drives the motion."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tunnel_sim.files.importing.tables import Channel, is_input
 from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
+from tunnel_sim.vocabulary.quantities import PerSample, Share
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -38,7 +39,12 @@ _NAMES = re.compile(
     r"tau|effort|u|base|root)(?![a-z])",
     re.IGNORECASE,
 )
-_CORRELATED = 0.3  # greatest correlation at any lag, from which a column drives the motion
+_FALSE_ALARM = 1e-5  # chance that a column without effect on the motion is taken for its input
+_PAST = 12  # earlier readings that predict a free motion, in which the noise is as good as white
+_INPUTS = 4  # readings of an input, the present and earlier ones: inertia, damping, stiffness and a lag
+_PER_CYCLE = 30  # means that the test takes of a cycle: of more, each hardly differs from its neighbours
+_SINGULAR = 1e-9  # of the largest singular value: a smaller one is rounding
+_LEAST_MEANS = 2000  # of a record that has as many samples, whatever its cycle seems to be
 
 
 def find_input(
@@ -83,9 +89,9 @@ def find_input(
         if conditional or not plausible or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
-        with suppress(TunnelError):  # it correlates with the motion, but is not the motion itself
+        with suppress(TunnelError):  # it is not the motion itself
             checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
-            if correlation(channel.values, reading)[0] >= _CORRELATED:
+            if chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
                 found.append(channel)
     if len(found) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
@@ -108,6 +114,33 @@ def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: li
 def _claimed(channel: Channel) -> InputColumn | None:
     """The kind of input shown by name and unit of a column; None if they do not show it."""
     return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
+
+
+def chance_without_effect(values: PerSample, reading: PerSample) -> Share:
+    """The chance that an input without effect predicts the motion as well, beside the motion's own past.
+
+    An F test of two fits: each reading by the ones before it, as in a free motion; and by the input, too.
+    """
+    from scipy.special import fdtrc  # only here: slow to load
+
+    cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(reading - reading.mean())[1:])))
+    block = max(1, reading.size // max(_PER_CYCLE * cycles, _LEAST_MEANS))
+    count = reading.size // block - _PAST
+    free = count - 1 - _PAST - _INPUTS  # degrees of freedom
+    if free < _PAST:
+        return 1.0
+    means = (x[: (count + _PAST) * block].reshape(-1, block).mean(axis=1) for x in (values, reading))
+    u, y = (x / (np.abs(x).max() or 1.0) for x in (x - x.mean() for x in means))
+    past = [y[_PAST - lag :][:count] for lag in range(1, _PAST + 1)]
+    own, _ = np.linalg.qr(np.stack([np.ones(count), *past], axis=1))
+    given = np.stack([u[_PAST - lag :][:count] for lag in range(_INPUTS)], axis=1)
+    residual, beside = y[_PAST:] - own @ (own.T @ y[_PAST:]), given - own @ (own.T @ given)
+    forms, sizes, _ = np.linalg.svd(beside, full_matrices=False)
+    explained = (forms[:, sizes > _SINGULAR * max(sizes[0], _SINGULAR)].T @ residual) ** 2
+    unexplained = float(residual @ residual - explained.sum())
+    if not explained.size or not unexplained > 0.0:
+        return 1.0
+    return float(fdtrc(explained.size, free, explained.mean() * free / unexplained))
 
 
 def correlation(values: Array, reading: Array) -> tuple[float, int]:
