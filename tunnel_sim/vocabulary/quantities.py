@@ -1,6 +1,6 @@
-"""Numbers and arrays whose type states their unit and shape; n counts samples. `tunnel_sim` uses SI units and radians.
+"""Numbers and arrays whose type states their unit and shape, in SI units and radians; n counts samples.
 
-A signature with these types needs no ``Args:`` for unit and shape: ``time: Times, angle: Angles, stiffness: NmPerRad``.
+A signature with these types needs no ``Args:`` for unit and shape: ``time: Times, stiffness: NmPerRad``.
 """
 
 from __future__ import annotations
