@@ -105,7 +105,7 @@ def import_file(folder: Path, draw: Draw) -> None:
 
 def _read_log(path: Path, **choices: Any) -> None:
     """Read a file of an instrument; a reader that ends its process by an exception is a finding."""
-    from tunnel_sim.files.importing.conditions import ImportChoices
+    from tunnel_sim.files.importing.choices import ImportChoices
     from tunnel_sim.files.importing.records import read_records
 
     try:

@@ -36,3 +36,8 @@ Rows: TypeAlias = Annotated[Array, "shape (n,), in the unit of the file; NaN whe
 """A column of a table of a file."""
 PerRun: TypeAlias = Annotated[Array, "shape (runs,)"]
 """One value for each run, in a unit that the docstring or the name states."""
+RatePerRun: TypeAlias = Annotated[Array, "shape (runs,), rad/s"]
+SpeedPerRun: TypeAlias = Annotated[Array, "shape (runs,), m/s"]
+DurationPerRun: TypeAlias = Annotated[Array, "shape (runs,), s"]
+StiffnessPerRun: TypeAlias = Annotated[Array, "shape (runs,), N m/rad"]
+Laws: TypeAlias = Annotated[Array, "shape (runs, parameters), the moment law's parameters in its order"]

@@ -9,9 +9,10 @@ import pytest
 from tunnel_lab.terminal.outputs import parts_table
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.exporting import export_campaign
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.inputs import chance_without_effect, correlation
-from tunnel_sim.files.importing.records import import_records, read_records
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -24,7 +24,7 @@ import xlsxwriter
 from tests.marks import slow
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.readers import load_reader
 from tunnel_sim.vocabulary import limits

@@ -1,4 +1,4 @@
-"""From a file to its tables: its reader is chosen, and runs in a process with limits."""
+"""Step 1 of an import: read the tables of a file, by the reader of its format, in a process with limits."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.formats.text import TEXT, read_text_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
-from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import check_count, is_blank, read_regular
 from tunnel_sim.sandbox import LimitReached, Message, Sandbox
