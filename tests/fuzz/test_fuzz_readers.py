@@ -105,7 +105,7 @@ def import_file(folder: Path, draw: Draw) -> None:
 
 def _read_log(path: Path, **choices: Any) -> None:
     """Read a file of an instrument; a reader that ends its process by an exception is a finding."""
-    from tunnel_sim.files.importing.conditions import ImportChoices
+    from tunnel_sim.files.importing.choices import ImportChoices
     from tunnel_sim.files.importing.records import read_records
 
     try:
@@ -195,7 +195,7 @@ def model_file(folder: Path, draw: Draw) -> None:
     recorded = joint_model.Recorded(
         moved, **({} if middle is None else {"middle": middle, "controlled": True})
     )
-    with patch.object(joint_model, "in_limited_process", in_fork):
+    with patch.object(joint_model, "in_sandbox", in_fork):
         found = joint_model.read_joint_model(folder / "model.xml", "hinge", recorded)
     spec, _ = patched(found, JointPatch(found.law.inertia * draw(st.floats(0.5, 2.0)), friction=0.01))
     patched_xml(spec, found, folder)

@@ -23,9 +23,9 @@ from tunnel_lab.experiments.sweep import open_store
 from tunnel_lab.experiments.sweep_cases import read_sweep
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
-from tunnel_sim.files.readers import read_table
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.run_files import read_table
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 

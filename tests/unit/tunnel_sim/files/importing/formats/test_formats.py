@@ -24,7 +24,7 @@ import xlsxwriter
 from tests.marks import slow
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.readers import load_reader
 from tunnel_sim.vocabulary import limits
@@ -222,7 +222,7 @@ def test_a_damaged_heap_in_which_hdf5_goes_round_for_ever_is_one_line(
     size = content.index(b"GCOL") + 24  # of the text in the heap: the next object is then this one
     content[size : size + 8] = (2**64 - 16).to_bytes(8, "little")
     monkeypatch.setattr(limits, "READER_SECONDS", 0.4)
-    with pytest.raises(TunnelError, match=r"takes longer than [\d.]+ s to read; it may be damaged"):
+    with pytest.raises(TunnelError, match=r"reading it takes more than [\d.]+ s; split it"):
         read_records([written(tmp_path, name, bytes(content))])
 
 

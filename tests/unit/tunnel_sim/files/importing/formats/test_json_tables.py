@@ -11,7 +11,9 @@ import pytest
 
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.conditions import Conditions, ImportChoices, Unstated
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.condition_names import Conditions
+from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import read_records
 
 TIME, ANGLE = decay()

@@ -11,12 +11,13 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.arrays import RUN_IDS, check_size, tables_of_arrays
+from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
+from tunnel_sim.files.importing.formats.text import facts_in
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
-from tunnel_sim.files.importing.text import facts_in
 from tunnel_sim.files.importing.units import known_unit, split_unit
-from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
+from tunnel_sim.files.readers import FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
+from tunnel_sim.files.run_files import USED_COLUMNS
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library, one_line
 

@@ -12,11 +12,11 @@ import pytest
 
 from tests.support.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.formats.text import find_dialect
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.text import find_dialect
 from tunnel_sim.files.importing.units import known_unit, split_unit
 
 

@@ -8,19 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import polars as pl
 
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
-
-if TYPE_CHECKING:
-    from tunnel_sim.files.importing.conditions import ImportChoices
 
 MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
 """Texts, in lower case, that stand for a missing number."""
