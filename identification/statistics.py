@@ -62,7 +62,7 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
         numpy.linalg.LinAlgError: when the matrix is singular.
     """
     diagonal = matrix.diagonal()
-    if not diagonal.min() > 0.0:
+    if not diagonal.min(initial=1.0) > 0.0:
         raise np.linalg.LinAlgError("an unknown does not influence the reading")
     scale = np.sqrt(diagonal)
     unit = scale if right.ndim == 1 else scale[:, None]

@@ -46,7 +46,7 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
     """Derivative of every run's values to the relative size of each of `SCATTERED`, shape (m, 3).
 
     Args:
-        design: of the runs, with the gains of inputs where there are driven ones.
+        design: of the runs, with the gains of inputs.
         parameters: φ, shape (p,).
     """
     columns = {name: float(parameters[place]) for name, place in design.columns.items()}
@@ -61,7 +61,7 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
         move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
         move[1, 1] = spring
         move[0, 2] = 0.5 * still
-        if run.known_gain is not None and len(link) > 2:
+        if run.known_gain is not None:
             move[2, 1] = run.known_gain.per_stiffness * spring
         moves.append(move)
     return moves
@@ -72,7 +72,7 @@ class MeasuredRuns:
     """Decay rates and stiffnesses of runs from a method, and their change with deviations of the runs.
 
     Args:
-        links: by run, shape (m, p), from the common parameters φ to (a, k), or to (a, k, g) with driven runs.
+        links: by run, shape (m, p), from the common parameters φ to (a, k, g).
         seen: by run, shape (m,).
         weights: inverse covariance of its noise by run, shape (m, m).
         moves: by run, derivative to the relative size of each of `SCATTERED`, shape (m, 3).
@@ -95,7 +95,7 @@ class MeasuredRuns:
         """Runs about common parameters.
 
         Args:
-            design: of the runs, with the gains of inputs where there are driven ones.
+            design: of the runs, with the gains of inputs.
             start: φ, shape (p,).
         """
         return cls(design.links, seen, weights, moves_of(runs, design, start))

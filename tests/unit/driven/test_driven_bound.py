@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from identification.uncertainty.cramer_rao import CampaignBound, campaign_bound
 from tests.marks import slow
 from tests.reference.free_decays import damped_cosine

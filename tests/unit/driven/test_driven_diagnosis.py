@@ -14,7 +14,7 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES, driven_variance
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive

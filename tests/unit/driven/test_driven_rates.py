@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose
 from identification import identify
-from identification.signal.driven import driven_rows, driven_start
+from identification.signal.forcing import driven_rows, driven_start
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
