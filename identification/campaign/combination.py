@@ -41,6 +41,7 @@ from identification.signal.run_fit import (
 from identification.statistics import determined
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _RUN_UNKNOWNS = 5  # of a run's own fit: decay, stiffness, initial state, zero
@@ -173,15 +174,24 @@ class RunByRun(ABC):
         """Identify every run, then the campaign from those that could be identified.
 
         Raises:
-            TunnelError: a wind-on run states no air density; raised before any run is analysed.
+            TunnelError: a wind-on run states no air density, or the method does not take a run; raised before any
+                run is analysed.
         """
         for run in campaign.runs:
             loads(run, campaign.rig)
+            if why := self._refusal(run):
+                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
+                raise TunnelError(f"the run {why}", where=where, remedy=remedy)
         pairs = [(run, self._run(run, campaign.sensor)) for run in counted(campaign.runs)]
         found = [
             RunDecay(RunEstimate(run.id, (one,))) if isinstance(one, Status) else one for run, one in pairs
         ]
         return combined_estimate(campaign, self.name, found, together=self._together(found))
+
+    def _refusal(self, run: Run) -> str:
+        """Why the method does not take a run, after "the run"; empty where it does."""
+        del run
+        return ""
 
     @abstractmethod
     def _run(self, run: Run, sensor: SensorProperties) -> Found:

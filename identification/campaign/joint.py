@@ -93,7 +93,7 @@ def joint_estimate(
         | design_statuses(design, fit.parameters[:size])
     )
     zero = None
-    if not campaign.driven:
+    if not campaign.driven:  # neither is stated of driven runs
         if Status.MODEL_DEPARTS in statuses and found.names:
             own = widened_covariance(own, _scatter(fit, linked, found, runs, own_zeros=own_zeros))
         zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")

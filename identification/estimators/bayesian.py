@@ -24,14 +24,13 @@ from scipy.interpolate import RectBivariateSpline
 
 from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
-from identification.estimate import Estimate, Quantity, Status
+from identification.estimate import Quantity, Status
 from identification.signal.decay_fit import Reading, block_means, mean_of_blocks, project_run
 from identification.signal.forcing import Forced
 from identification.signal.free_decay import Decay, response_rows
 from identification.signal.run_fit import NO_WINDOWS, Gained, decay_covariance_of, describe_run, identify_run
 from identification.statistics import determined, inner
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
@@ -360,19 +359,8 @@ class Bayesian(RunByRun):
 
         return together
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Raises:
-            TunnelError: for a driven body without a spring, or a wind-on run without air density.
-        """
-        for run in campaign.runs:
-            if run.drive is not None and run.unrestrained:
-                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
-                raise TunnelError(
-                    "the run has no spring, and so no stiffness to find", where=where, remedy=remedy
-                )
-        return super().estimate(campaign)
+    def _refusal(self, run: Run) -> str:
+        return "has no spring, and so no stiffness to find" if run.drive and run.unrestrained else ""
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
         bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)

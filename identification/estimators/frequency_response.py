@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.campaign.combination import Found, RunByRun, RunDecay
-from identification.estimate import Estimate, Status
+from identification.estimate import Status
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.forcing import ANGLE, ANGULAR_RATE, Forced, State
 from identification.signal.run_fit import Gained, describe_run, identify_run
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _EXCITED = 1e-3  # of the input's greatest line, in power, from which a line counts as excited on purpose
@@ -48,20 +47,12 @@ class FrequencyResponse(RunByRun):
     segments: int = 4
     least_coherence: float = 0.5
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Raises:
-            TunnelError: for a free decay, a body without a spring, uneven samples, or wind without density.
-        """
-        for run in campaign.runs:
-            why = "is a free decay, which has no frequency response" if run.drive is None else ""
-            why = "has no spring, and so no resonance" if run.unrestrained else why
-            why = why if run.record.uniform else "has uneven samples, which a Fourier transform does not take"
-            if why:
-                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
-                raise TunnelError(f"the run {why}", where=where, remedy=remedy)
-        return super().estimate(campaign)
+    def _refusal(self, run: Run) -> str:
+        if not run.record.uniform:
+            return "has uneven samples, which a Fourier transform does not take"
+        if run.unrestrained:
+            return "has no spring, and so no resonance"
+        return "is a free decay, which has no frequency response" if run.drive is None else ""
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
         bare = identify_run(run, sensor)

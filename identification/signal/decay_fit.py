@@ -31,6 +31,7 @@ from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, embed, inner, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
+from tunnel_sim.vocabulary.shapes import PerParameter, Vector
 
 ZeroKind = Literal["shared", "own", "known"]
 """Whether the sensor's zero is an unknown of all runs together, of every run, or known."""
@@ -118,12 +119,11 @@ class DecayFit:
     """Runs fitted together.
 
     Args:
-        parameters: φ, shape (p,).
         zero: the sensor's zero, rad; the mean where every run has its own.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
     """
 
-    parameters: Array
+    parameters: PerParameter
     zero: float
     runs: tuple[RunFit, ...]
     normal: Array
@@ -400,12 +400,8 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
     return Reading(mean_of_blocks(reading.time, factor), mean_of_blocks(reading.yaw, factor)), factor
 
 
-def mean_of_blocks(values: Array, factor: int) -> Array:
-    """Means of consecutive values, shape (n // factor,); the remainder at the end is dropped.
-
-    Args:
-        values: shape (n,).
-    """
+def mean_of_blocks(values: Vector, factor: int) -> Array:
+    """Means of consecutive values, shape (n // factor,); the remainder at the end is dropped."""
     if factor == 1:
         return values
     usable = values.size // factor * factor

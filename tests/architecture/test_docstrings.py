@@ -13,13 +13,15 @@ import pkgutil
 import re
 from collections.abc import Callable, Iterator
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 import pydantic
 import pytest
 from test_layers import PACKAGES
 
 from tunnel_lab import cli
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles, Seconds
 
 # Typer turns the arguments of a command into its help; test_cli.py reads that.
 COMMANDS = {f"{command.__module__}.{command.__name__}" for command in cli.COMMANDS.values()} | {
@@ -142,8 +144,21 @@ def faults(name: str, member: Any) -> list[str]:
     if inspect.isclass(member) and dataclasses.is_dataclass(member):
         described = {field.name for field in dataclasses.fields(member) if describes_itself(field)}
         signature = {name: kind for name, kind in signature.items() if name not in described}
-    found = [argument_fault(argument, kind, known.get(argument)) for argument, kind in signature.items()]
+    found = [
+        argument_fault(argument, untold(member, kind), known.get(argument))
+        for argument, kind in signature.items()
+    ]
     return [f"{name}: {fault}" for fault in found if fault]
+
+
+def untold(member: Any, annotation: str) -> str:
+    """An annotation; that of the number or array where it is the name of one without unit or shape."""
+    alias = vars(importlib.import_module(member.__module__)).get(annotation.removesuffix(" | None"))
+    base, *notes = get_args(alias) if get_origin(alias) is Annotated else [alias]
+    for kind, plain, needed in (("float", float, UNIT), ("Array", Array, ARRAY)):
+        if base == plain and not any(needed.search(str(note)) for note in notes):
+            return kind
+    return annotation
 
 
 def argument_fault(argument: str, annotation: str, text: str | None) -> str:
@@ -205,6 +220,25 @@ def without_a_shared_unit(low: float, high: float) -> float:
     return high - low
 
 
+Unitless = Annotated[float, "of something"]
+Shapeless = Annotated[Array, "rad"]
+
+
+def typed(delay: Seconds, yaw: Angles | None, count: int) -> float:
+    """Something."""
+    return delay * count * (0.0 if yaw is None else float(yaw[0]))
+
+
+def typed_without_unit(speed: Unitless, count: int) -> float:
+    """Something."""
+    return speed * count
+
+
+def typed_without_shape(yaw: Shapeless, count: int) -> float:
+    """Something."""
+    return float(yaw[0]) * count
+
+
 @dataclasses.dataclass
 class HalfDescribed:
     """Something."""
@@ -220,6 +254,8 @@ class HalfDescribed:
         (undocumented_argument, "argument speed is not documented"),
         (without_unit, "argument speed has no unit"),
         (without_a_shared_unit, "argument high has no unit"),
+        (typed_without_unit, "argument speed is not documented"),
+        (typed_without_shape, "argument yaw is not documented"),
     ],
 )
 def test_planted_faults_are_found(function: Callable[..., object], fault: str) -> None:
@@ -227,4 +263,4 @@ def test_planted_faults_are_found(function: Callable[..., object], fault: str) -
 
 
 def test_a_good_docstring_has_no_fault() -> None:
-    assert faults("good", good) == []
+    assert faults("good", good) == faults("typed", typed) == []
