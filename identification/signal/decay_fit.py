@@ -24,6 +24,7 @@ from identification.signal.forcing import (
     STIFFNESS,
     ZERO,
     Free,
+    Rows,
     State,
     forcing_of,
 )
@@ -31,7 +32,7 @@ from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, embed, inner, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
-from tunnel_sim.vocabulary.shapes import PerParameter, Vector
+from tunnel_sim.vocabulary.shapes import Angles, Gain, PerParameter, Vector
 
 ZeroKind = Literal["shared", "own", "known"]
 """Whether the sensor's zero is an unknown of all runs together, of every run, or known."""
@@ -67,17 +68,13 @@ class Reading:
         """
         return replace(cls.from_record(run.record), forcing=forcing_of(run, derivative))
 
-    def residual(self, state: State, rows: Array) -> Array:
-        """Reading less model, shape (n,), rad.
-
-        Args:
-            rows: of the forcing at the decay, shape (m, n).
-        """
+    def residual(self, state: State, rows: Rows) -> Angles:
+        """Reading less model; ``rows`` are those of the forcing at the decay."""
         free = self.forcing.freed(self.yaw, rows, state.gain)
         return np.asarray(free - state.zero * rows[4] - state.angle * rows[0] - state.rate * rows[1])
 
-    def freed(self, decay: Decay, gain: float) -> Reading:
-        """The reading less the response to the input, with a gain in rad/s² per unit: a free decay."""
+    def freed(self, decay: Decay, gain: Gain) -> Reading:
+        """The reading less the response to the input: a free decay."""
         rows = self.forcing.rows(self.time, decay)
         return Reading(self.time, self.forcing.freed(self.yaw, rows, gain))
 
@@ -357,7 +354,7 @@ def shared_system(
     runs: Sequence[RunFit],
     links: Sequence[Array],
     zero: ZeroKind,
-    parameters: Array,
+    parameters: PerParameter,
     prior: Prior | None = None,
 ) -> tuple[Array, Array]:
     """Information, shape (m, m), and score, shape (m,), of shared parameters φ, shape (p,), and a shared zero last.

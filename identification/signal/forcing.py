@@ -14,7 +14,7 @@ discretisation error, for any damping and any stiffness, zero included.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from scipy.linalg import expm
@@ -24,6 +24,7 @@ from identification.statistics import determined, eliminate
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.shapes import Angles, Gain, Rad, RadPerS, Times, Vector
 
 if TYPE_CHECKING:
     from identification.signal.decay_fit import RunFit
@@ -41,6 +42,8 @@ _GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start o
 
 
 _NO_GAIN = KnownGain()
+Zero: TypeAlias = Annotated[float, "rad, the sensor's; without a spring the constant acceleration, rad/s²"]
+Rows: TypeAlias = Annotated[Array, "shape (rows, n), SI"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +51,16 @@ class State:
     """The unknowns of one run.
 
     Args:
-        zero: the sensor's, rad; without a spring the constant acceleration, rad/s².
         angle: initial angle from the sensor's zero, rad.
         rate: initial rate, rad/s.
-        gain: of its input, rad/s² per unit; 0 where there is none.
+        gain: of its input; 0 where there is none.
     """
 
     decay: Decay
-    zero: float
-    angle: float
-    rate: float
-    gain: float = 0.0
+    zero: Zero
+    angle: Rad
+    rate: RadPerS
+    gain: Gain = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,17 +112,13 @@ class Free:
         """The decay and the gain of (a, k) or (a, k, g - c), shape (2,) or (3,), SI."""
         return Decay(float(coefficients[0]), float(coefficients[1])), 0.0
 
-    def admits(self, decay: Decay, time: Array) -> bool:
-        """Whether a fitted decay is possible, given sample times, shape (n,), s."""
+    def admits(self, decay: Decay, time: Times) -> bool:
+        """Whether a fitted decay is possible with these sample times."""
         del time
         return decay.stiffness > 0.0
 
-    def rows(self, time: Array, decay: Decay) -> Array:
-        """The terms of the motion and their derivatives, by row, shape (m, n), SI.
-
-        Args:
-            time: since the initial state, shape (n,), s.
-        """
+    def rows(self, time: Times, decay: Decay) -> Rows:
+        """The terms of the motion and their derivatives, by row, at times since the initial state."""
         return response_rows(time, decay, constant=True)
 
     def weights(self, state: State) -> Array:
@@ -130,8 +128,8 @@ class Free:
         weights[ZERO, 4] = weights[ANGLE, 0] = weights[ANGULAR_RATE, 1] = 1.0
         return weights
 
-    def freed(self, values: Array, rows: Array, gain: float) -> Array:
-        """A reading, shape (n,), rad, less the response to the input with a gain in rad/s² per unit."""
+    def freed(self, values: Angles, rows: Rows, gain: Gain) -> Angles:
+        """A reading less the response to the input."""
         del rows, gain
         return values
 
@@ -139,8 +137,8 @@ class Free:
         """A fit of this run alone with information in the order of free decays; None where it is not determined."""
         return fit
 
-    def level(self, values: Array, fitted: float) -> float:
-        """The level about which the reading, shape (n,), rad, moves, from the fitted zero: rad."""
+    def level(self, values: Angles, fitted: Zero) -> float:
+        """The level about which a reading moves, rad, from the fitted zero."""
         del values
         return fitted
 
@@ -154,13 +152,13 @@ class Forced(Free):
     """An input of a body on a spring.
 
     Args:
-        values: of the input at the samples, shape (n,).
+        values: of the input at the samples.
         held: whether the input is constant from one sample to the next; else linear.
         derivative: 0 where the readings are angles, 1 where they are rates. Zero and initial state are then rates
             too, since the rates of free motion obey the equation of its angles.
     """
 
-    values: Array
+    values: Vector
     held: bool
     derivative: int
     known: KnownGain | None
@@ -173,7 +171,7 @@ class Forced(Free):
         """With fewer, a fit of the run alone does not show the noise."""
         return _LEAST_SAMPLES * (len(self.sought) + _OWN)
 
-    def responses(self, time: Array, decay: Decay) -> Array:
+    def responses(self, time: Times, decay: Decay) -> Array:
         """The response from rest to the input with unit gain and its derivatives, as `driven_rows`."""
         of_decay = decay.rate, decay.stiffness
         return driven_rows(time, self.values, *of_decay, held=self.held, derivative=self.derivative)
@@ -188,11 +186,11 @@ class Forced(Free):
         """The decay and the gain of (a, k, g - c), shape (3,), SI."""
         return super().at(coefficients)[0], float(coefficients[2] + self.fixed[2])
 
-    def admits(self, decay: Decay, time: Array) -> bool:
+    def admits(self, decay: Decay, time: Times) -> bool:
         """A record shows no resonance above half its sample rate."""
         return 0.0 < decay.stiffness < (np.pi / float(np.diff(time).min())) ** 2
 
-    def rows(self, time: Array, decay: Decay) -> Array:
+    def rows(self, time: Times, decay: Decay) -> Rows:
         """The rows of a free decay, then those of the input."""
         return np.vstack([super().rows(time, decay), self.responses(time, decay)])
 
@@ -204,8 +202,8 @@ class Forced(Free):
         weights[GAIN, 5] = 1.0
         return weights
 
-    def freed(self, values: Array, rows: Array, gain: float) -> Array:
-        """A reading, shape (n,), rad, less the response to the input with a gain in rad/s² per unit."""
+    def freed(self, values: Angles, rows: Rows, gain: Gain) -> Angles:
+        """A reading less the response to the input."""
         return np.asarray(values - gain * rows[5])
 
     def alone(self, fit: RunFit) -> RunFit | None:
@@ -239,12 +237,12 @@ class Loose(Forced):
             start[0] = max(start[0], -_GROWTH / record.duration)
         return start
 
-    def admits(self, decay: Decay, time: Array) -> bool:
+    def admits(self, decay: Decay, time: Times) -> bool:
         """Any decay rate is possible."""
         del decay, time
         return True
 
-    def rows(self, time: Array, decay: Decay) -> Array:
+    def rows(self, time: Times, decay: Decay) -> Rows:
         """The row of the zero is the response to a constant acceleration, whose derivatives come last."""
         rest = driven_rows(time, np.ones(time.size), decay.rate, decay.stiffness, held=True)
         rows = np.vstack([super().rows(time, decay), rest[1:]])
@@ -265,7 +263,7 @@ class Loose(Forced):
         information[STIFFNESS, STIFFNESS] = 1.0
         return super().alone(replace(fit, information=information, score=score))
 
-    def level(self, values: Array, fitted: float) -> float:
+    def level(self, values: Angles, fitted: Zero) -> float:
         """The mean of the reading."""
         del fitted
         return float(values.mean())

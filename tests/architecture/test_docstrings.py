@@ -17,8 +17,8 @@ from typing import Annotated, Any, get_args, get_origin
 
 import pydantic
 import pytest
-from test_layers import PACKAGES
 
+from tests.architecture.test_layers import PACKAGES
 from tunnel_lab import cli
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.shapes import Angles, Seconds

@@ -13,6 +13,7 @@ Seconds: TypeAlias = Annotated[float, "s"]
 Hertz: TypeAlias = Annotated[float, "Hz"]
 Rad: TypeAlias = Annotated[float, "rad"]
 RadPerS: TypeAlias = Annotated[float, "rad/s"]
+Gain: TypeAlias = Annotated[float, "rad/s² per unit of the input"]
 KgM2: TypeAlias = Annotated[float, "kg m²"]
 Share: TypeAlias = Annotated[float, "a fraction of 1"]
 
