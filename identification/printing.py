@@ -16,7 +16,6 @@ from typing import Any
 
 from identification.status import Remark, Status
 from tunnel_sim.vocabulary.errors import counted
-from tunnel_sim.vocabulary.shapes import Rad
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -62,10 +61,11 @@ def coefficient_label(name: str, unit: str) -> str:
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
-def in_degrees(angle: Rad, digits: int = 2) -> str:
+def in_degrees(angle: float, digits: int = 2) -> str:
     """An angle in degrees, such as ``5.2°``.
 
     Args:
+        angle: rad.
         digits: significant digits (a count).
     """
     return f"{significant(math.degrees(angle), digits)}°"
