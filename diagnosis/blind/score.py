@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from diagnosis.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
 from diagnosis.blind.scatter import ScatterScore, scatter_score
@@ -72,7 +73,7 @@ def calibration(
 
 _POINTS = 401
 _WIDTHS = (0.005, 1.0)
-_HALVINGS = 20
+_CLOSE = 1e-9  # of the width
 _RESAMPLES = 500
 _LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel covers at least one statement
 
@@ -127,16 +128,16 @@ def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]])
         counts[row] = np.bincount(at, minlength=_POINTS)
         surplus[row] = np.bincount(at, weights=y - p, minlength=_POINTS)
     # The error falls with the width, so exactly one width equals its error.
-    low, high = _WIDTHS
-    for _ in range(_HALVINGS):
-        width = float(np.sqrt(low * high))
-        too_narrow = _error(_kernel(grid, width), surplus.sum(axis=0), counts.sum()) > width
-        low, high = (width, high) if too_narrow else (low, width)
-    kernel = _kernel(grid, high)
+
+    def beyond(width: float) -> float:
+        return _error(_kernel(grid, width), surplus.sum(axis=0), float(counts.sum())) - width
+
+    width = float(brentq(beyond, *_WIDTHS, xtol=_CLOSE)) if beyond(_WIDTHS[0]) > 0.0 else _WIDTHS[0]
+    kernel = _kernel(grid, width)
     rng = np.random.default_rng(0)
     drawn = rng.multinomial(len(groups), np.full(len(groups), 1.0 / len(groups)), _RESAMPLES)
     errors = [_error(kernel, w @ surplus, float((w @ counts).sum())) for w in drawn]
-    weight = kernel @ counts.sum(axis=0) * high * np.sqrt(2.0 * np.pi)
+    weight = kernel @ counts.sum(axis=0) * width * np.sqrt(2.0 * np.pi)
     shown = weight >= _LEAST_WEIGHT
     observed = _curve(kernel, counts.sum(axis=0), surplus.sum(axis=0), grid)
     curves = np.stack([_curve(kernel, w @ counts, w @ surplus, grid) for w in drawn])
@@ -144,7 +145,7 @@ def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]])
     return SmoothCalibration(
         _error(kernel, surplus.sum(axis=0), float(counts.sum())),
         (float(np.quantile(errors, 0.025)), float(np.quantile(errors, 0.975))),
-        high, grid[shown], observed[shown], ends[0][shown], ends[1][shown],
+        width, grid[shown], observed[shown], ends[0][shown], ends[1][shown],
         int(counts.sum()), len(groups),
     )  # fmt: skip
 

@@ -19,7 +19,7 @@ from diagnosis.noise.sensor_noise import (
     trend_statistics,
 )
 from diagnosis.settings import Settings
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records

@@ -15,9 +15,9 @@ from identification.estimators import (
     Estimator,
     estimators_of_driven_runs,
 )
-from identification.estimators.bayesian import Bayesian, Forced
+from identification.estimators.bayesian import Bayesian, InputResponse
 from identification.estimators.frequency_response import FrequencyResponse
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from identification.signal.free_decay import Decay
 from tests.marks import slow
 from tests.reference.rigs import rig
@@ -139,7 +139,7 @@ def test_the_response_over_the_grid_of_a_posterior_is_that_of_its_points() -> No
     def rows(decay: Decay) -> np.ndarray:
         return driven_rows(TIME, run.drive.values, decay.rate, decay.stiffness, held=False)
 
-    found = Forced(rows, known=None).over(centre, scale, axis).reshape(15, 15, 3, -1)
+    found = InputResponse(rows, known=None).over(centre, scale, axis).reshape(15, 15, 3, -1)
     for i, j in ((0, 0), (3, 11), (7, 7), (14, 2)):
         exact = rows(Decay(*(centre + scale @ axis[[i, j]])))
         assert np.max(np.abs(found[i, j] - exact) / np.max(np.abs(exact), axis=1, keepdims=True)) < 1e-3

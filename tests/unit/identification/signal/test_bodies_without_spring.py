@@ -8,7 +8,7 @@ import pytest
 
 from identification import Estimate, identify
 from identification.estimate import Status
-from identification.signal.driven import driven_rows, driven_start
+from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive

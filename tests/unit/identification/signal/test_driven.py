@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.signal.driven import driven_rows, driven_start
+from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
