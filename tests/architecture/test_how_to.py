@@ -15,7 +15,7 @@ from test_tutorials import printed, steps
 
 from identification import estimators
 from tunnel_lab.cli import main
-from tunnel_lab.experiments.score_trials import packaged_baseline
+from tunnel_lab.experiments.score import packaged_baseline
 
 PAGES = HOW_TO
 INDEX = ROOT / "docs" / "README.md"

@@ -18,10 +18,11 @@ import pytest
 
 from tests.unit.experiments.small_sweep import SMALL, contents
 from tests.unit.killed import names_of_the_dead
-from tunnel_lab.experiments import sweep as engine
+from tunnel_lab.experiments import experiment as engine
+from tunnel_lab.experiments import sweep_work
+from tunnel_lab.experiments.experiment import begin, run_in
 from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import Sweep, open_store, read_sweep
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[3]
@@ -52,13 +53,13 @@ def running(group: int) -> bool:
 
 def test_killed_and_resumed_is_the_same_to_the_bit(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
     """Against a sweep that nobody disturbed, in one process and in another order."""
-    run_sweep(sweep, tmp_path / "whole", here)
+    run_in(sweep, tmp_path / "whole", here)
     process = started(small, tmp_path / "killed")
     process.kill()
     process.communicate()
     finished = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed").glob("results/part-*")}
     assert 0 < len(finished) < sweep.shards, "killed too late to say anything"
-    outcome = run_sweep(sweep, tmp_path / "killed", here)
+    _, outcome = run_in(sweep, tmp_path / "killed", here)
     assert outcome.found == len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished  # nothing was done twice
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
@@ -84,7 +85,7 @@ def test_ctrl_c_keeps_what_is_finished(small: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "whole", here)
+    run_in(sweep, tmp_path / "whole", here)
     said: list[str] = []
     killed: list[int] = []
 
@@ -95,7 +96,7 @@ def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> Non
             killed.append(int(mine[0]))
             os.kill(killed[0], signal.SIGKILL)
 
-    run_sweep(sweep, tmp_path / "out", processes(2, said.append), kill_one)
+    run_in(sweep, tmp_path / "out", processes(2, said.append), kill_one)
     assert said == ["a worker process was lost; its tasks are repeated"]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
 
@@ -133,7 +134,7 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
         ["sweep.json", "results", "records", "checksums"]
     )
-    assert store.finished() == []
+    assert store.finished() == set()
 
 
 def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: Sweep, tmp_path: Path) -> None:
@@ -147,28 +148,28 @@ def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: S
 
 
 def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
-    store = run_sweep(sweep, tmp_path / "out", here).store
+    store, _ = run_in(sweep, tmp_path / "out", here)
     whole = contents(tmp_path / "out")
     part = tmp_path / "out" / "results" / "part-00004.parquet"
     part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
     names_of_the_dead(part.with_name("part-00005.parquet"))[0].write_bytes(b"PAR1")
-    assert 4 not in store.finished()
-    assert run_sweep(sweep, tmp_path / "out", here).found == 11
+    assert "part-00004" not in store.finished()
+    assert run_in(sweep, tmp_path / "out", here)[1].found == 11
     assert contents(tmp_path / "out") == whole
 
 
 def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "out", here)
+    run_in(sweep, tmp_path / "out", here)
     before = contents(tmp_path / "out")
     for text, said in (
-        (SMALL.replace("seed = 1", "seed = 2"), "whose seed differs from the file's"),
-        (SMALL.replace("0.02]", "0.03]"), "whose effects differs from the file's"),
+        (SMALL.replace("seed = 1", "seed = 2"), "another sweep, whose seed differs"),
+        (SMALL.replace("0.02]", "0.03]"), "another sweep, whose effects differs"),
     ):
         (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
         with pytest.raises(TunnelError, match=said):
-            run_sweep(read_sweep(tmp_path / "changed.toml"), tmp_path / "out", here)
+            run_in(read_sweep(tmp_path / "changed.toml"), tmp_path / "out", here)
     (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
-    assert run_sweep(read_sweep(tmp_path / "same.toml"), tmp_path / "out", here).found == 12
+    assert run_in(read_sweep(tmp_path / "same.toml"), tmp_path / "out", here)[1].found == 12
     assert contents(tmp_path / "out") == before
 
 
@@ -176,14 +177,14 @@ def test_other_versions_are_refused(
     sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(engine, "made_with", lambda: {"numpy": "1.0"})
-        run_sweep(sweep, tmp_path / "old", lambda *_: iter(()))
+        patch.setattr(engine, "versions", lambda: {"numpy": "1.0"})
+        run_in(sweep, tmp_path / "old", lambda *_: iter(()))
     with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
-        run_sweep(sweep, tmp_path / "old", here)
+        run_in(sweep, tmp_path / "old", here)
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep uses 1"):
-        run_sweep(sweep, tmp_path / "new", here)
-    assert open_store(tmp_path / "new").finished() == []
+        run_in(sweep, tmp_path / "new", here)
+    assert open_store(tmp_path / "new").finished() == set()
 
 
 def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, here) -> None:
@@ -195,7 +196,7 @@ def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, 
     )
     text = text.replace("replicates = 2", "replicates = 1").replace("per_shard = 1", "per_shard = 24")
     (tmp_path / "wild.toml").write_text(text, encoding="utf-8")
-    rows = run_sweep(read_sweep(tmp_path / "wild.toml"), tmp_path / "out", here).store.scan().collect()
+    rows = run_in(read_sweep(tmp_path / "wild.toml"), tmp_path / "out", here)[0].scan().collect()
     failed = rows.filter(pl.col("status") == "not_simulated")
     assert set(failed["cn_beta"]) == {5.0}
     assert failed["value"].null_count() == len(failed)
@@ -212,11 +213,11 @@ def test_an_estimator_that_crashes_is_a_status(
         def estimate(self, _campaign):
             raise ZeroDivisionError("planted")
 
-    monkeypatch.setattr(engine, "_estimator", lambda _: Broken())
-    outcome = run_sweep(sweep, tmp_path / "out", here)
+    monkeypatch.setattr(sweep_work, "_estimator", lambda _: Broken())
+    store, outcome = run_in(sweep, tmp_path / "out", here)
     (failed,) = outcome.failed
     assert (failed.status, failed.count) == ("raised", 12)
-    rows = outcome.store.scan().collect()
+    rows = store.scan().collect()
     assert set(rows["status"]) == {"raised"}
     (message,) = set(rows["message"])
     assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep_engine\.py line \d+", message)
@@ -239,17 +240,17 @@ def damages(first: Path, second: Path) -> Iterator[None]:
 @pytest.mark.slow
 def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     """Not only where its end is missing: a disk may lose a block in the middle."""
-    store = run_sweep(sweep, tmp_path / "out", here).store
+    store, _ = run_in(sweep, tmp_path / "out", here)
     whole = contents(tmp_path / "out")
     for dataset in ("results", "records", "checksums"):
         for _ in damages(*sorted((tmp_path / "out" / dataset).iterdir())[:2]):
-            assert store.finished() == list(range(1, sweep.shards))
-            assert run_sweep(sweep, tmp_path / "out", here).found == sweep.shards - 1
+            assert store.finished() == set(map(sweep.name, range(1, sweep.shards)))
+            assert run_in(sweep, tmp_path / "out", here)[1].found == sweep.shards - 1
             assert contents(tmp_path / "out") == whole
 
 
 def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "out", here)
+    run_in(sweep, tmp_path / "out", here)
     names = [f"checksums/{path.name}" for path in (tmp_path / "out" / "checksums").iterdir()]
     done = subprocess.run(
         ["sha256sum", "--check", *names], cwd=tmp_path / "out", capture_output=True, text=True, check=False

@@ -12,9 +12,9 @@ import pytest
 import tomli_w
 
 from tests.unit.experiments.small_sweep import SMALL
-from tunnel_lab.experiments.sweep import run_shard
-from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
-from tunnel_lab.experiments.sweep_summary import lines_of
+from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep_view import lines_of
+from tunnel_lab.experiments.sweep_work import run_shard
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -93,7 +93,7 @@ def test_a_case_can_be_simulated_by_itself(sweep: Sweep, tmp_path: Path) -> None
     case = sweep.case(5)
     (tmp_path / "plan.toml").write_text(tomli_w.dumps(dict(case.document)), encoding="utf-8")
     campaign = simulate_campaign(load_plan(tmp_path / "plan.toml"))
-    kept = pl.read_parquet(run_shard(sweep.to_json(), 5).records)
+    kept = pl.read_parquet(run_shard(sweep, 5).files["records"])
     for run, (name, yaw) in zip(campaign.runs, kept.select("run", "yaw_rad").iter_rows(), strict=True):
         assert run.id == name
         assert np.array_equal(run.record.yaw_rad, np.array(yaw))
@@ -102,9 +102,9 @@ def test_a_case_can_be_simulated_by_itself(sweep: Sweep, tmp_path: Path) -> None
 @pytest.mark.slow
 def test_threads_and_company_leave_the_bits_alone(tmp_path: Path, sweep: Sweep) -> None:
     together = variant(tmp_path, ("cases_per_shard = 1", "cases_per_shard = 12"))
-    one, two = (run_shard(together.to_json(), 0, nthread=n) for n in (1, 2))
+    one, two = (run_shard(together, 0, nthread=n) for n in (1, 2))
     assert (one.results, one.records) == (two.results, two.records)
-    alone = [pl.read_parquet(run_shard(sweep.to_json(), index).results) for index in (0, 7, 11)]
+    alone = [pl.read_parquet(run_shard(sweep, index).files["results"]) for index in (0, 7, 11)]
     whole = pl.read_parquet(one.results)
     for part, index in zip(alone, (0, 7, 11), strict=True):
         assert part.equals(whole.filter(pl.col("case") == index), null_equal=True)
@@ -118,7 +118,7 @@ def test_the_truth_of_a_run_is_the_nominal_models(sweep: Sweep, speed: float, na
     stiffness = 44.84 - q * speed**2 * 0.495
     damping = rig.dynamics.mechanical_damping + q * speed * rig.body.length * 0.114
     omega_n = (stiffness / rig.dynamics.yaw_inertia) ** 0.5
-    rows = pl.read_parquet(run_shard(sweep.to_json(), 0).results).filter(pl.col("run") == name)
+    rows = pl.read_parquet(run_shard(sweep, 0).files["results"]).filter(pl.col("run") == name)
     truths = dict(rows.select("quantity", "truth").iter_rows())
     assert truths["omega_n"] == pytest.approx(omega_n, rel=1e-12)
     assert truths["zeta"] == pytest.approx(damping / (2.0 * rig.dynamics.yaw_inertia * omega_n), rel=1e-12)
@@ -148,7 +148,7 @@ def test_scatter_is_in_the_results_and_an_axis_of_the_summary(tmp_path: Path) ->
     text = SMALL.replace('[[effects]]\nname = "none"', SCATTER).replace("records = true", "records = false")
     (tmp_path / "scatter.toml").write_text(text.replace("cases_per_shard = 1", "cases_per_shard = 50"))
     sweep = read_sweep(tmp_path / "scatter.toml")
-    rows = pl.read_parquet(run_shard(sweep.to_json(), 0).results)
+    rows = pl.read_parquet(run_shard(sweep, 0).files["results"])
     assert set(rows["scatter_wind_speed"]) == {0.0, 0.003, 0.01}
     assert set(rows["scatter_spring_stiffness_drift"]) == {-0.02}
     assert set(rows["scatter_zero"]) == {0.0}
@@ -197,7 +197,7 @@ parameters.friction_moment = 0.002
 def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
     """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
     (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
-    rows = pl.read_parquet(run_shard(read_sweep(tmp_path / "long.toml").to_json(), 0).results)
+    rows = pl.read_parquet(run_shard(read_sweep(tmp_path / "long.toml"), 0).files["results"])
     still = rows.filter((pl.col("wind_speed") == 0.0) & pl.col("run").is_not_null())
     assert set(rows.filter(pl.col("noise_std") == 0.0)["bound"]) == {None}
     for noise in (0.001, 0.002):
