@@ -217,9 +217,9 @@ def estimate(_folder: Path, draw: Draw) -> None:
 
 def blind_answers(folder: Path, draw: Draw) -> None:
     """Truth, answer or seal of a blind set changed; the hashes mostly agree."""
-    from diagnosis.blind import score_set
-    from diagnosis.blind.sets import folder_hash
-    from tunnel_lab.report import blind
+    from tunnel_lab.experiments.blind import page as blind
+    from tunnel_lab.experiments.blind import score_set
+    from tunnel_lab.experiments.blind.sets import folder_hash
 
     changed = draw(st.sampled_from(("truth", "answer", "truth", "answer", "seal of key", "seal of answer")))
 

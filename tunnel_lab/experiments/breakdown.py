@@ -285,10 +285,10 @@ def breakdown_view(results: pl.DataFrame) -> View:
     """
     frame = breakdown_frame(results)
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
+    tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
     return View(
         "Bias caused by each unmodelled effect",
-        [one for quantity in given for one in breakdown_tables(frame, quantity)],
-        [ABOUT, *not_given_lines(not_given(results))],
+        [*tables, ABOUT, *not_given_lines(not_given(results))],
         {f"breakdown-{one.replace('_', '-')}": partial(breakdown_figure, frame, one) for one in given},
         {"breakdown.parquet": parquet(frame)},
     )

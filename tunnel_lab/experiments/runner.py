@@ -111,7 +111,7 @@ def processes(jobs: int, say: Say = said) -> Workers:
                     what = f"worker processes died {PATIENCE} times without finishing a task"
                     remedy = (
                         "give fewer --jobs if memory is short, and check that an estimator of your own does not "
-                        "end its process; finished work in --out is kept"
+                        "end its process; finished work is kept"
                     )
                     raise TunnelError(what, remedy=remedy) from None
                 say("a worker process was lost; its tasks are repeated")
@@ -138,7 +138,8 @@ def crew(
     if jobs is not None and scheduler not in (None, LOCAL):
         what = "its workers are started on their own machines"
         raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
-    count = jobs if jobs is not None else usual or available_processors()
+    count = available_processors() if usual is None else usual
+    count = count if jobs is None else jobs
     count = count if tasks is None else min(count, tasks)
     return processes(count) if scheduler is None else on_cluster(scheduler, max(count, 1), said)
 

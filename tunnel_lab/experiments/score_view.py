@@ -211,8 +211,7 @@ def score_view(results: Results, *, cells: bool = False) -> View:
 
     return View(
         f"Score on the grid {results.grid.name}",
-        [*summary_tables(results), *(cell_tables(results) if cells else ())],
-        lines_below(results),
+        [*summary_tables(results), *(cell_tables(results) if cells else ()), *lines_below(results)],
         {"score": partial(score_figure, results)},
         {"scores.parquet": parquet(scores_frame(results))},
     )

@@ -125,10 +125,10 @@ def sweep_view(results: pl.LazyFrame, name: str) -> View:
     along = groups(lines)
     texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
     csv = pl.DataFrame([line.to_row() for line in lines]).with_columns(texts).write_csv()
+    tables = (overall_table(lines), *map(axis_table, along.values()))
     return View(
         f"Sweep {name}",
-        [overall_table(lines), *map(axis_table, along.values())],
-        [BRACKETS, *not_given_lines(unanswered(results))],
+        [*tables, BRACKETS, *not_given_lines(unanswered(results))],
         {name: partial(error_figure, part) for name, part in along.items()},
         {"summary.csv": csv.encode()},
     )

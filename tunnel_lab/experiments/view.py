@@ -24,14 +24,13 @@ class View:
     """What an experiment has found.
 
     Args:
-        lines: below the tables.
+        parts: tables and lines, in their order.
         figures: by name of their files, without suffix; drawn when they are written.
         data: contents of further files, by name.
     """
 
     title: str
-    tables: Sequence[Table]
-    lines: Sequence[str] = ()
+    parts: Sequence[Table | str]
     figures: Mapping[str, Callable[[], Figure | None]] = field(default_factory=dict)
     data: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -50,13 +49,15 @@ class View:
 
     def show(self) -> None:
         """Print tables and lines."""
-        show_tables(*self.tables)
-        for line in self.lines:
-            say(line)
+        for part in self.parts:
+            say(part) if isinstance(part, str) else show_tables(part)
 
     def _page(self, pictures: Sequence[Path]) -> str:
-        parts = [text_table(table).html() for table in self.tables if table.row_count]
-        parts += [f"<p>{escape(line)}</p>" for line in self.lines]
+        parts = [
+            f"<p>{escape(part)}</p>" if isinstance(part, str) else text_table(part).html()
+            for part in self.parts
+            if isinstance(part, str) or part.row_count
+        ]
         for path in pictures:
             name = escape(path.stem.replace("-", " "))
             content = b64encode(path.read_bytes()).decode()
