@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -97,20 +98,14 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
     wall, cpu = time.perf_counter(), time.process_time()
     from tunnel_lab.experiments.experiment import run_in
     from tunnel_lab.experiments.runner import processes
-    from tunnel_lab.experiments.sweep import Sweep, read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep
     from tunnel_lab.experiments.sweep_work import run_shard
 
-    class ByThreads(Sweep):
-        """A sweep whose shards are simulated by several threads of this process."""
-
-        @property
-        def work(self):
-            return partial(run_shard, self, nthread=threads)
-
     plan = read_sweep(file)
+    experiment = plan.experiment
     if threads > 1:
-        plan = ByThreads(plan.document, plan.rigs)
-    run_in(plan, out, processes(0 if threads > 1 else workers, print))
+        experiment = replace(experiment, work=partial(run_shard, plan, nthread=threads))
+    run_in(experiment, out, processes(0 if threads > 1 else workers, print))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = time.process_time() - cpu + children.ru_utime + children.ru_stime
     return {

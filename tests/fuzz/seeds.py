@@ -166,9 +166,9 @@ def sweep_folder() -> dict[str, bytes]:
         file = Path(name) / "sweep.toml"
         file.write_text(SMALL.replace("records = true", "records = false"), encoding="utf-8")
         sweep = read_sweep(file)
-        store = begin(sweep, Path(name) / "out")
+        store = begin(sweep.experiment, Path(name) / "out")
         for index in range(3):
-            store.keep(sweep.name(index), run_shard(sweep, index))
+            store.keep(sweep.experiment.name(index), run_shard(sweep, index))
         return {
             str(path.relative_to(store.folder)): path.read_bytes()
             for path in sorted(store.folder.rglob("*"))

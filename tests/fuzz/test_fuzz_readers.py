@@ -250,7 +250,7 @@ def sweep_file(folder: Path, draw: Draw) -> None:
     from tunnel_lab.experiments.sweep import read_sweep
 
     sweep = read_sweep(written(folder / "sweep.toml", draw(spoilt_toml(seeds.SMALL.encode())), draw))
-    begin(sweep, folder / "out")
+    begin(sweep.experiment, folder / "out")
 
 
 def sweep_folder(folder: Path, draw: Draw) -> None:

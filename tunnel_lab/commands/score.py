@@ -221,12 +221,12 @@ def _breakdown(
     trials: int | None,
 ) -> None:
     from tunnel_lab.experiments.answers import failures_in
-    from tunnel_lab.experiments.breakdown import REALISATIONS, Breakdown, breakdown_view, make_cases
+    from tunnel_lab.experiments.breakdown import REALISATIONS, breakdown_of, breakdown_view, make_cases
     from tunnel_lab.experiments.experiment import results_of
 
     terminal = console(stderr=True).is_terminal
     cases = make_cases(seed, realisations=trials or REALISATIONS, show_steps=terminal)
     with bar("scoring") as progress:
-        results, outcome = results_of(Breakdown(tuple(cases), names, seed), parts, workers, progress)
+        results, outcome = results_of(breakdown_of(cases, names, seed), parts, workers, progress)
     failed = failures_in(results, ("effect", "severity", "realisation"), outcome.failed)
     _present(breakdown_view(results), out, failed)

@@ -88,7 +88,7 @@ def sweep(
     plan = read_sweep(file, chosen_estimators(estimators))
     workers = crew(jobs, scheduler, plan.shards)
     with bar("cases", plan.size) as progress:
-        _, outcome = run_in(plan, out, workers, progress)
+        _, outcome = run_in(plan.experiment, out, workers, progress)
     if outcome.found:
         say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
@@ -104,17 +104,18 @@ def sweep(
 
 def _summarise(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep."""
-    from tunnel_lab.experiments.sweep import open_store
+    from tunnel_lab.experiments.experiment import Parts
+    from tunnel_lab.experiments.sweep import stored_sweep
     from tunnel_lab.experiments.sweep_view import sweep_view
 
-    store = open_store(folder)
-    sweep = store.experiment
-    if not sweep.estimators:
+    sweep = stored_sweep(folder)
+    store = Parts(folder, sweep.experiment)
+    if not sweep.document.estimators:
         remedy = "there is no estimate to summarise"
         raise TunnelError("the sweep has no estimators", where=str(folder), remedy=remedy)
     view = sweep_view(store.scan(), sweep.document.name)
     written = view.write(folder / "summary")
-    done, shards = len(store.finished()), len(sweep.tasks)
+    done, shards = len(store.finished()), sweep.shards
     if done < shards:
         say(f"Finished: {done} of {counted(shards, 'shard')}; run the same command again for the rest\n")
     view.show()

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from math import radians
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -21,7 +21,7 @@ from rich.text import Text
 from identification.printing import significant
 from identification.scoring import score
 from tunnel_lab.experiments.answers import counted_failures, not_given
-from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, Work, parquet
+from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
 from tunnel_lab.experiments.view import View
@@ -197,43 +197,27 @@ def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     return replace(draw, effects=effects, seed=noise)
 
 
-@dataclass(frozen=True, eq=False)
-class Breakdown(Experiment[BiasCase]):
-    """Some estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity."""
+def breakdown_of(cases: Sequence[BiasCase], estimators: tuple[str, ...], seed: int) -> Experiment[BiasCase]:
+    """Some estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity.
 
-    kind: ClassVar[str] = "breakdown"
-    elsewhere: ClassVar[str] = "name another --out, or add --overwrite"
-    code_matters: ClassVar[bool] = True
-    cases: tuple[BiasCase, ...]
-    names: tuple[str, ...]
-    seed: int
+    Args:
+        seed: of the cases.
+    """
+    return Experiment(
+        "breakdown",
+        cases,
+        partial(_estimate_case, estimators),
+        case_name,
+        {"cases": list(map(case_name, cases)), "seed": seed, "estimators": list(estimators)},
+        estimators,
+        elsewhere="name another --out, or add --overwrite",
+        code_matters=True,
+    )
 
-    @property
-    def estimators(self) -> Sequence[str]:
-        """Names of the estimators."""
-        return self.names
 
-    @property
-    def tasks(self) -> Sequence[BiasCase]:
-        """The cases."""
-        return self.cases
-
-    @property
-    def work(self) -> Work[BiasCase]:
-        """Every estimator on a case."""
-        return partial(_estimate_case, self.names)
-
-    def name(self, task: BiasCase) -> str:
-        """Effect, severity and realisation."""
-        return f"{task.effect.replace(' ', '_')}-{task.severity:g}-{task.realisation}"
-
-    def description(self) -> dict[str, Any]:
-        """Names of the cases, which follow from their seed, and of the estimators."""
-        return {
-            "cases": [self.name(case) for case in self.cases],
-            "seed": self.seed,
-            "estimators": list(self.names),
-        }
+def case_name(case: BiasCase) -> str:
+    """Effect, severity and realisation."""
+    return f"{case.effect.replace(' ', '_')}-{case.severity:g}-{case.realisation}"
 
 
 def _estimate_case(estimators: Sequence[str], case: BiasCase) -> Done:
@@ -281,7 +265,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     """The view of a breakdown.
 
     Args:
-        results: of `Breakdown`.
+        results: of `breakdown_of`.
     """
     frame = breakdown_frame(results)
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]

@@ -15,21 +15,20 @@ import hashlib
 import io
 import os
 import platform
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field
+from contextlib import closing, nullcontext, suppress
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import polars as pl
 
 from identification.estimators import Own, own_estimators
 from tunnel_lab.experiments.answers import Failed, counted_failures
-from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
+from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
@@ -37,6 +36,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 TaskT = TypeVar("TaskT")
 SCHEMA_VERSION = 2
+ELSEWHERE = "name another --out"
 RESULTS, CHECKSUMS = "results", "checksums"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a task uses one."""
@@ -46,70 +46,56 @@ _OWN = "estimator "  # before the name of a user's estimator, in the versions
 
 @dataclass(frozen=True)
 class Done:
-    """What the work on a task gives: files that depend on nothing but the task, and the estimates that failed.
+    """A finished task: files that depend on nothing but the task, and the estimates that failed.
 
     Args:
         files: bytes by dataset.
+        made_with: versions and number of threads of the process.
     """
 
     files: Mapping[str, bytes]
     failed: tuple[Failed, ...] = ()
+    made_with: Mapping[str, str | None] = field(default_factory=dict)
 
 
 Work = Callable[[TaskT], Done]
 
 
-class Experiment(ABC, Generic[TaskT]):
-    """A kind of experiment: its tasks, the work on a task, and what determines the results."""
+def _one(_: Any) -> int:
+    return 1
 
-    kind: ClassVar[str]
-    """Its name, and that of its manifest."""
-    elsewhere: ClassVar[str] = "name another --out"
-    """The remedy where a folder holds something else."""
-    code_matters: ClassVar[bool] = False
-    """Whether results of changed code are refused, as where the code is what is examined."""
 
-    @property
-    def datasets(self) -> tuple[str, ...]:
-        """Names of its tables; the results come first."""
-        return (RESULTS,)
+@dataclass(frozen=True, eq=False)
+class Experiment(Generic[TaskT]):
+    """One experiment of any kind.
 
-    @property
-    def estimators(self) -> Sequence[str]:
-        """Names of the estimators that its work uses."""
-        return ()
+    Args:
+        kind: its name, and that of its manifest.
+        tasks: in the order of the results.
+        work: on a task: a pure function of a module with its data, sent to the workers with every task.
+        name: of a task's files, without suffix.
+        description: all that determines the results, but for the code, in JSON's types.
+        estimators: names of those that the work uses.
+        datasets: names of its tables; the results come first.
+        weight: of a task in the progress.
+        about: further entries of the manifest, for people.
+        elsewhere: the remedy where a folder holds something else.
+        code_matters: whether results of changed code are refused, as where the code is what is examined.
+        described: the description in a manifest as of this version; an error if it is none.
+    """
 
-    @property
-    @abstractmethod
-    def tasks(self) -> Sequence[TaskT]:
-        """Its tasks, in the order of the results."""
-
-    @property
-    @abstractmethod
-    def work(self) -> Work[TaskT]:
-        """The work on a task: a pure function of a module with its data, sent to the workers with every task."""
-
-    @abstractmethod
-    def name(self, task: TaskT) -> str:
-        """The name of a task's files, without suffix."""
-
-    def weight(self, task: TaskT) -> int:
-        """Weight of a task in the progress."""
-        del task
-        return 1
-
-    @abstractmethod
-    def description(self) -> dict[str, Any]:
-        """All that determines the results, but for the code, in JSON's types."""
-
-    @classmethod
-    def described_by(cls, kept: Any) -> dict[str, Any]:
-        """The description in a manifest, which an earlier version may have written; an error if it is none."""
-        return dict(kept)
-
-    def about(self) -> dict[str, Any]:
-        """Further entries of the manifest, to be read by people."""
-        return {}
+    kind: str
+    tasks: Sequence[TaskT]
+    work: Work[TaskT]
+    name: Callable[[TaskT], str]
+    description: Mapping[str, Any]
+    estimators: Sequence[str] = ()
+    datasets: tuple[str, ...] = (RESULTS,)
+    weight: Callable[[TaskT], int] = _one
+    about: Mapping[str, Any] = field(default_factory=dict)
+    elsewhere: str = ELSEWHERE
+    code_matters: bool = False
+    described: Callable[[Any], Mapping[str, Any]] = dict
 
 
 @cache
@@ -226,10 +212,10 @@ def begin(experiment: Experiment[TaskT], folder: Path) -> Parts[TaskT]:
         TunnelError: when the folder holds another experiment or something else, or cannot be written.
     """
     kind, where, elsewhere = experiment.kind, shown(folder), experiment.elsewhere
-    manifest, description = folder / f"{kind}.json", experiment.description()
+    manifest, description = folder / f"{kind}.json", experiment.description
     now = made_with(experiment.estimators, experiment.code_matters)
     if manifest.is_file():
-        document = read_manifest(type(experiment), folder)
+        document = read_manifest(kind, folder, elsewhere, experiment.described)
         kept, before = document[kind], document["made_with"]
         if key := _first_difference(kept, description):
             what = f"the folder holds another {kind}, whose {key} differs"
@@ -245,7 +231,7 @@ def begin(experiment: Experiment[TaskT], folder: Path) -> Parts[TaskT]:
     else:
         refuse_other_content(experiment, folder)
         output_folder(folder)
-        head = {"schema_version": SCHEMA_VERSION, **experiment.about()}
+        head = {"schema_version": SCHEMA_VERSION, **experiment.about}
         write_json(
             manifest, {**head, "made_with": now, kind: description}
         )  # first, to be continued from then on
@@ -268,18 +254,18 @@ def refuse_other_content(experiment: Experiment[Any], folder: Path) -> None:
             )
 
 
-def read_manifest(experiment: type[Experiment[Any]], folder: Path) -> dict[str, Any]:
+def read_manifest(
+    kind: str, folder: Path, elsewhere: str = ELSEWHERE, described: Callable[[Any], Mapping[str, Any]] = dict
+) -> dict[str, Any]:
     """The manifest in the folder of a kind of experiment; a `TunnelError` if it is none of this version."""
-    kind, elsewhere = experiment.kind, experiment.elsewhere
     path = folder / f"{kind}.json"
     document = read_json(path, remedy=f"name the folder of a {kind}")
     if document.get("schema_version") != SCHEMA_VERSION:
         what = f"this program reads version {SCHEMA_VERSION} only"
         raise TunnelError(what, where=shown(path), remedy=elsewhere)
     with as_described(f"is not a {kind}", shown(path), elsewhere):
-        document["made_with"] = {str(name): str(value) for name, value in document["made_with"].items()}
-        document[kind] = experiment.described_by(document[kind])
-    return document
+        versions_of = {str(name): str(value) for name, value in document["made_with"].items()}
+        return {"made_with": versions_of, kind: described(document[kind])}
 
 
 def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -300,29 +286,20 @@ class Outcome:
     failed: tuple[Failed, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Made:
-    """A result, with the versions of the process that made it."""
-
-    done: Done
-    made_with: Mapping[str, str] = field(default_factory=dict)
-
-
-def _make(
+def _done(
     work: Work[TaskT], own: Sequence[Own], estimators: Sequence[str], code_matters: bool, task: TaskT
-) -> _Made:
+) -> Done:
     """Do a task, in any process: the user's estimators are made known there."""
     for one in own:
         one.register()
-    done = work(task)
-    threads = os.environ.get(ONE_THREAD[0], "several")
-    return _Made(done, {**made_with(estimators, code_matters), "threads": threads})
+    threads = {"threads": os.environ.get(ONE_THREAD[0], "several")}
+    return replace(work(task), made_with={**made_with(estimators, code_matters), **threads})
 
 
 def run(
     experiment: Experiment[TaskT], store: Store, workers: Workers, progress: Progress | None = None
 ) -> Outcome:
-    """Do the unfinished tasks of an experiment.
+    """Do the unfinished tasks of an experiment. Only this process stores results: a repeated task is stored once.
 
     Args:
         progress: called with the finished and the whole weight, at the start and after each task.
@@ -330,33 +307,27 @@ def run(
     Raises:
         TunnelError: when a worker has other versions, or a result cannot be stored.
     """
-    names = tuple(experiment.estimators)
-    wanted = {**made_with(names, experiment.code_matters), "threads": "1"}
-    failed: dict[str, tuple[Failed, ...]] = {}
-
-    def keep(task: TaskT, made: _Made) -> None:
-        odd = _first_difference(wanted, {name: made.made_with.get(name) for name in wanted})
-        if odd:
-            what = (
-                f"a worker has {odd} {made.made_with.get(odd)}, but this {experiment.kind} uses {wanted[odd]}"
-            )
-            remedy = "give every worker the same environment (threads: OMP_NUM_THREADS=1)"
-            raise TunnelError(what, remedy=remedy)
-        name = experiment.name(task)
-        store.keep(name, made.done)
-        failed[name] = made.done.failed
-
-    finished = store.finished()
-    found = run_tasks(
-        partial(_make, experiment.work, own_estimators(names), names, experiment.code_matters),
-        experiment.tasks,
-        workers,
-        finished=lambda task: experiment.name(task) in finished,
-        keep=keep,
-        size=experiment.weight,
-        progress=progress,
-    )
-    return Outcome(found, counted_failures(one for name in sorted(failed) for one in failed[name]))
+    names, show = tuple(experiment.estimators), progress or (lambda _done, _total: None)
+    wanted: dict[str, str | None] = {**made_with(names, experiment.code_matters), "threads": "1"}
+    finished, failed = store.finished(), {}
+    waiting = [task for task in experiment.tasks if experiment.name(task) not in finished]
+    total = sum(map(experiment.weight, experiment.tasks))
+    reached = total - sum(map(experiment.weight, waiting))
+    show(reached, total)
+    work = partial(_done, experiment.work, own_estimators(names), names, experiment.code_matters)
+    with closing(workers(work, waiting)) as finishing:  # the workers end with the first error
+        for task, done in finishing:
+            odd = _first_difference(wanted, {name: done.made_with.get(name) for name in wanted})
+            if odd:
+                has = f"a worker has {odd} {done.made_with.get(odd)}"
+                remedy = "give every worker the same environment (threads: OMP_NUM_THREADS=1)"
+                raise TunnelError(f"{has}, but this {experiment.kind} uses {wanted[odd]}", remedy=remedy)
+            store.keep(experiment.name(task), done)
+            failed[experiment.name(task)] = done.failed
+            reached += experiment.weight(task)
+            show(reached, total)
+    every = (one for name in sorted(failed) for one in failed[name])
+    return Outcome(len(experiment.tasks) - len(waiting), counted_failures(every))
 
 
 def run_in(

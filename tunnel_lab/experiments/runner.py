@@ -1,7 +1,6 @@
-"""The runner of experiments: a task is data, its work a pure function; finished tasks are not repeated.
+"""The workers of experiments: processes of this machine, or of a Dask cluster.
 
-The workers are processes of this machine or of a Dask cluster. Only this process keeps results: a repeated task is
-stored once. Nothing heavy is imported here, because worker processes start with this module.
+Nothing heavy is imported here, because worker processes start with this module.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import logging
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -43,47 +42,8 @@ class Workers(Protocol):
 
     def __call__(
         self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], /
-    ) -> Iterator[tuple[TaskT, ResultT]]:
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
         """Yield every task with its result, in the order of completion."""
-
-
-def run_tasks(
-    work: Callable[[TaskT], ResultT],
-    tasks: Sequence[TaskT],
-    workers: Workers,
-    *,
-    finished: Callable[[TaskT], bool],
-    keep: Callable[[TaskT, ResultT], object],
-    size: Callable[[TaskT], int] = lambda _: 1,
-    progress: Progress | None = None,
-) -> int:
-    """Do the unfinished tasks.
-
-    Args:
-        work: a pure function of a module: a repeated task gives the same result.
-        finished: whether the result of a task is already stored.
-        keep: called in this process with each task and its result.
-        size: weight of a task in the progress.
-
-    Returns:
-        Number of tasks that were finished before.
-    """
-    waiting = [task for task in tasks if not finished(task)]
-    total = sum(map(size, tasks))
-    done = total - sum(map(size, waiting))
-    show = progress or (lambda _done, _total: None)
-    show(done, total)
-
-    def results() -> Generator[tuple[TaskT, ResultT], None, None]:
-        if waiting:
-            yield from workers(work, waiting)
-
-    with closing(results()) as finishing:  # the workers end with the first error
-        for task, result in finishing:
-            keep(task, result)
-            done += size(task)
-            show(done, total)
-    return len(tasks) - len(waiting)
 
 
 def said(line: str) -> None:
@@ -96,7 +56,9 @@ def said(line: str) -> None:
 def processes(jobs: int, say: Say = said) -> Workers:
     """Processes of this machine; 0 jobs: this process. The tasks of a process that dies are repeated."""
 
-    def workers(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+    def workers(
+        work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
         waiting = list(tasks)
         broken = 0
         while waiting:
@@ -153,7 +115,11 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
         poll_s: time to wait for a task before counting the workers, s.
     """
 
-    def crew(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+    def at_work(
+        work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
+        if not tasks:
+            return
         distributed = library("distributed", "--scheduler", "cluster")
         gone = distributed.CancelledError, distributed.comm.core.CommClosedError
         with _client(address, workers) as client:
@@ -162,7 +128,7 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
             except gone:
                 raise _gone() from None
 
-    return crew
+    return at_work
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
@@ -28,7 +28,7 @@ from tunnel_lab.experiments.answers import (
     not_given,
     quantity_rows,
 )
-from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, Work, parquet, results_of
+from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.figures import trials_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_grid import Grid
@@ -68,46 +68,23 @@ class Unit:
     stop: int
 
 
-@dataclass(frozen=True)
-class GridScore(Experiment[Unit]):
-    """Some estimators on every trial of a grid."""
-
-    kind: ClassVar[str] = "score"
-    elsewhere: ClassVar[str] = "name another --out, or add --overwrite"
-    code_matters: ClassVar[bool] = True
-    grid: Grid
-    names: tuple[str, ...]
-
-    @property
-    def estimators(self) -> Sequence[str]:
-        """Names of the estimators."""
-        return self.names
-
-    @property
-    def tasks(self) -> Sequence[Unit]:
-        """Units, ordered across cells, to estimate the remaining time early."""
-        return [
-            Unit(cell, first, min(first + UNIT_TRIALS, self.grid.trials))
-            for first in range(0, self.grid.trials, UNIT_TRIALS)
-            for cell in range(len(self.grid.cells))
-        ]
-
-    @property
-    def work(self) -> Work[Unit]:
-        """Every estimator on the unit's trials."""
-        return partial(score_unit, self.grid, self.names)
-
-    def name(self, task: Unit) -> str:
-        """Cell and first trial."""
-        return f"c{task.cell:04d}-t{task.first:05d}"
-
-    def weight(self, task: Unit) -> int:
-        """Number of trials."""
-        return task.stop - task.first
-
-    def description(self) -> dict[str, Any]:
-        """The grid, and the names of the estimators."""
-        return {**self.grid.to_json_dict(), "estimators": list(self.names)}
+def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[Unit]:
+    """Some estimators on every trial of a grid, ordered across cells, to estimate the remaining time early."""
+    return Experiment(
+        "score",
+        [
+            Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+            for first in range(0, grid.trials, UNIT_TRIALS)
+            for cell in range(len(grid.cells))
+        ],
+        partial(score_unit, grid, estimators),
+        lambda unit: f"c{unit.cell:04d}-t{unit.first:05d}",
+        {**grid.to_json_dict(), "estimators": list(estimators)},
+        estimators,
+        weight=lambda unit: unit.stop - unit.first,
+        elsewhere="name another --out, or add --overwrite",
+        code_matters=True,
+    )
 
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> Done:
@@ -174,7 +151,7 @@ def score_grid(
     count = quantities * sum(grid.trials_for(name) for name in estimators)
     what = "rows (trials × estimators × quantities)"
     check_count(count, limits.SCORE_ROWS, what, "score", "give fewer trials, cells or estimators")
-    table, outcome = results_of(GridScore(grid, tuple(estimators)), parts, workers, progress)
+    table, outcome = results_of(score_of(grid, tuple(estimators)), parts, workers, progress)
     table = table.sort("cell", "trial", maintain_order=True)
     failed = failures_in(table, ("cell", "trial"), outcome.failed)
     return Results(grid, tuple(estimators), table.select(list(TRIAL_COLUMNS))), failed

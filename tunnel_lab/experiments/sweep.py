@@ -14,12 +14,12 @@ from functools import cached_property, lru_cache, partial
 from itertools import product
 from math import prod
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from identification.estimators import free_decay_estimators
-from tunnel_lab.experiments.experiment import RESULTS, Experiment, Parts, Work, read_manifest
+from tunnel_lab.experiments.experiment import RESULTS, Experiment, Parts, read_manifest
 from tunnel_lab.experiments.sweep_tables import (
     SweepDocument,
     axis_lengths,
@@ -62,57 +62,31 @@ class SweepCase:
 
 
 @dataclass(frozen=True)
-class Sweep(Experiment[int]):
-    """A sweep file with the sections of each rig's description, which together determine the results.
+class Sweep:
+    """A sweep file with the sections of each rig's description, which together determine the results."""
 
-    A task is a shard: some cases in sequence, simulated together.
-    """
-
-    kind: ClassVar[str] = "sweep"
     document: SweepDocument
     rigs: tuple[Mapping[str, Any], ...]
 
     @property
-    def datasets(self) -> tuple[str, ...]:
-        """Results, and records where they are stored."""
-        return (RESULTS, RECORDS) if self.document.records else (RESULTS,)
-
-    @property
-    def estimators(self) -> Sequence[str]:
-        """Names of the estimators."""
-        return self.document.estimators
-
-    @property
-    def tasks(self) -> range:
-        """Numbers of the shards."""
-        return range(self.shards)
-
-    @property
-    def work(self) -> Work[int]:
-        """Simulate and estimate a shard."""
-        return partial(run_shard, self)
-
-    def name(self, task: int) -> str:
-        """The name of a shard's files."""
-        return f"part-{task:0{max(5, len(str(self.shards - 1)))}d}"
-
-    def weight(self, task: int) -> int:
-        """Number of cases of a shard."""
-        return min(self.cases_per_shard, self.size - task * self.cases_per_shard)
-
-    def about(self) -> dict[str, Any]:
-        """Name and numbers of the sweep."""
-        numbers = {"cases": self.size, "runs": self.runs, "shards": self.shards}
-        return {"name": self.document.name, **numbers}
-
-    def description(self) -> dict[str, Any]:
-        """The file and the rigs, as after a passage through JSON."""
-        return dict(json.loads(self.to_json()))
-
-    @classmethod
-    def described_by(cls, kept: Any) -> dict[str, Any]:
-        """As of this version, which may know further keys."""
-        return cls.from_json(json.dumps(kept)).description()
+    def experiment(self) -> Experiment[int]:
+        """The sweep as an experiment: a task is a shard, some cases in sequence that are simulated together."""
+        last, numbers = (
+            len(str(self.shards - 1)),
+            {"cases": self.size, "runs": self.runs, "shards": self.shards},
+        )
+        return Experiment(
+            "sweep",
+            range(self.shards),
+            partial(run_shard, self),
+            lambda shard: f"part-{shard:0{max(5, last)}d}",
+            json.loads(self.to_json()),
+            estimators=self.document.estimators,
+            datasets=(RESULTS, RECORDS) if self.document.records else (RESULTS,),
+            weight=lambda shard: min(self.cases_per_shard, self.size - shard * self.cases_per_shard),
+            about={"name": self.document.name, **numbers},
+            described=_described,
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A worker process makes it once from its text, and its axes once."""
@@ -231,6 +205,11 @@ def _received(text: str) -> Sweep:
     return Sweep.from_json(text)
 
 
+def _described(kept: Any) -> Mapping[str, Any]:
+    """The description in a manifest, with the keys of this version."""
+    return dict(json.loads(Sweep.from_json(json.dumps(kept)).to_json()))
+
+
 def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     """Every combination of lists, the last key fastest."""
     return [dict(zip(table, values, strict=True)) for values in product(*table.values())]
@@ -341,10 +320,15 @@ def _in(where: str) -> Iterator[None]:
         raise TunnelError(error.what, where=place, remedy=error.remedy) from None
 
 
-def open_store(folder: Path) -> Parts[int]:
-    """Open the folder of a sweep, finished or not.
+def stored_sweep(folder: Path) -> Sweep:
+    """The sweep of a folder, finished or not.
 
     Raises:
         TunnelError: when it does not hold a sweep, or the sweep is malformed or of another format version.
     """
-    return Parts(folder, Sweep.from_json(json.dumps(read_manifest(Sweep, folder)["sweep"])))
+    return Sweep.from_json(json.dumps(read_manifest("sweep", folder)["sweep"]))
+
+
+def open_store(folder: Path) -> Parts[int]:
+    """The results in the folder of a sweep; errors as of `stored_sweep`."""
+    return Parts(folder, stored_sweep(folder).experiment)

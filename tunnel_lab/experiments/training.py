@@ -27,7 +27,13 @@ from identification.neural.posterior import (
 )
 from tunnel_lab.experiments.experiment import read_manifest, refuse_other_content, run_in
 from tunnel_lab.experiments.runner import Workers
-from tunnel_lab.experiments.training_samples import PARTS, Samples, read_samples, sizes_at_unit_excess
+from tunnel_lab.experiments.training_samples import (
+    PARTS,
+    TRAINING,
+    read_samples,
+    samples_of,
+    sizes_at_unit_excess,
+)
 from tunnel_reference.forms import FAMILIES
 from tunnel_sim.files.reading import read_regular
 from tunnel_sim.files.writing import json_line, write_whole
@@ -77,13 +83,12 @@ def train(
         TunnelError: when the folder belongs to another seed or version, or cannot be written.
     """
     shards = {part: spec.of_part(part) for part in PARTS}
-    samples = Samples(spec.seed, shards, {})
-    if (folder / "training.json").is_file():  # the sizes take long; another seed is refused below
-        samples = replace(samples, sizes=read_manifest(Samples, folder)["training"].get("sizes"))
+    if (folder / f"{TRAINING}.json").is_file():  # the sizes take long; another seed is refused below
+        sizes = read_manifest(TRAINING, folder)[TRAINING].get("sizes", {})
     else:
-        refuse_other_content(samples, folder)
-        samples = replace(samples, sizes=sizes_at_unit_excess(spec.seed))
-    run_in(samples, folder, workers, partial(progress, "simulating"))
+        refuse_other_content(samples_of(spec.seed, shards, {}), folder)
+        sizes = sizes_at_unit_excess(spec.seed)
+    run_in(samples_of(spec.seed, shards, sizes), folder, workers, partial(progress, "simulating"))
     used = {
         kind: {part: usable(read_samples(folder, f"{kind}s", part, count)) for part, count in shards.items()}
         for kind in KINDS

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 import polars as pl
@@ -16,7 +15,7 @@ import polars as pl
 from identification.campaign.derivatives import build_design
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.rivals import Features, campaign_features, record_features
-from tunnel_lab.experiments.experiment import Done, Experiment, Work, parquet
+from tunnel_lab.experiments.experiment import Done, Experiment, parquet
 from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
@@ -28,7 +27,8 @@ from tunnel_reference.severity import Simulated, bind_effects, read_and_fit
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record
 
-PARTS = ("training", "tuning", "calibration")
+TRAINING = "training"
+PARTS = (TRAINING, "tuning", "calibration")
 LETTERS = {"records": "r", "campaigns": "c"}
 """Kinds of samples by the name of their table."""
 CAMPAIGNS = 200
@@ -57,48 +57,23 @@ class ShardSpec:
     sizes: tuple[tuple[str, float], ...]
 
 
-@dataclass(frozen=True)
-class Samples(Experiment[ShardSpec]):
-    """The samples of campaigns and of records in some shards of each part.
+def samples_of(seed: int, shards: Mapping[str, int], sizes: Mapping[str, float]) -> Experiment[ShardSpec]:
+    """The samples of some shards of each part, a table for each network; shards may be added later.
 
     Args:
         shards: number of each part's.
         sizes: from `sizes_at_unit_excess`.
     """
-
-    kind: ClassVar[str] = "training"
-    elsewhere: ClassVar[str] = "name another file, or add --restart"
-    seed: int
-    shards: Mapping[str, int]
-    sizes: Mapping[str, float]
-
-    @property
-    def datasets(self) -> tuple[str, ...]:
-        """A table for each network."""
-        return tuple(LETTERS)
-
-    @property
-    def tasks(self) -> Sequence[ShardSpec]:
-        """The shards."""
-        sizes = tuple(sorted(self.sizes.items()))
-        return [
-            ShardSpec(self.seed, part, number, sizes)
-            for part, count in self.shards.items()
-            for number in range(count)
-        ]
-
-    @property
-    def work(self) -> Work[ShardSpec]:
-        """Draw, simulate and reduce the campaigns of a shard."""
-        return shard_samples
-
-    def name(self, task: ShardSpec) -> str:
-        """Part and number."""
-        return f"{task.part}-{task.number:04d}"
-
-    def description(self) -> dict[str, Any]:
-        """The seed; more shards may be added."""
-        return {"seed": self.seed, "sizes": dict(self.sizes)}
+    known = tuple(sorted(sizes.items()))
+    return Experiment(
+        TRAINING,
+        [ShardSpec(seed, part, number, known) for part, count in shards.items() for number in range(count)],
+        shard_samples,
+        lambda spec: f"{spec.part}-{spec.number:04d}",
+        {"seed": seed, "sizes": dict(sizes)},
+        datasets=tuple(LETTERS),
+        elsewhere="name another file, or add --restart",
+    )
 
 
 def shard_samples(spec: ShardSpec) -> Done:

@@ -219,7 +219,7 @@ def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
 def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Bare", "Mine")]
-    run_in(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
     status, out, err = tunnel("sweep", "--summary", "out")
     assert (status, err) == (0, "")
     assert "Not given by bare: ζ, zero.\n" in out
@@ -250,7 +250,7 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Mine", "Broken")]
     given = campaign(TWELVE[:4], noise=5e-4, duration=4.0, rate=200.0, rng=np.random.default_rng(1))
     case = breakdown.BiasCase("no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3))
-    rows, outcome = results_of(breakdown.Breakdown((case,), tuple(names), 1), None, processes(1))
+    rows, outcome = results_of(breakdown.breakdown_of([case], tuple(names), 1), None, processes(1))
     mine, broken = (rows.filter(pl.col("estimator") == name) for name in names)
     assert mine["value"].null_count() == 0
     assert set(broken["status"]) == {"raised TypeError"}
@@ -276,7 +276,7 @@ def test_a_wrong_return_is_one_line_in_every_command(tunnel, tiny_campaign: Path
 def test_a_wrong_return_fails_a_sweep(folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("NotANumber", "Mine")]
-    store, outcome = run_in(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    store, outcome = run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
     (failed,) = outcome.failed
     assert (failed.status, failed.of_the_estimator) == ("wrong_return", True)
     rows = store.scan().collect().filter(estimator="not_a_number")

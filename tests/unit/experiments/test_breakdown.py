@@ -12,7 +12,6 @@ from tunnel_lab.experiments.experiment import results_of
 from tunnel_lab.experiments.runner import processes
 
 NAMES = ("matrix_pencil", "conventional")
-named = work.Breakdown((), NAMES, 1).name
 EFFECTS = ("coulomb_friction", "sensor_drift")
 
 
@@ -23,7 +22,7 @@ def cases():
 
 @pytest.fixture(scope="module")
 def found(cases):
-    return work.breakdown_frame(results_of(work.Breakdown(tuple(cases), NAMES, 1), None, processes(0))[0])
+    return work.breakdown_frame(results_of(work.breakdown_of(cases, NAMES, 1), None, processes(0))[0])
 
 
 @pytest.mark.slow
@@ -31,14 +30,14 @@ def test_effects_are_as_strong_as_they_should_be(cases):
     assert [case.effect for case in cases] == ["no effect"] * 2 + [name for name in EFFECTS for _ in "ab"]
     for case in cases:
         assert case.reached == pytest.approx(case.severity, rel=0.15, abs=0.05)
-    assert len(set(map(named, cases))) == len(cases)
+    assert len(set(map(work.case_name, cases))) == len(cases)
 
 
 def test_a_case_is_named_for_its_effect_and_severity(monkeypatch):
     monkeypatch.setattr(work, "size_effects", lambda draws, **_: draws)
     cases = work.make_cases(1, realisations=1, effects=EFFECTS[:1], severities=(10.0,), duration=0.2)
     assert [(case.effect, case.severity) for case in cases] == [("no effect", 0.0), (EFFECTS[0], 10.0)]
-    assert list(map(named, cases)) == ["no_effect-0-0", "coulomb_friction-10-0"]
+    assert list(map(work.case_name, cases)) == ["no_effect-0-0", "coulomb_friction-10-0"]
 
 
 @pytest.mark.slow
@@ -76,7 +75,7 @@ def test_the_map_is_a_table_and_a_figure(found):
 
 @pytest.mark.slow
 def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
-    experiment = work.Breakdown(tuple(cases), NAMES, 1)
+    experiment = work.breakdown_of(cases, NAMES, 1)
     results_of(experiment, tmp_path, processes(0))
     (tmp_path / "results" / "sensor_drift-10-1.parquet").unlink()
     asked = []

@@ -58,7 +58,7 @@ def worker(address: str) -> subprocess.Popen[bytes]:
 def test_workers_missing_and_lost_are_survived(
     sweep: Sweep, here, tmp_path: Path, address: str, processes: list[subprocess.Popen[bytes]]
 ) -> None:
-    run_in(sweep, tmp_path / "alone", here)
+    run_in(sweep.experiment, tmp_path / "alone", here)
     said: list[str] = []
     killed: list[int] = []
 
@@ -72,7 +72,9 @@ def test_workers_missing_and_lost_are_survived(
             processes[1].kill()
             killed.append(done)
 
-    store, _ = run_in(sweep, tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one)
+    store, _ = run_in(
+        sweep.experiment, tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one
+    )
     assert said[0].startswith("no worker is connected to tcp://")
     assert killed
     assert killed[0] < sweep.size
@@ -102,7 +104,7 @@ def test_a_scheduler_that_goes_away_is_one_line(
 
 
 def test_a_local_cluster_gives_the_same(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
-    run_in(sweep, tmp_path / "alone", here)
+    run_in(sweep.experiment, tmp_path / "alone", here)
     command = [
         sys.executable,
         "-m",

@@ -34,7 +34,7 @@ def test_the_file_is_read_and_the_code_runs(here, tmp_path: Path, monkeypatch: p
         "coefficient = 0.002", "coefficient = [0.002, 0.003, 0.004, 0.005, 0.006]"
     )
     (tmp_path / "sweep.toml").write_text(small, encoding="utf-8")
-    store, _ = run_in(read_sweep(tmp_path / "sweep.toml"), tmp_path / "results", here)
+    store, _ = run_in(read_sweep(tmp_path / "sweep.toml").experiment, tmp_path / "results", here)
     monkeypatch.chdir(tmp_path)
     found: dict[str, object] = {}
     for code in blocks("python"):

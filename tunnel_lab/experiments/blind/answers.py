@@ -11,8 +11,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from diagnosis._diagnose import diagnose, vocabulary
 from tunnel_lab.experiments.blind.sets import (
@@ -24,7 +25,7 @@ from tunnel_lab.experiments.blind.sets import (
     read_hashes,
     write_document,
 )
-from tunnel_lab.experiments.experiment import Done, Experiment, Work, run
+from tunnel_lab.experiments.experiment import Done, Experiment, run
 from tunnel_lab.experiments.runner import Progress, Workers, processes
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.expression_effect import read_effects
@@ -49,44 +50,6 @@ def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Pat
 
 def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
     return () if effects_file is None else read_effects(effects_file)
-
-
-@dataclass(frozen=True)
-class Answers(Experiment[Path]):
-    """The diagnosis of every campaign of a set.
-
-    Args:
-        excluded: effects withheld from the vocabulary, sorted.
-        effects_file: file of effects added to the vocabulary; None: none.
-    """
-
-    kind: ClassVar[str] = ANSWERS
-    folder: Path
-    excluded: tuple[str, ...] = ()
-    effects_file: Path | None = None
-
-    @property
-    def datasets(self) -> tuple[str, ...]:
-        """Only answers."""
-        return (ANSWERS,)
-
-    @property
-    def tasks(self) -> Sequence[Path]:
-        """Folders of the campaigns."""
-        return campaign_folders(self.folder)
-
-    @property
-    def work(self) -> Work[Path]:
-        """Diagnose a campaign."""
-        return partial(answer_campaign, excluded=self.excluded, effects_file=self.effects_file)
-
-    def name(self, task: Path) -> str:
-        """The name of the campaign."""
-        return task.name
-
-    def description(self) -> dict[str, Any]:
-        """The withheld effects."""
-        return {"excluded": list(self.excluded)}
 
 
 @dataclass
@@ -153,11 +116,13 @@ def answer_set(
     Raises:
         TunnelError: when the set has no campaign, an effect is unknown, or an answer was changed afterwards.
     """
-    answers = Answers(folder, tuple(sorted(set(excluded))), effects_file)
-    campaign_folders(folder)
+    without = sorted(set(excluded))
+    work = partial(answer_campaign, excluded=without, effects_file=effects_file)
+    about: dict[str, Any] = {"excluded": without}
+    answers = Experiment(ANSWERS, campaign_folders(folder), work, attrgetter("name"), about)
     vocabulary(exclude=excluded)
     target = output_folder(answers_folder(folder, excluded, effects_file))
-    run(answers, Sealed(target, answers.description()), workers or processes(0), progress)
+    run(answers, Sealed(target, about), workers or processes(0), progress)
     return file_hash(target / SEAL)
 
 
