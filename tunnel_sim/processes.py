@@ -52,7 +52,8 @@ def in_processes(
     Items are returned with results as they finish; BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
-        yield from ((item, work(item)) for item in items)
+        with _one_thread_each(), one_blas_thread():
+            yield from ((item, work(item)) for item in items)
         return
     context = multiprocessing.get_context("spawn")
     line, end = context.Pipe(duplex=False)

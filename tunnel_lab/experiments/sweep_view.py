@@ -9,26 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import polars as pl
 
-from identification.printing import SYMBOLS, concise, significant, unit
-from identification.scoring import Score, Trials, score
-from identification.statistics import Proportion
-from tunnel_lab.experiments.asked import NOT_ASKED
-from tunnel_lab.experiments.score_trials import not_given
-from tunnel_lab.experiments.score_view import share_text
-from tunnel_lab.experiments.sweep import SCATTER_COLUMNS, Store
+from identification.printing import concise, significant, unit
+from identification.scoring import Score, score
+from tunnel_lab.experiments.answers import NOT_ASKED, not_given
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, share_text, trials_of
+from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
+from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
 from tunnel_sim.effects import effect_class
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import read_only
+from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
-    import polars as pl
     from matplotlib.figure import Figure
     from rich.table import Table
 
@@ -52,7 +50,6 @@ AXES = {
 """Columns that a summary uses as axes, each with its name and unit."""
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
-NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
 BRACKETS = (
     "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %. Bound: "
     "Cramér–Rao's, of the nominal model, with the scatter where runs scatter."
@@ -86,73 +83,64 @@ class Line:
 
     def to_row(self) -> dict[str, Any]:
         """The line as plain values: every figure with its standard error or 95 % interval."""
-        bias, rmse, coverage = self.score.bias, self.score.rmse, self.score.coverage
-        over = self.score.rmse_over_bound
+        figures = {name: name for name in ("bias", "rmse", "rmse_over_bound")}
+        failures = figure_columns(self.score, {}, {"failures": "failures"}, "")
         return {
             "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
             "estimator": self.estimator, "quantity": self.quantity,
-            "unit": None if bias is None else bias.unit, "count": self.score.count,
-            **_share("failures", self.score.failures),
-            "bias": bias and bias.value, "bias_std": bias and bias.std,
-            "rmse": rmse and rmse.value, "rmse_std": rmse and rmse.std,
-            "rmse_over_bound": over and over.value, "rmse_over_bound_std": over and over.std,
-            **_share("coverage", coverage),
+            "unit": getattr(self.score.bias, "unit", None), "count": self.score.count, **failures,
+            **figure_columns(self.score, figures, {"coverage": "coverage"}, "_std"),
         }  # fmt: skip
 
 
-def _share(name: str, share: Proportion | None) -> dict[str, float | None]:
-    low, high = (None, None) if share is None else share.interval
-    return {name: None if share is None else share.value, f"{name}_low": low, f"{name}_high": high}
-
-
-def summarise(store: Store) -> list[Line]:
-    """Score the finished part of a sweep, of at least one shard.
+def summarise(results: pl.LazyFrame) -> list[Line]:
+    """Score the results of a sweep.
 
     Returns:
         Lines: of all cases, then along each axis that has two values or more, by estimator and quantity.
-
-    Raises:
-        TunnelError: when nothing is finished, or the sweep has no estimators.
     """
-    import polars as pl
-
-    frame = store.scan()
-    if not store.sweep.document.estimators:
-        raise TunnelError(
-            "the sweep has no estimators", where=str(store.folder), remedy="there is no estimate to summarise"
-        )
-    absent = unanswered(store)
-    pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
+    absent = unanswered(results)
     columns = ("effect", "severity", *AXES, "truth", "value", "std", "bound", "status", "unit")
+    asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
+    pairs = results.select("estimator", "quantity").unique(maintain_order=True).collect()
     lines: list[Line] = []
     for estimator, quantity in pairs.iter_rows():
-        if quantity in absent.get(estimator, ()):
-            continue
-        mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
-        asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
-        data = frame.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
-        if len(data):
-            lines += lines_of(data, estimator, quantity)
+        if quantity not in absent.get(estimator, ()):
+            mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
+            data = results.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
+            lines += lines_of(data, estimator, quantity) if len(data) else ()
     order = [OVERALL, *AXES, SEVERITY]
     return sorted(
         lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
     )
 
 
-def unanswered(store: Store) -> dict[str, tuple[str, ...]]:
-    """Quantities by estimator that it gives in no case, unless its status is a failure in all cases."""
-    import polars as pl
+def sweep_view(results: pl.LazyFrame, name: str) -> View:
+    """The view of the finished part of a sweep.
 
-    given = pl.when(pl.col("value").is_not_null()).then(1.0).alias("value")
-    asked = store.scan().filter(pl.col("truth").is_not_null())
-    kinds = asked.select("estimator", "quantity", "status", given).unique(maintain_order=True).collect()
-    return not_given(kinds.iter_rows(named=True))
+    Args:
+        name: of the sweep.
+    """
+    lines = summarise(results)
+    along = groups(lines)
+    texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
+    csv = pl.DataFrame([line.to_row() for line in lines]).with_columns(texts).write_csv()
+    tables = (overall_table(lines), *map(axis_table, along.values()))
+    return View(
+        f"Sweep {name}",
+        [*tables, BRACKETS, *not_given_lines(unanswered(results))],
+        {name: partial(error_figure, part) for name, part in along.items()},
+        {"summary.csv": csv.encode()},
+    )
+
+
+def unanswered(results: pl.LazyFrame) -> dict[str, tuple[str, ...]]:
+    """Quantities by estimator that it gives in no case, unless its status is a failure in all cases."""
+    return not_given(results.filter(pl.col("truth").is_not_null()))
 
 
 def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
     """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
-    import polars as pl
-
     plain = data.filter(pl.col("effect") == NO_EFFECT)
     base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
     yield Line(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
@@ -184,22 +172,7 @@ def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
 
 def _score(data: pl.DataFrame) -> Score:
     """The score in % of the truth, or in the quantity's unit where a truth is zero."""
-    truth = data["truth"].to_numpy()
-    relative = bool(np.all(truth != 0.0))
-    kept = data["value"].is_not_null().to_numpy()
-    given = data.filter(data["value"].is_not_null())
-    bounded = len(given) > 0 and not given["bound"].null_count()
-    scale = 100.0 / np.abs(truth[kept]) if relative else np.ones(int(kept.sum()))
-    return score(
-        Trials(
-            error=read_only((given["value"].to_numpy() - truth[kept]) * scale),
-            std=read_only(given["std"].to_numpy() * scale),
-            truth=read_only(truth[kept] * scale),
-            bound=read_only(given["bound"].to_numpy() * scale) if bounded else None,
-            failures=int((~kept).sum()),
-            unit="%" if relative else data["unit"][0],
-        )
-    )
+    return score(trials_of(data, percent=bool((data["truth"] != 0.0).all())))
 
 
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:

@@ -4,8 +4,9 @@
 in the fits), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
 """
 
-from diagnosis.blind.score import Score, score_set
-from diagnosis.blind.sets import answer_set, answers_folder, make_blind
+from tunnel_lab.experiments.blind.answers import answer_set, answers_folder
+from tunnel_lab.experiments.blind.score import Score, score_set
+from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_reference.make import parse_shares
 

@@ -8,24 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-import time
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from diagnosis._diagnose import diagnose, vocabulary
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_reference.severity import ATTEMPTS, Simulated
-from tunnel_sim.effects import Effect
-from tunnel_sim.effects.expression_effect import read_effects
-from tunnel_sim.effects.registry import answering_with
-from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
+from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.files.reading import read_json, read_regular
-from tunnel_sim.files.writing import clear_leftovers, json_text, output_folder, whole_folder, write_whole
-from tunnel_sim.processes import in_processes
+from tunnel_sim.files.writing import clear_leftovers, json_text, whole_folder, write_whole
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
@@ -186,104 +178,3 @@ def written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
                 raise
             (simulated,) = simulate_set([redraw(simulated.draw)], progress=show_steps)
     return simulated
-
-
-AnswerProgress = Callable[[int, int, str], None]
-
-
-def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
-    """The folder of the answers to a set: ``answers`` in it, or ``answers-without-…-with-…``.
-
-    The latter ends with a hash of the file of added effects.
-    """
-    without = ["without", *sorted(set(excluded))] if excluded else []
-    names = sorted(kind.name for kind in _own_effects(effects_file))
-    own = ["with", *names, file_hash(effects_file)[:8]] if effects_file else []
-    return folder / "-".join(["answers", *without, *own])
-
-
-def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
-    return () if effects_file is None else read_effects(effects_file)
-
-
-def answer_set(
-    folder: Path,
-    *,
-    excluded: Sequence[str] = (),
-    jobs: int = 1,
-    progress: AnswerProgress | None = None,
-    effects_file: Path | None = None,
-) -> str:
-    """Diagnose every campaign of a set that has no answer yet.
-
-    An interrupted run leaves only complete answers, and the next run continues from there. A campaign that cannot
-    be diagnosed gets an answer with the reason; it counts as wrong.
-
-    Args:
-        excluded: effects withheld from the vocabulary.
-        progress: called with the number of campaigns answered, the total, and the name of the last.
-        effects_file: file of effects added to the vocabulary; None: none.
-
-    Returns:
-        SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
-
-    Raises:
-        TunnelError: when the set has no campaign, an effect is unknown, or an answer was changed afterwards.
-    """
-    campaigns = campaign_folders(folder)
-    vocabulary(exclude=excluded)
-    target = answers_folder(folder, excluded, effects_file)
-    output_folder(target)
-    hashes: dict[str, str] = {}
-    if (target / SEAL).exists():
-        hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")
-    for name, known in hashes.items():
-        path = target / f"{name}.json"
-        if not path.is_file() or file_hash(path) != known:
-            remedy = f"remove {target} and answer all campaigns again"
-            raise TunnelError("is not the answer that was given", where=str(path), remedy=remedy)
-    names = {path.name for path in campaigns}
-    left = [path for path in campaigns if path.name not in hashes]
-    if progress is not None:
-        progress(len(names & hashes.keys()), len(campaigns), "")
-    without = tuple(sorted(set(excluded)))
-    work = partial(answer_campaign, excluded=without, effects_file=effects_file)
-    try:
-        for _, (name, answer) in in_processes(work, left, jobs if jobs > 1 and len(left) > 1 else 0):
-            hashes[name] = write_document(target / f"{name}.json", answer)
-            seal = {
-                "schema_version": SCHEMA_VERSION,
-                "excluded": list(without),
-                "answers_sha256": dict(sorted(hashes.items())),
-            }
-            write_document(target / SEAL, seal)
-            if progress is not None:
-                progress(len(names & hashes.keys()), len(campaigns), name)
-    except BrokenProcessPool:
-        what = "a process that diagnoses died"
-        remedy = "check the memory, give fewer --jobs, and repeat the command: answers are kept"
-        raise TunnelError(what, where=str(target), remedy=remedy) from None
-    return file_hash(target / SEAL)
-
-
-def answer_campaign(
-    folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None
-) -> tuple[str, dict[str, Any]]:
-    """Diagnose one campaign of a set.
-
-    Returns:
-        Its name and its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where
-        there is none, ``causes`` null and the ``error``.
-    """
-    begun = time.perf_counter()
-    try:
-        with answering_with(_own_effects(effects_file)):
-            found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
-        answer = found.to_json_dict()
-        answer.pop("maps", None)  # data of the figures: larger than the records, and not scored
-    except Exception as error:  # one bad campaign must not end the whole set; the score counts it as wrong
-        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
-        answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}
-    answer["data_sha256"] = folder_hash(folder)
-    answer["wall_s"] = time.perf_counter() - begun
-    return folder.name, answer

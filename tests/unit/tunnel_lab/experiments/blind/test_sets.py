@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.blind import answer_set, answers_folder, make_blind, score_set
-from diagnosis.blind import sets as answer
 from identification.statistics import Proportion
 from tests.reference.rigs import rig
 from tests.support.gone_reader import unheard
-from tests.unit.diagnosis.blind.test_score import document
+from tests.unit.tunnel_lab.experiments.blind.test_score import document
 from tunnel_lab.cli import main
+from tunnel_lab.experiments.blind import answer_set, answers_folder, make_blind, score_set, sets
+from tunnel_lab.experiments.blind import answers as answer
+from tunnel_lab.experiments.runner import processes
 from tunnel_reference import draw, severity
 from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
@@ -138,7 +139,7 @@ def test_an_interrupted_making_leaves_nothing(tmp_path, monkeypatch):
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("diagnosis.blind.sets.simulate_set", interrupted)
+    monkeypatch.setattr("tunnel_lab.experiments.blind.sets.simulate_set", interrupted)
     with pytest.raises(KeyboardInterrupt):
         make_blind(tmp_path / "set", count=1, seed=1)
     assert list(tmp_path.iterdir()) == []
@@ -153,7 +154,7 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
             raise TunnelError("about 1.3 cycles of oscillation, fewer than three")
         return write_campaign(campaign, folder)
 
-    monkeypatch.setattr("diagnosis.blind.sets.write_campaign", refuses_the_first)
+    monkeypatch.setattr("tunnel_lab.experiments.blind.sets.write_campaign", refuses_the_first)
     c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
     monkeypatch.setattr(severity, "_SUBSTEPS", 2)
@@ -189,7 +190,7 @@ def test_answering_goes_on_where_it_was_interrupted(blind, quick, monkeypatch):
     answer_set(blind, progress=lambda *args: steps.append(args))
     assert [name for name, _ in quick] == ["c0001", "c0002", "c0003"]
     assert (blind / "answers" / "c0001.json").read_bytes() == first
-    assert steps == [(1, 3, ""), (2, 3, "c0002"), (3, 3, "c0003")]
+    assert steps == [(1, 3), (2, 3), (3, 3)]
     assert {p.name for p in (blind / "answers").iterdir()} == {
         "c0001.json",
         "c0002.json",
@@ -221,9 +222,10 @@ def test_processes_give_the_answers_of_one(blind, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     exclude = ("buffeting",)
     alone = [
-        answer.answer_campaign(blind / name, exclude)[1]["causes"] for name in ("c0001", "c0002", "c0003")
+        json.loads(answer.answer_campaign(blind / name, exclude).files["answers"])["causes"]
+        for name in ("c0001", "c0002", "c0003")
     ]
-    answer_set(blind, excluded=exclude, jobs=2)
+    answer_set(blind, excluded=exclude, workers=processes(2))
     folder = answers_folder(blind, exclude)
     assert folder.name == "answers-without-buffeting"
     assert [json.loads((folder / f"c000{i}.json").read_text())["causes"] for i in (1, 2, 3)] == alone
@@ -306,7 +308,7 @@ def test_an_open_set_is_scored_and_said_to_be_open(blind, quick, capsys):
 
 
 def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(answer, "simulate_set", lambda *_, **__: [])
+    monkeypatch.setattr(sets, "simulate_set", lambda *_, **__: [])
     for words, made in (
         ([], (0.5, "mixed", 0.5, 0.5)),
         (["--scatter", "0"], (0.0, "mixed", 0.5, 0.5)),

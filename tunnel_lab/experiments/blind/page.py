@@ -10,16 +10,19 @@ import numpy as np
 
 from diagnosis.words.numbers import plain
 from identification.printing import TextTable
+from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
+from tunnel_lab.terminal.outputs import rich_table
 from tunnel_sim.vocabulary.errors import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+    from rich.table import Table
 
-    from diagnosis.blind import Score
     from identification.statistics import Proportion
+    from tunnel_lab.experiments.blind import Score
 
 
 CALIBRATION = "Calibration"
@@ -225,6 +228,14 @@ def _other_sections(score: Score) -> list[ScoreSection]:
             [(f"{middle:.1f}", f"{high:.1f}", f"{longest:.1f}")] if longest > 0.0 else (),
         ),
     ]
+
+
+def blind_view(score: Score) -> View:
+    """The view of a score, each table with its note."""
+    parts: list[Table | str] = [*origin_lines(score), ""]
+    for section in sections(score):
+        parts += [rich_table(section), *([section.note + "\n"] if section.note else [])]
+    return View("Blind check", parts)
 
 
 def origin_lines(score: Score) -> list[str]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.blind.cases import case, found_by_group, inclusions
-from diagnosis.blind.score import Score, smooth_calibration
 from identification.statistics import Proportion
-from tests.unit.diagnosis.blind.test_score import document
-from tunnel_lab.report import blind
-from tunnel_lab.report.blind import calibration_figure, confusion_figure
+from tests.unit.tunnel_lab.experiments.blind.test_score import document
+from tunnel_lab.experiments.blind import page as blind
+from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.page import calibration_figure, confusion_figure
+from tunnel_lab.experiments.blind.score import Score, smooth_calibration
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 

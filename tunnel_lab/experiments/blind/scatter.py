@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.blind.cases import Case
 from identification.statistics import Proportion
+from tunnel_lab.experiments.blind.cases import Case
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 FACTOR = 1.5

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from diagnosis.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
-from diagnosis.blind.scatter import ScatterScore, scatter_score
-from diagnosis.blind.sets import (
+from diagnosis.search.weigh import UNKNOWN
+from identification.statistics import Proportion
+from tunnel_lab.experiments.blind.answers import answers_folder
+from tunnel_lab.experiments.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
+from tunnel_lab.experiments.blind.scatter import ScatterScore, scatter_score
+from tunnel_lab.experiments.blind.sets import (
     KEY,
     SEAL,
-    answers_folder,
     campaign_folders,
     file_hash,
     folder_hash,
     read_hashes,
 )
-from diagnosis.search.weigh import UNKNOWN
-from identification.statistics import Proportion
 from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown

@@ -6,12 +6,12 @@ import json
 
 import pytest
 
-from diagnosis.blind.cases import SCATTERING, case, found_by_group, inclusions
-from diagnosis.blind.scatter import scatter_score
-from diagnosis.blind.score import Score
 from identification.statistics import Proportion
-from tests.unit.diagnosis.blind.test_score import TRUTH, document
-from tunnel_lab.report import blind
+from tests.unit.tunnel_lab.experiments.blind.test_score import TRUTH, document
+from tunnel_lab.experiments.blind import page as blind
+from tunnel_lab.experiments.blind.cases import SCATTERING, case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.scatter import scatter_score
+from tunnel_lab.experiments.blind.score import Score
 
 SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
