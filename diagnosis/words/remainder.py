@@ -178,11 +178,6 @@ def ceiling(given: Document) -> Ceiling:
     return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
 
 
-def rest_line(document: Document) -> str:
-    """The remaining gap, from the document; empty for a document without it."""
-    return str((document["rest"] or {"words": ""})["words"])
-
-
 def closable_line(document: Document) -> str:
     """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
     if found := document.get("closable"):

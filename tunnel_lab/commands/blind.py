@@ -19,7 +19,7 @@ from tunnel_lab.terminal.inputs import (
     with_format,
     with_quiet,
 )
-from tunnel_lab.terminal.outputs import bar_or_lines, console, rich_table, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import bar_or_lines, console, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
@@ -261,7 +261,7 @@ def score(
         say(line)
     say("")
     for section in blind.sections(result):
-        show_tables(rich_table(section))
+        show_tables(section)
         if section.note:
             say(section.note + "\n")
     say_written(markdown, json, *drawn)

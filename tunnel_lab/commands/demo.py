@@ -14,24 +14,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.text import Text
 from typer import Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.outputs import (
     bar,
     console,
-    rich_table,
     say,
     say_written,
     show_tables,
     step_display,
-    table,
     truth_table,
 )
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from identification.estimate import Estimate
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.plan import CampaignPlan
@@ -150,7 +146,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{document['verdict']}\n")
-    show_tables(found_table(plan, document), rich_table(waterfall_table(document)))
+    show_tables(found_table(plan, document), waterfall_table(document))
 
 
 def found_table(plan: CampaignPlan, document: Document) -> Table:
@@ -159,27 +155,26 @@ def found_table(plan: CampaignPlan, document: Document) -> Table:
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
     from tunnel_sim.effects.registry import effect_class
 
-    result = table(
-        "Planted and found, ± one standard deviation σ",
-        *("", "planted", "nominal model", "with the causes", "error"),
-        right=("planted", "error"),
-    )
+    rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in after:
         truth = getattr(plan.truth, name)
-        result.add_row(
-            Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"),
-            significant(truth),
-            with_std(before[name]["value"], before[name]["std"]),
-            with_std(after[name]["value"], after[name]["std"]),
-            in_stds(after[name]["value"] - truth, after[name]["std"]),
+        rows.append(
+            (
+                f"{SYMBOLS[name]} {unit(UNITS[name])}",
+                significant(truth),
+                with_std(before[name]["value"], before[name]["std"]),
+                with_std(after[name]["value"], after[name]["std"]),
+                in_stds(after[name]["value"] - truth, after[name]["std"]),
+            )
         )
     for (effect, name), (truth, found) in planted_and_found(plan, document).items():
         info = next(info for info in effect_class(effect).parameters() if info.name == name)
         error = in_stds(found["value"] - truth, found["std"]) if found and found["std"] else ""
         cell = "not found" if found is None else estimated(found)
-        result.add_row(Text(f"{info.symbol} {unit(info.unit)}"), significant(truth), "", cell, error)
-    return result
+        rows.append((f"{info.symbol} {unit(info.unit)}", significant(truth), "", cell, error))
+    heads = ("quantity", "planted", "nominal model", "with the causes", "error")
+    return Table("Planted and found, ± one standard deviation σ", heads, tuple(rows), ("planted", "error"))
 
 
 def planted_and_found(

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from identification.uncertainty.cramer_rao import CampaignBound
     from tunnel_sim.files.plan_file import PlanDocument
 
@@ -308,10 +307,14 @@ def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) 
 
     names = tuple(f"std {SYMBOLS[name]}\n{unit(UNITS[name])}" for name in _COEFFICIENTS)
     heads = ("runs", "record\n[s]", "rig time\n[min]", *names)
-    result = table("Cramér–Rao bounds: the smallest standard deviations", "plan", *heads, right=heads)
-    for name, runs, record, spent, bound in rows:
-        deviations = (significant(bound.std(each), 3) for each in _COEFFICIENTS)
-        result.add_row(name, f"{runs}", f"{record:g}", f"{spent / 60.0:.1f}", *deviations)
-    found = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
-    result.add_row("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in found))
-    return result
+    cells = [
+        (
+            *(name, f"{runs}", f"{record:g}", f"{spent / 60.0:.1f}"),
+            *(significant(bound.std(each), 3) for each in _COEFFICIENTS),
+        )
+        for name, runs, record, spent, bound in rows
+    ]
+    ratios = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
+    cells.append(("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in ratios)))
+    title = "Cramér–Rao bounds: the smallest standard deviations"
+    return Table(title, ("plan", *heads), tuple(cells), right=heads)

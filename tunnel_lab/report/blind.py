@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.printing import TextTable
+from identification.blocks import Table
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 from tunnel_sim.vocabulary.errors import counted
@@ -43,7 +43,7 @@ _DARK = 0.55  # share of the colour above which white text is legible
 
 
 @dataclass(frozen=True)
-class ScoreSection(TextTable):
+class ScoreSection(Table):
     """A table with a line below it.
 
     Args:
