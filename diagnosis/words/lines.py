@@ -79,7 +79,7 @@ def coefficients_line(document: Document) -> str:
         return ""
     return (
         f"± includes {listed(parts)}. tunnel identify includes the noise, the scatter between runs and what its "
-        "own model misses, so that its ± may be far smaller or larger."
+        "model misses, so its ± may be far smaller or larger."
     )
 
 
@@ -100,7 +100,7 @@ def hidden_line(document: Document) -> str:
     size = f"{significant(abs(first['size']['value']), 2)} {mark}".strip()
     return (
         f"What could hide: {plain(first['effect'])} of up to {size}{explained({first['size']['unit']})}, which "
-        f"these runs do not exclude, would move {' and '.join(moved)}. The intervals allow for it."
+        f"these runs do not exclude, would change {' and '.join(moved)}. The intervals allow for it."
     )
 
 

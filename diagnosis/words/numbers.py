@@ -265,12 +265,12 @@ KINDS: Mapping[str, str] = {
     "rate": "a moment of the rate alone",
     "state": "a moment of angle and rate",
     "wind": "a moment of angle and rate with the wind",
-    "time": "a moment in time, alike in all runs",
-    "reading": "an error of the reading, alike in all runs",
-    "line": "a steady line in the reading, of a phase of its own in every run",
-    "between": "a stiffness, damping or moment of each run's own",
-    "event": "a moment in time of each run's own",
-    "wander": "a wandering or jumping zero of each run's own",
+    "time": "a moment in time, equal in all runs",
+    "reading": "an error of the reading, equal in all runs",
+    "line": "a steady line in the reading, with another phase in every run",
+    "between": "a stiffness, damping or moment that differs between runs",
+    "event": "a moment in time that differs between runs",
+    "wander": "a wandering or jumping zero that differs between runs",
     "noise": "nothing smooth: the rest is noise",
 }
 """Kinds of missing law (`diagnosis.facts.remainder.KINDS`)."""

@@ -213,7 +213,7 @@ def _closable(document: Document) -> Section:
     drawn = captioned("law")
     return Section(
         "closable",
-        "What could close the rest of the gap",
+        "What could explain the residual gap",
         (Paragraph(closable_line(document)), closable_table(document), drawn),
     )
 

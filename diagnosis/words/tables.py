@@ -201,7 +201,7 @@ def _interval(given: Document) -> str:
 
 SOURCES = {
     "noise": "noise of the readings",
-    "misfit": "what the model leaves unexplained",
+    "misfit": "residual that the model does not explain",
     "small causes": "small causes that are not named",
     "hidden effects": "effects that could hide",
     "air density": "rounding of the stated air density",
@@ -221,7 +221,7 @@ def hidden_table(document: Document) -> Table:
         size = f"{significant(one['size']['value'], 2)} {mark}".rstrip()
         moves = [significant(one["moves"][name]["value"], 2) for name in names]
         rows.append((plain(one["effect"]), size, *moves))
-    heads = [f"moves {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
+    heads = [f"changes {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
     title = f"What could hide{explained({one['size']['unit'] for one in hidden})}"
     return Table(title, ("effect", "up to", *heads), tuple(rows), ("up to", *heads))
 

@@ -196,8 +196,8 @@ def _nearly(found: Mapping[str, Any]) -> str:
     if found["rival"]:
         return f"{said}, and {plain(*found['rival'])} as much ({probability(found['rival_probability'])})."
     if found["misfit"]:
-        left = " and ".join(MISFITS[name] for name in found["misfit"])
-        return f"{said}, but leaves a significant misfit of {left}."
+        misfit = " and ".join(MISFITS[name] for name in found["misfit"])
+        return f"{said}, but leaves a significant misfit of {misfit}."
     return f"{said}: too little to name it."
 
 
@@ -438,7 +438,5 @@ def next_steps(document: Document) -> list[str]:
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]
     if (document.get("rest") or {}).get("material"):
-        steps.append(
-            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
-        )
+        steps.append("Do not trust the coefficients beyond their intervals: the residual gap changes them.")
     return steps

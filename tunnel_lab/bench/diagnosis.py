@@ -48,7 +48,7 @@ _FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"
 """Sections below the figures, in groups side by side; the others are folded."""
 _ELSEWHERE = ("answer", "fit", "place", "closes", "next")
 """Sections that the page shows in another way, or another page."""
-_AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
+_AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
@@ -98,7 +98,7 @@ class DiagnosePage:
         if not state.running and (took := work.seconds_taken(self._log)) is not None:
             self._before = f"; the last diagnosis took {took:.0f} s"
         now = (replace(state, lines=(), printed=0.0), found.stages, written)
-        words = "Paused; it goes on where it was."
+        words = "Paused; it continues where it was."
         if state.running and not state.paused:
             begun = datetime.fromisoformat(state.started)
             elapsed = (datetime.now().astimezone() - begun).total_seconds()
@@ -108,7 +108,7 @@ class DiagnosePage:
                 left = found.reached.words(found.seconds + time.time() - state.printed)
             words = (
                 f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
-                "It runs in a process of its own: this page may be closed."
+                "It runs in a separate process: this page may be closed."
             )
         self._clock.set_text(f"{words} {_STOP}" if state.running else "")
         if now == self._shown:
@@ -120,7 +120,7 @@ class DiagnosePage:
                 words = "Diagnose again" if result.is_file() else "Diagnose"
                 button(words, self._start, main=True)
             elif state.paused:
-                button("Go on", lambda: work.go_on(self._log), main=True)
+                button("Continue", lambda: work.go_on(self._log), main=True)
             else:
                 button("Pause", lambda: work.pause(self._log))
             if state.running:

@@ -88,7 +88,7 @@ def test_no_number_is_broken_in_a_narrow_terminal(
     assert status == 0
     assert max(map(len, out.splitlines())) <= width
     for row in whole:
-        assert "off the line" not in row[""] or "off the line" in out
+        assert "off the line" not in row["remark"] or "off the line" in out
         assert f"{row['ωn² [rad²/s²]']:.2f}" in out
 
 

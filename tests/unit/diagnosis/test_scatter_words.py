@@ -196,6 +196,6 @@ def test_what_could_be_closed_of_an_undecided_gap_is_beyond_the_scatter(given: D
         "kind": "angle", "words": "", "events": [], "curve": None, "law": None, "alike": [], "next_most": None,
         "line": None,
     }  # fmt: skip
-    assert "% of what the causes leave could be closed" in closable_words(given)
+    assert "% of the residual gap could be explained" in closable_words(given)
     given["decided"] = False
     assert "% of the gap beyond the scatter between runs could be closed" in closable_words(given)

@@ -192,13 +192,13 @@ def test_numbers_are_those_of_the_document(page):
 
 def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
     text = Page(page).text
-    assert "What could be closed: A moment." in text
+    assert "What could be explained: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "not determined" in text  # worse than nothing, and beyond any meaning
     explained = document | {"closable": None, "maps": None}
-    assert "What could be closed" not in written(explained)
+    assert "What could be explained" not in written(explained)
     page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
-    assert "What could be closed: nothing beyond chance (p = 0.43)." in Page(page).text
+    assert "What could be explained: nothing beyond chance (p = 0.43)." in Page(page).text
     assert "kind of law" not in page
 
 
