@@ -286,19 +286,17 @@ def _html_table(table: Table) -> str:
     """Each cell has its heading, for narrow pages that stack the cells of a row."""
     numeric = [' class="n"' if heading in table.right else "" for heading in table.columns]
     named = [heading in table.names for heading in table.columns]
-    heads = [_capital(heading) for heading in table.columns]
-    top = "".join(
-        f'<th scope="col"{kind}>{_words(head)}</th>' for kind, head in zip(numeric, heads, strict=True)
-    )
+    heads = zip(numeric, table.columns, strict=True)
+    top = "".join(f'<th scope="col"{kind}>{_words(head)}</th>' for kind, head in heads)
     rows = []
     for first, *others in table.rows:
         cells = [f'<th scope="row"{numeric[0]}>{_cell(first, named[0])}</th>']
-        for head, cell, kind, name in zip(heads[1:], others, numeric[1:], named[1:], strict=True):
+        for head, cell, kind, name in zip(table.columns[1:], others, numeric[1:], named[1:], strict=True):
             about = escape(" ".join(head.split()))
             shown = f"<span>{_cell(cell, name)}</span>" if cell else ""
             cells.append(f'<td data-head="{about}"{kind}>{shown}</td>')
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    wide = ' class="wide"' if len(heads) > _WIDE else ""
+    wide = ' class="wide"' if len(table.columns) > _WIDE else ""
     return (
         f'<div class="scroll" role="region" aria-label="{escape(table.title)}" tabindex="0"><table{wide}>'
         f"<caption>{_words(table.title)}</caption><thead><tr>{top}</tr></thead>"
@@ -308,8 +306,3 @@ def _html_table(table: Table) -> str:
 
 def _cell(text: str, name: bool) -> str:
     return _words(text.replace("_", " ") if name else text)
-
-
-def _capital(heading: str) -> str:
-    """A heading that begins with a capital letter, unless it begins with a symbol."""
-    return heading[0].upper() + heading[1:] if re.match("[a-z]{2}", heading) else heading

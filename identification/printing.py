@@ -295,7 +295,7 @@ def repeatability_lines(document: Document) -> list[str]:
             return []
         return [
             f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
-            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]"
+            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]."
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():
@@ -316,7 +316,7 @@ def repeatability_lines(document: Document) -> list[str]:
     differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
-        f"it{told}"
+        f"it{told}."
     ]
 
 

@@ -100,12 +100,12 @@ CAUTIONS: Mapping[str, Sentence] = {
     "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
-        f'A separate zero for each run would explain {share(given["share"])} of the gap. State zero = "per_run" under '
-        "[sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
+        f'A separate zero for each run would explain {share(given["share"])} of the gap. State zero = "per_run" '
+        "under [sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
     ),
     "beyond reach": lambda given: (
-        f"By linear theory all known effects together would leave at least {share(given['left'])} of the gap unexplained, so "
-        "no larger sets of effects were tried."
+        f"By linear theory all known effects together would leave at least {share(given['left'])} of the gap "
+        "unexplained, so no larger sets of effects were tried."
     ),
     "remainder not sought": "No formula for the remaining gap is sought for a driven body without a restoring "
     "moment: every small error of a moment adds up in its angle.",

@@ -90,8 +90,8 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
     said = [
-        f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on {best.held_out} "
-        "held out of the fit."
+        f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on "
+        f"{best.held_out} held out of the fit."
     ]
     if found["alike"]:
         said.append(

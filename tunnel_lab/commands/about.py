@@ -38,14 +38,14 @@ def docs(
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the site goes, in its folder html.")
     ] = Path("tunnel-output/docs"),
     browser: Annotated[
-        bool, Option("--browser/--no-browser", help="Open the first page, or only say where it is.")
+        bool, Option("--browser/--no-browser", help="Open the first page, or only print its path.")
     ] = True,
 ) -> None:
     """Build the documentation site and open it.
 
     The site has all pages, an API reference and three notebooks, which are
-    executed. Pages that have not changed since the last time are not built again.
-    Nothing is written beside the pages. It needs the extra 'docs'.
+    executed. Only changed pages are built again. Nothing is written into the
+    source folder. It needs the extra 'docs'.
 
     [bold]Examples[/bold]
       tunnel docs

@@ -55,16 +55,16 @@ def demo(
 ) -> None:
     """Plant two faults in the virtual rig, and find them from its records.
 
-    The rig is simulated with dry friction and with one spring that is softer than
-    stated. Then the records alone are identified and diagnosed: what is wrong, how
-    large it is, and how far the gap closes on runs held out of the fit. FOLDER
-    gets the report (report.html), the plan, the campaign, and both answers as
-    JSON. It takes a quarter of a minute.
+    The rig is simulated with dry friction and with a spring that is softer than
+    stated. The records alone are then identified and diagnosed: the causes, their
+    sizes, and how far the gap closes on runs held out of the fit. The report
+    (report.html), the plan, the campaign, and both answers as JSON are written to
+    FOLDER. It takes about 15 s.
 
-    With --estimators the paper's campaign, without faults, is identified by three
-    estimators instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are
-    shown beside the injected values, and FOLDER gets figures (PNG, PDF). tunnel
-    score compares all estimators, with the Cramér–Rao bound.
+    With --estimators, three estimators identify the paper's campaign, without
+    faults, instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are shown
+    beside the injected values, and figures (PNG, PDF) are written to FOLDER.
+    tunnel score compares all estimators with the Cramér–Rao bound.
 
     [bold]Examples[/bold]
       tunnel demo
@@ -72,8 +72,8 @@ def demo(
       tunnel demo --estimators
 
     [bold]Exit status[/bold]
-      0 success, 1 the faults were not found, an estimate failed, or one that is
-      checked missed the truth by more than four standard deviations, 2 bad input.
+      0 success, 1 the faults were not found, an estimate failed or missed the
+      truth by more than four standard deviations, 2 bad input.
     """
     from tunnel_sim.files.plan_file import load_plan, paper_plan
     from tunnel_sim.files.writing import output_folder

@@ -76,7 +76,7 @@ def diagnose(
     ] = "",
     notes: Annotated[str, _output("--notes", metavar="TEXT", help="Notes for the head of the report.")] = "",
     effects: Annotated[
-        list[str] | None, _causes("--effects", metavar="A,B", help="Consider these effects only.")
+        list[str] | None, _causes("--effects", metavar="A,B", help="Consider only these effects.")
     ] = None,
     exclude: Annotated[
         list[str] | None,
@@ -134,7 +134,7 @@ def diagnose(
             "--propose",
             callback=ending(".toml"),
             metavar="LAW.toml",
-            help="Write the formula proposed for what no effect explains.",
+            help="Write the formula proposed for the residual gap.",
         ),
     ] = None,
 ) -> None:
@@ -144,11 +144,11 @@ def diagnose(
     the noise. Then the effects that tunnel effects lists, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (none of these effects explains it), each with a probability.
-    Gap and coefficients are given before and after the effects are added. The gap
-    is predicted for runs, or stretches of time, held out of the fit. Where
-    something remains, the answer says whether it could move the coefficients, how
-    much of it could be closed, by what kind of moment or error of the reading, and
-    by which formula; --propose writes the formula for --effects-file.
+    The gap and the coefficients are given before and after the effects are added.
+    The gap is predicted for runs, or stretches of time, held out of the fit. For a
+    significant residual gap, the answer states whether it could change the
+    coefficients, and which kind of moment or error of the reading, and which
+    formula, could explain it; --propose writes the formula for --effects-file.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -262,10 +262,10 @@ def compare(
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.
 
-    For each diagnosis: the gap (its power over that of the noise) before and with the causes, the causes
-    with their parameters, and the coefficients with standard deviations. Then the
-    difference of each coefficient from the first diagnosis, for campaigns that are
-    independent of each other.
+    For each diagnosis: the gap (its power over that of the noise) without and with
+    the causes, the causes with their parameters, and the coefficients with standard
+    deviations. The last table shows the difference of each coefficient from the
+    first diagnosis; it assumes that the campaigns are independent.
 
     [bold]Examples[/bold]
       tunnel compare before.json after.json

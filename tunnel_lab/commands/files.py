@@ -126,10 +126,10 @@ def import_files(
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
     Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
-    sample rate, runs and releases are found; what was found, and why, is printed
-    before anything is written. Options correct what was found wrongly. The campaign
-    gets a picture (import.png), the choices made (import.toml, for --recipe), and
-    comments in campaign.toml on what the files do not state, such as the stiffness.
+    sample rate, runs and releases are detected; the choices and their reasons are
+    printed before anything is written, and options correct them. The campaign has a
+    picture (import.png), the choices (import.toml, for --recipe), and comments in
+    campaign.toml on conditions that the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig

@@ -105,8 +105,8 @@ def run(
     Every run gives its natural frequency ωn (rad/s) and damping ratio ζ. Runs
     with a stated spring, with the wind off and on, together give Cnβ and Cnr
     (1/rad), Izz (kg m²) and Cr (N m s/rad). Without spring_stiffness the runs
-    stay in normalised form: ωn and ζ. Every estimate has a standard deviation,
-    and every note says what to do.
+    give only ωn and ζ. Every estimate has a standard deviation, and every note
+    states a remedy.
 
     [bold]Estimators[/bold]
       {estimators}
@@ -119,10 +119,10 @@ def run(
       tunnel identify my-campaign --uncertainties known.toml --model conventional
 
     [bold]Uncertainty[/bold]
-      By default, standard deviations are due to sensor noise and to the scatter
-      between runs. --budget adds the choice of model. --uncertainties also adds
-      those of the stated Kr, V, ρ, A and l. The combined standard uncertainty is
-      then reported, and a table shows which source dominates.
+      By default, standard deviations include sensor noise and the scatter between
+      runs. --budget adds the choice of model, and --uncertainties those of the
+      stated Kr, V, ρ, A and l. The combined standard uncertainty is then reported,
+      and a table shows the dominant source.
 
     [bold]Exit status[/bold]
       0 identified, 1 nothing could be identified, or an estimator of your own failed, 2 bad input.

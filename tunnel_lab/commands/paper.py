@@ -169,12 +169,12 @@ def paper(
 ) -> None:
     """Reproduce the paper's tables and figures, ours beside theirs.
 
-    FOLDER gets a page (index.html) with a summary, Tables I to IV, Figs 1 to 6
-    and the slips of the equations, and its figures as pictures (PNG) and for
-    print (PDF). It says what cannot be reproduced, and why. The runs are
+    A page (index.html) with a summary, Tables I to IV, Figs 1 to 6 and the
+    misprints in the equations is written to FOLDER, with its figures as PNG and
+    PDF. It states which results cannot be reproduced, and why. The runs are
     simulated, and identified by the paper's two methods, in a minute or two.
-    What is finished is kept: after an interruption the same command does the
-    rest. Delete the folder to compute everything again.
+    After an interruption the same command computes the unfinished parts. Delete
+    the folder to compute everything again.
 
     [bold]Examples[/bold]
       tunnel paper

@@ -251,7 +251,7 @@ def show_estimate(
     conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign.runs}
     coefficients, runs, *notes = printing.estimate_blocks(document, conditions)
     of_windows = map(printing.windows_table, document["runs"]) if windows else ()
-    command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
+    command = DIAGNOSE if source is None else f"run tunnel diagnose {shlex.quote(str(source))}"
     show(
         (
             coefficients,

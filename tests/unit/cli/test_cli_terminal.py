@@ -114,7 +114,7 @@ def test_a_note_shows_the_command_of_its_remedy(tunnel: Tunnel, tiny_campaign: P
     ]
     run.write_text("\n".join([lines[0], *cubic]))
     out = tunnel("identify", spaced)[1]
-    assert f"run: tunnel diagnose '{spaced}'" in out
+    assert f"run tunnel diagnose '{spaced}'" in out
     assert "run the diagnosis" not in out
 
 
