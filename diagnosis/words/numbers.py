@@ -268,9 +268,9 @@ KINDS: Mapping[str, str] = {
     "time": "a moment in time, equal in all runs",
     "reading": "an error of the reading, equal in all runs",
     "line": "a steady line in the reading, with another phase in every run",
-    "between": "a stiffness, damping or moment that differs between runs",
-    "event": "a moment in time that differs between runs",
-    "wander": "a wandering or jumping zero that differs between runs",
+    "between": "a stiffness, damping or moment of each run",
+    "event": "a moment in time of each run",
+    "wander": "a wandering or jumping zero of each run",
     "noise": "nothing smooth: the rest is noise",
 }
 """Kinds of missing law (`diagnosis.facts.remainder.KINDS`)."""

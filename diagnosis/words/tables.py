@@ -158,30 +158,31 @@ def closable_table(document: Document) -> Table:
 
 
 def coefficients_table(document: Document) -> Table:
-    """The coefficients of the nominal model; where causes are named, also with these, and the change of size."""
+    """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
+
+    A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
+    """
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     named, rows = document["causes"] not in ([], ["unknown"]), []
+    skewed = any(given.get("interval") for given in (after or before).values())
     for name in dict.fromkeys([*before, *after]):
-        one, two = before.get(name), after.get(name)
-        best = two or one
-        assert best is not None
-        cells = [_without_interval(given) for given in ([one, two] if named else [best])]
-        known = one and two and all(given.get("determined", True) for given in (one, two))
-        changed = size_change(one["value"], two["value"]) if known and one["value"] else "–"
-        unit = (one or best)["unit"]
-        rows.append((coefficient_label(name, unit), *cells, _interval(best), *[changed] * named))
-    skewed = any(given.get("interval") for given in (after if named else before).values())
+        nominal, with_causes = before.get(name), after.get(name)
+        best = with_causes or before[name]
+        cells = [_without_interval(given) for given in ([nominal, with_causes] if named else [best])]
+        interval = _interval(best)
+        if skewed and best["std"]:
+            cells[-1] += f"\n({interval})"
+        change = "–"
+        both = [given for given in (nominal, with_causes) if given and given.get("determined", True)]
+        if len(both) == 2 and both[0]["value"]:
+            change = size_change(*(given["value"] for given in both))
+        label = coefficient_label(name, (nominal or best)["unit"])
+        rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
     causes = "with the causes" if document.get("decided", True) else f"with the {set_out(document)}"
-    interval = "95 % interval"
-    values = ("nominal model", causes) if named else ("nominal model",)
-    heads = ("coefficient", *values, interval, *["change of size"] * named)
-    return Table(
-        "Coefficients ± one standard deviation",
-        heads,
-        tuple(rows),
-        right=heads[1:],
-        detail=() if skewed else (interval,),
-    )
+    detail = () if skewed else ("95 % interval",)
+    heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
+    title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
+    return Table(title, heads, tuple(rows), right=heads[1:], detail=detail)
 
 
 def _without_interval(given: Document | None) -> str:
@@ -201,7 +202,7 @@ def _interval(given: Document) -> str:
 
 SOURCES = {
     "noise": "noise of the readings",
-    "misfit": "residual that the model does not explain",
+    "misfit": "model error",
     "small causes": "small causes that are not named",
     "hidden effects": "effects that could hide",
     "air density": "rounding of the stated air density",

@@ -241,7 +241,7 @@ def test_what_could_be_closed(given: Document) -> None:
     said_both = text(ceilings=larger)
     assert said_both.startswith(first)
     assert said_both.endswith(
-        "A moment in time that differs between runs would explain 97.0 ± 1.0 %, measured on short gaps. A law "
+        "A moment in time of each run would explain 97.0 ± 1.0 %, measured on short gaps. A law "
         "common to all runs is preferred from four fifths of that share on, since it can be a property of the rig."
     )
     table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})

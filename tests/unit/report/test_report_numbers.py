@@ -359,7 +359,7 @@ def test_the_uncertainty_budget(given: Document) -> None:
     assert table.columns == ("source", "Cnβ [1/rad]")
     found = dict(table.rows)
     assert_shows(found["noise of the readings"], [0.6 * 0.0013, 36.0])
-    assert_shows(found["residual that the model does not explain"], [0.8 * 0.0013, 64.0])
+    assert_shows(found["model error"], [0.8 * 0.0013, 64.0])
     assert found["rounding of the stated air density"] == "–"
     assert_shows(found["combined standard deviation"], [0.0013])
     assert tables.budget_table(given).rows == ()
