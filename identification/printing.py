@@ -168,12 +168,12 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
     Args:
         given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
             false, and ``interval`` where it differs from value ± 1.96 std. A std of zero means that the value was
-            given, not fitted.
+            given, not fitted: it is marked as fixed.
     """
     if not given.get("determined", True):
         return UNDETERMINED
     value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-    text = f"{value} {mark}".rstrip() + at_bound(given)
+    text = f"{value} {mark}".rstrip() + at_bound(given) + " (fixed)" * (given["std"] == 0.0)
     if not given.get("interval") or not given["std"]:
         return text
     # The ends of the interval have as many digits as the value.

@@ -301,7 +301,7 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
     from identification.printing import status_lines
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
-    show_tables(truth_table(estimates, vars(plan.truth)))
+    show_tables(*(truth_table(estimate, vars(plan.truth)) for estimate in estimates))
     for estimate in estimates:
         for line in status_lines(estimate.to_json_dict()):
             say(f"Note, {estimate.estimator}: {line}")

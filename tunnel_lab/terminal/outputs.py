@@ -168,8 +168,8 @@ def rich_table(given: Table) -> RichTable:
     return result
 
 
-def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
-    """Estimates beside the injected values.
+def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> Table:
+    """An estimate beside the injected values.
 
     Args:
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
@@ -177,24 +177,18 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
     from identification.estimate import UNITS
 
     rows = []
-    for estimate in estimates:
-        for place, (name, value) in enumerate(truth.items()):
-            cells = (
-                "" if place else estimate.estimator,
-                f"{SYMBOLS[name]} {unit(UNITS[name])}",
-                significant(value),
-            )
-            quantity: Quantity | None = getattr(estimate, name)
-            if quantity is None:
-                rows.append((*cells, estimate.status.name.lower().replace("_", " "), "", ""))
-                continue
-            error = quantity.value - value
-            relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
-            stds = in_stds(error, quantity.std)
-            rows.append((*cells, with_std(quantity.value, quantity.std), relative, stds))
-    heads = ("estimator", "quantity", "truth", "estimate ± std", "error", "error/std")
+    for name, value in truth.items():
+        cells = (f"{SYMBOLS[name]} {unit(UNITS[name])}", significant(value))
+        quantity: Quantity | None = getattr(estimate, name)
+        if quantity is None:
+            rows.append((*cells, estimate.status.name.lower().replace("_", " "), "", ""))
+            continue
+        error = quantity.value - value
+        relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
+        rows.append((*cells, with_std(quantity.value, quantity.std), relative, in_stds(error, quantity.std)))
+    heads = ("quantity", "truth", "estimate ± std", "error", "error/std")
     right = ("truth", "error", "error/std")
-    return Table("Estimates against the injected truth", heads, tuple(rows), right)
+    return Table(f"{estimate.estimator} against the injected truth", heads, tuple(rows), right)
 
 
 def is_too_wide(table: RichTable, width: int) -> bool:

@@ -95,10 +95,9 @@ def test_the_values_before_are_those_of_the_verdict(faulty: CampaignPlan) -> Non
     found = found_document()
     before = {"cn_beta": {"value": 0.4897, "std": 0.018, "unit": "1/rad"}}
     found["coefficients"]["before"] = before
-    heads = [str(column.header) for column in found_table(faulty, found).columns]
-    cells = [next(iter(column.cells)) for column in found_table(faulty, found).columns]
-    assert dict(zip(heads, map(str, cells), strict=True)) == {
-        "": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
+    table = found_table(faulty, found)
+    assert dict(zip(table.columns, table.rows[0], strict=True)) == {
+        "quantity": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
         "with the causes": "0.4719 ± 0.0010", "error": "+0.0 σ",
     }  # fmt: skip
     assert "(0.490 → 0.472)" in consequence(found)

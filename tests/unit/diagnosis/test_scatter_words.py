@@ -177,7 +177,7 @@ def test_every_run_is_listed_against_the_model(given: Document) -> None:
     given["repeatability"]["spreads"] = []
     assert (
         repeatability_line(given)
-        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
+        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows."
     )
     assert not repeatability_table(given).rows
     given["repeatability"] = None

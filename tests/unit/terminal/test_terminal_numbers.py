@@ -84,13 +84,15 @@ def test_parameters_of_the_answer(given: Document) -> None:
         "a.x": {"value": 0.25, "std": 0.01, "unit": "1"},
         "a.y": {"value": 2.5, "std": None, "unit": "1", "bound": "upper"},
         "b.x": {"value": 0.0, "std": None, "unit": "1", "determined": False},
+        "b.y": {"value": 21.0217, "std": 0.0, "unit": "N m/rad"},
     }
     found = rows(parameters_table(given))
-    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
+    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"], ["", "y"]]
     assert [row[2] for row in found] == [
         "0.250 ± 0.010",
         "2.500 (at its upper bound)",
         "not determined by these runs",
+        "21.02  (fixed)",
     ]
     given["candidates"] = given["candidates"][-2:]
     given["candidates"][0]["parameters"] = {}
@@ -244,7 +246,7 @@ def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_tab
     assert line == (
         "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
         "other answers, by their probability. tunnel identify includes the noise, the scatter between runs and "
-        "what its own model misses, so that its ± may be far smaller or larger."
+        "what its model misses, so its ± may be far smaller or larger."
     )
     assert Paragraph(line) in printed(given)
     assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
@@ -318,9 +320,9 @@ def test_coefficients_of_an_estimate() -> None:
 
 def test_errors_against_the_truth() -> None:
     found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
-    table = rows(outputs.truth_table([found], truth))
-    assert [row[0] for row in table] == ["own", "", ""]
-    cells = [row[1:] for row in table]
+    table = outputs.truth_table(found, truth)
+    assert table.title.startswith("own")
+    cells = rows(table)
     for row, (name, value) in zip(cells, truth.items(), strict=True):
         own = getattr(found, name)
         error = own.value - value
