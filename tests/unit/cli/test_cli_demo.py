@@ -145,7 +145,7 @@ def test_every_estimator_of_the_comparison_is_kept_and_shown(
     assert sorted(path.stem for path in tmp_path.glob("*.json")) == sorted(f"estimate-{n}" for n in SHOWN)
     show_simulated(campaign, [replace(estimates[0], statuses=(Status.MODEL_DEPARTS,)), *estimates[1:]], plan)
     shown = capsys.readouterr().out.splitlines()
-    assert [line.strip() for line in shown if line.strip() in SHOWN] == list(SHOWN)
+    assert [line.split()[0] for line in shown if "against the injected truth" in line] == list(SHOWN)
     assert [line for line in shown if line.startswith("Note")] == [
         f"Note, {SHOWN[0]}: {Status.MODEL_DEPARTS.value}"
     ]
