@@ -56,7 +56,7 @@ def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
 def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
 
-    It changes neither causes nor coefficients, and has tests of its own (``test_closable.py``).
+    It changes neither causes nor coefficients, and has tests of its own (``test_explain.py``).
     """
     from diagnosis.remainder import ways
 

@@ -190,7 +190,7 @@ class Between:
         """
         return np.asarray(values**2 >= stds**2 * np.diag(self.most.covariance), np.bool_)
 
-    def cost(self, known: Array) -> float:
+    def cost(self, known: Array, given: Kept | None = None) -> float:
         """−2 ln of the evidence without the residuals' χ²: the cost of letting the runs differ so much.
 
         It is 0 for runs that repeat exactly. The deviations count as if they were known as well as under one
@@ -201,13 +201,16 @@ class Between:
 
         Args:
             known: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
+            given: the common parameters that are not integrated out, shape (common,): those of effects that the
+                runs show by themselves, which cannot align runs by chance. None: there are none.
         """
         one = np.eye(self.widths.size)
         scaled = one + self.widths[None, :, None] * known * self.widths
         away = self.found.deviations / self.widths
         seen = np.einsum("rk,rkl,rl->", away, one - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
-        return width + self.prior_cost + self.found.log_information - self.most.log_information
+        information = self.found.log_information_given(given) - self.most.log_information_given(given)
+        return width + self.prior_cost + information
 
 
 def _orthonormal(columns: Array) -> Array:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
@@ -89,6 +90,17 @@ class Marginal:
     def likelihood(self) -> float:
         """−2 ln L at the likeliest common parameters, up to a constant: compares sets of common parameters."""
         return self.log_determinant + self.quadratic
+
+    def log_information_given(self, given: NDArray[np.bool_] | None) -> float:
+        """ln|H| of the other common parameters, where some are given.
+
+        Args:
+            given: the given parameters, shape (common,); None: there are none.
+        """
+        if given is None or not given.any():
+            return self.log_information
+        covariance = self.covariance[np.ix_(given, given)]
+        return self.log_information + float(np.linalg.slogdet(covariance)[1])
 
     @property
     def restricted(self) -> float:

@@ -17,8 +17,8 @@ from typing import Any
 
 import pydantic
 import pytest
-from test_layers import PACKAGES
 
+from tests.architecture.test_layers import PACKAGES
 from tunnel_lab import cli
 
 # Typer turns the arguments of a command into its help; test_cli.py reads that.

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from tests.fuzz.campaigns import free_decays
 from tests.fuzz.tables import parquet
 from tests.fuzz.values import odd_words
-from tests.unit.experiments.small_sweep import SMALL
+from tests.support.small_sweep import SMALL
 
 _TESTS = Path(__file__).parents[1]
 PLAN = b"""
