@@ -61,7 +61,7 @@ def sections(score: Score) -> list[ScoreSection]:
 def _section(
     title: str, headings: tuple[str, ...], rows: Iterable[tuple[str, ...]], note: str = ""
 ) -> ScoreSection:
-    return ScoreSection(title, headings, tuple(rows), headings[1:-1], note)
+    return ScoreSection(title, headings, tuple(rows), headings[1:-1], note=note)
 
 
 def _answer_sections(score: Score) -> list[ScoreSection]:
