@@ -18,10 +18,11 @@ from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Closable, Remainder
 from diagnosis.facts.repeatability import Repeatability
 from diagnosis.settings import settings_of
-from diagnosis.words.tables import diagnosis_brief, diagnosis_parts
+from diagnosis.words.lines import diagnosis_brief
+from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
+from identification.blocks import as_notebook, as_text
 from identification.estimate import as_pandas, wide_frame
-from identification.printing import as_html, as_text
 from identification.status import Remark
 from identification.trade_off import TradeOff
 from tunnel_sim.files.writing import as_json
@@ -333,8 +334,8 @@ class Diagnosis:
         }
 
     def __str__(self) -> str:
-        """The verdict, the answers weighed and the coefficients as short tables, and the caveats."""
-        return as_text(diagnosis_parts(self.to_json_dict()))
+        """The verdict, short tables of the answers, gaps and coefficients, the caveats and the next steps."""
+        return as_text(printed(self.to_json_dict()))
 
     def __repr__(self) -> str:
         """The answer, the gap, and the next step, in three lines."""
@@ -342,7 +343,7 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         """The same as `__str__` for notebooks."""
-        return as_html(diagnosis_parts(self.to_json_dict()))
+        return as_notebook(printed(self.to_json_dict()))
 
     def plot(self, what: str = "fit", runs: Sequence[str] = ()) -> Figure:
         """Draw one figure of the report.

@@ -15,7 +15,8 @@ import numpy as np
 import polars as pl
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
-from identification.printing import as_html, as_text, estimate_brief, estimate_parts
+from identification.blocks import as_notebook, as_text
+from identification.printing import estimate_blocks, estimate_brief
 from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_severity as by_severity
@@ -279,7 +280,7 @@ class Estimate:
 
     def __str__(self) -> str:
         """The coefficients and the first runs as short tables, and the notes on them."""
-        return as_text(estimate_parts(self.to_json_dict()))
+        return as_text(estimate_blocks(self.to_json_dict()))
 
     def __repr__(self) -> str:
         """The coefficients, the number of runs, and where to go from here, in three lines."""
@@ -287,7 +288,7 @@ class Estimate:
 
     def _repr_html_(self) -> str:
         """The text of `__str__` for notebooks."""
-        return as_html(estimate_parts(self.to_json_dict()))
+        return as_notebook(estimate_blocks(self.to_json_dict()))
 
     def coefficients_frame(self) -> pl.DataFrame:
         """A row for each coefficient: value, std, unit, and the ends low and high of its 95 % interval."""

@@ -1,4 +1,4 @@
-"""The printing of results: numbers with their standard deviations, tables, and the parts of an estimate.
+"""The printing of results: numbers with their standard deviations, and an estimate in blocks.
 
 Two significant digits of the standard deviation determine those of the value.
 """
@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-import textwrap
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from html import escape
-from itertools import zip_longest
+from collections.abc import Mapping
 from typing import Any
 
+from identification.blocks import Block, Paragraph, Table
 from identification.status import Remark, Status
 from tunnel_sim.vocabulary.errors import counted
 
@@ -171,12 +168,12 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
     Args:
         given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
             false, and ``interval`` where it differs from value ± 1.96 std. A std of zero means that the value was
-            given, not fitted.
+            given, not fitted: it is marked as fixed.
     """
     if not given.get("determined", True):
         return UNDETERMINED
     value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-    text = f"{value} {mark}".rstrip() + at_bound(given)
+    text = f"{value} {mark}".rstrip() + at_bound(given) + " (fixed)" * (given["std"] == 0.0)
     if not given.get("interval") or not given["std"]:
         return text
     # The ends of the interval have as many digits as the value.
@@ -199,86 +196,6 @@ def p_text(value: float) -> str:
 _LEAST_P = 1e-300  # close to the smallest positive float
 
 
-WIDTH = 88
-"""Paragraphs are wrapped to this many characters."""
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table whose cells are texts.
-
-    Args:
-        columns: headings, with their units.
-        rows: one text for each column; lines of a cell are separated by line ends.
-        right: headings of the right-aligned columns.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    right: tuple[str, ...] = ()
-
-    def text(self) -> str:
-        """The table in columns of a fixed width, with a rule below the headings."""
-        widths = [
-            max(len(line) for cell in column for line in cell.split("\n"))
-            for column in zip(self.columns, *self.rows, strict=True)
-        ]
-        rule = "-" * (sum(widths) + 2 * (len(widths) - 1))
-        body = [self._lines(row, widths) for row in self.rows]
-        return "\n".join([self.title, self._lines(self.columns, widths), rule, *body])
-
-    def html(self) -> str:
-        """The table as an HTML element, each cell with its heading, for narrow screens that stack rows."""
-        head = "".join(self._cell("th", heading, heading) for heading in self.columns)
-        rows = ("".join(map(self._cell, ("td",) * len(row), row, self.columns)) for row in self.rows)
-        body = "".join(f"<tr>{row}</tr>" for row in rows)
-        return (
-            f"<table><caption>{escape(self.title)}</caption>"
-            f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        )
-
-    def _lines(self, row: tuple[str, ...], widths: list[int]) -> str:
-        """One row, on as many lines as its tallest cell."""
-        lines = zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
-        return "\n".join(
-            "  ".join(
-                text.rjust(width) if heading in self.right else text.ljust(width)
-                for text, width, heading in zip(line, widths, self.columns, strict=True)
-            ).rstrip()
-            for line in lines
-        )
-
-    def _cell(self, tag: str, text: str, heading: str) -> str:
-        side = "right" if heading in self.right else "left"
-        style = f"text-align: {side}; padding: 0.15em 0.8em"
-        head = f'data-head="{escape(" ".join(heading.split()))}" ' if tag == "td" else ""
-        lines = escape(text).replace("\n", "<br>")
-        lines = f"<span>{lines}</span>" if "\n" in text else lines
-        return f'<{tag} {head}style="{style}">{lines}</{tag}>'
-
-
-def as_text(parts: Iterable[str | TextTable]) -> str:
-    """Paragraphs and tables as plain text, with an empty line around each table; empty ones are left out."""
-    blocks = [
-        f"\n{part.text()}\n" if isinstance(part, TextTable) else textwrap.fill(part, WIDTH)
-        for part in _filled(parts)
-    ]
-    return "\n".join(blocks).strip("\n").replace("\n\n\n", "\n\n")
-
-
-def as_html(parts: Iterable[str | TextTable]) -> str:
-    """Paragraphs and tables as one ``div`` of HTML; empty ones are left out."""
-    blocks = [
-        part.html() if isinstance(part, TextTable) else f"<p>{escape(part)}</p>" for part in _filled(parts)
-    ]
-    return f"<div>{''.join(blocks)}</div>"
-
-
-def _filled(parts: Iterable[str | TextTable]) -> list[str | TextTable]:
-    return [part for part in parts if (part.rows if isinstance(part, TextTable) else part)]
-
-
 Document = Mapping[str, Any]
 
 
@@ -286,15 +203,40 @@ SHOWN_RUNS = 16
 """At most this many runs are listed."""
 
 
-def estimate_parts(document: Document) -> list[str | TextTable]:
-    """The printed parts of an estimate: the coefficients, the runs, and a paragraph for each note."""
-    notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-    notes += status_lines(document)
-    left = len(document["runs"]) - SHOWN_RUNS
-    more = f"and {counted(left, 'more run')}, which runs_frame() lists" if left > 0 else ""
-    tables: list[str | TextTable] = [coefficients_table(document), runs_table(document), more]
-    beside = (*repeatability_lines(document), trade_off_line(document, SYMBOLS))
-    return [*tables, *beside, *(f"Note: {note}" for note in notes)]
+def estimate_blocks(document: Document, conditions: Conditions | None = None) -> tuple[Block, ...]:
+    """An estimate: the coefficients, the runs, the scatter between them, and a paragraph for each note.
+
+    Args:
+        conditions: of the runs, which are then all listed; without them, the first `SHOWN_RUNS` runs.
+    """
+    count = len(document["runs"]) - SHOWN_RUNS
+    more = (
+        f"and {counted(count, 'more run')}, which runs_frame() lists" if count > 0 and not conditions else ""
+    )
+    shown = runs_table(document, conditions)
+    return (
+        coefficients_table(document),
+        shown,
+        Paragraph(more),
+        Paragraph(BRACKETS if shown.rows else ""),
+        *(Paragraph(line) for line in notes(document)),
+    )
+
+
+def notes(document: Document) -> list[str]:
+    """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
+    remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
+    beside = [*repeatability_lines(document), *filter(None, [trade_off_line(document, SYMBOLS)])]
+    return [*beside, *(f"Note: {note}" for note in (*remarks, *status_lines(document)))]
+
+
+Conditions = Mapping[str, tuple[float | None, float]]
+"""Of runs, by id: the stiffness of the spring (N m/rad; None: not stated) and the wind speed (m/s)."""
+BRACKETS = (
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
+    "tunnel diagnose adds what the model may miss."
+)
+"""Stands below tables in the short notation."""
 
 
 def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
@@ -307,10 +249,10 @@ def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
     found = document.get("trade_off")
     if found is None:
         return ""
-    one, other = (_parameter_label(name, symbols) for name in found["parameters"])
+    first, second = (_parameter_label(name, symbols) for name in found["parameters"])
     return (
-        f"What trades off: {one} and {other} are poorly separable in these runs (correlation "
-        f"{_correlation(found['correlation'])}): {found['remedy']}"
+        f"What trades off: {first} and {second} are poorly separable in these runs (correlation "
+        f"{_correlation(found['correlation'])}): {found['remedy']}."
     )
 
 
@@ -353,7 +295,7 @@ def repeatability_lines(document: Document) -> list[str]:
             return []
         return [
             f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
-            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]"
+            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]."
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():
@@ -374,7 +316,7 @@ def repeatability_lines(document: Document) -> list[str]:
     differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
-        f"it{told}"
+        f"it{told}."
     ]
 
 
@@ -400,7 +342,7 @@ def estimate_brief(document: Document) -> str:
     )
 
 
-def coefficients_table(document: Document) -> TextTable:
+def coefficients_table(document: Document) -> Table:
     """The coefficients of the campaign that could be identified; no rows where there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
@@ -409,17 +351,48 @@ def coefficients_table(document: Document) -> TextTable:
         if document[name] is not None
     )
     title = f"{document['campaign']} by {document['estimator']}"
-    return TextTable(title, ("quantity", "estimate ± std"), rows)
+    return Table(title, ("quantity", "estimate ± std"), rows)
 
 
-def runs_table(document: Document) -> TextTable:
-    """Natural frequency and damping ratio of the first runs, at most `SHOWN_RUNS`."""
+def runs_table(document: Document, conditions: Conditions | None = None) -> Table:
+    """Natural frequency and damping ratio of the runs: of all, with their conditions, or of `SHOWN_RUNS`."""
+    runs = document["runs"][: None if conditions else SHOWN_RUNS]
+    stated = ("Kr\n[N m/rad]", "V\n[m/s]") if conditions else ()
     rows = tuple(
-        (run["id"], _with_std(run["omega_n"]), _with_std(run["zeta"]), run["status"].replace("_", " "))
-        for run in document["runs"][:SHOWN_RUNS]
+        (
+            run["id"],
+            *(_stated(*conditions[run["id"]]) if conditions else ()),
+            _concise(run["omega_n"]),
+            _concise(run["zeta"]),
+            run["status"].replace("_", " "),
+        )
+        for run in runs
     )
-    title = f"Runs of {document['campaign']} ± one standard deviation"
-    return TextTable(title, ("run", "ωn [rad/s]", "ζ [1]", "status"), rows)
+    return Table(
+        f"Runs of {document['campaign']}",
+        ("run", *stated, "ωn\n[rad/s]", "ζ\n[1]", "status"),
+        rows,
+        right=stated,
+    )
+
+
+def _stated(spring: float | None, wind: float) -> tuple[str, str]:
+    return "not stated" if spring is None else f"{spring:g}", f"{wind:g}"
+
+
+def windows_table(run: Document) -> Table:
+    """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
+    cycles = run["windows"][0]["cycles"] if run["windows"] else 0
+    rows = tuple(
+        (
+            f"{window['start_s']:.2f}",
+            f"{window['start_s'] + window['duration_s']:.2f}",
+            *(_concise(window[name]) for name in ("amplitude", "zeta", "omega_n")),
+        )
+        for window in run["windows"]
+    )
+    heads = ("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]")
+    return Table(f"{run['id']}: windows of {counted(cycles, 'cycle')}", heads, rows, right=heads[:2])
 
 
 def status_lines(document: Document) -> list[str]:
@@ -438,3 +411,8 @@ def status_lines(document: Document) -> list[str]:
 
 def _with_std(quantity: Document | None) -> str:
     return "–" if quantity is None else with_std(quantity["value"], quantity["std"])
+
+
+def _concise(quantity: Document | None) -> str:
+    """A quantity without its unit, which is in the heading."""
+    return "–" if quantity is None else concise(quantity["value"], quantity["std"])

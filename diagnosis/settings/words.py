@@ -187,9 +187,6 @@ class WordsSettings:
     answer_drawn: float = setting(
         0.01, "Probability from which an answer is drawn in the report.", "judgement"
     )
-    answer_described: float = setting(
-        0.01, "Probability from which an answer is described in the report.", "judgement"
-    )
     effect_listed: float = setting(
         0.01, "Probability from which an effect is listed among the causes.", "judgement"
     )

@@ -198,7 +198,7 @@ def consequence(document: Document) -> str:
         label = COEFFICIENTS.get(name, name)
         if two["std"] is not None and two["std"] > _OPEN * abs(two["value"]):
             said.append(
-                f"{label} stays open ({for_people(two['value'], two['std'], unit_mark(two['unit']))})"
+                f"{label} remains uncertain ({for_people(two['value'], two['std'], unit_mark(two['unit']))})"
             )
             continue
         label = f"the size of {label}" if one["value"] < 0.0 and two["value"] < 0.0 else label

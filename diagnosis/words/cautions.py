@@ -25,7 +25,7 @@ _LEFT_OUT = (
 
 def _not_confirmed(given: Figures) -> str:
     return (
-        f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:2} (root mean square "
+        f"The integrator of the fits differs from the MuJoCo model by {given['rms_rad']:2} (root mean square "
         f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:2}). "
         "The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
         "and may be wrong by as much."
@@ -86,7 +86,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "more noise than stated": f"{_NOISE}, and noise above the stated level counts as a gap. If the sensor really "
     "is as noisy as that, correct noise_std or leave it out.",
     "not followed": "The MuJoCo model could not follow the fitted motion ({failure}), so all figures come from the "
-    "fits' own integrator. Do not rely on the fitted parameters.",
+    "integrator of the fits. Do not rely on the fitted parameters.",
     "not confirmed": _not_confirmed,
     "few runs": _few_runs,
     "none held out": _none_held_out,
@@ -100,12 +100,12 @@ CAUTIONS: Mapping[str, Sentence] = {
     "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
-        f'A zero of each run\'s own would close {share(given["share"])} of the gap. State zero = "per_run" under '
-        "[sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
+        f'A separate zero for each run would explain {share(given["share"])} of the gap. State zero = "per_run" '
+        "under [sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
     ),
     "beyond reach": lambda given: (
-        f"By linear theory all known effects together would leave {share(given['left'])} of the gap or more, so "
-        "no larger sets of effects were tried."
+        f"By linear theory all known effects together would leave at least {share(given['left'])} of the gap "
+        "unexplained, so no larger sets of effects were tried."
     ),
     "remainder not sought": "No formula for the remaining gap is sought for a driven body without a restoring "
     "moment: every small error of a moment adds up in its angle.",
@@ -173,7 +173,7 @@ PATCH: Mapping[str, Sentence] = {
     "hinges only, and it is left out.",
     "friction against load": "The friction's dependence on the moment that the joint carries has no native "
     "element, and is left out where this moment is not gravity's on a hinge.",
-    "rod": "The twist of the rod is left out: it needs a body and a joint of its own.",
+    "rod": "The twist of the rod is left out: it needs a further body and joint.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",
     "air": "The air's moment is left out: the patched model is that of the runs with the wind off.",

@@ -232,23 +232,14 @@ Document = Mapping[str, Any]
 CHANNELS = {
     "stiffness": "the restoring moment",
     "damping": "the damping",
-    "forcing": "an imposed moment",
-    "sensor": "the angle sensor",
+    "forcing": "the forcing moment",
+    "sensor": "the sensor reading",
     "calibration": "a stated value",
 }
-"""The object on which a cause acts, for the verdict."""
-
-PLACES = {
-    "stiffness": "the restoring moment (stiffness)",
-    "damping": "the damping",
-    "forcing": "the rig as a moment that does not depend on its motion (forcing)",
-    "sensor": "the reading of the sensor",
-    "calibration": "a value stated for the runs (calibration)",
-}
-"""The object on which a gap acts, by its residuals."""
+"""The object on which a cause or a gap acts."""
 
 CONDITIONS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
-"""The condition under which a gap shows."""
+"""The condition under which a cause acts, or a gap shows."""
 
 BANDS = {
     "0": "slower than the oscillation",
@@ -274,19 +265,15 @@ KINDS: Mapping[str, str] = {
     "rate": "a moment of the rate alone",
     "state": "a moment of angle and rate",
     "wind": "a moment of angle and rate with the wind",
-    "time": "a moment in time, alike in all runs",
-    "reading": "an error of the reading, alike in all runs",
-    "line": "a steady line in the reading, of a phase of its own in every run",
-    "between": "a stiffness, damping or moment of each run's own",
-    "event": "a moment in time of each run's own",
-    "wander": "a wandering or jumping zero of each run's own",
+    "time": "a moment in time, equal in all runs",
+    "reading": "an error of the reading, equal in all runs",
+    "line": "a steady line in the reading, with another phase in every run",
+    "between": "a stiffness, damping or moment of each run",
+    "event": "a moment in time of each run",
+    "wander": "a wandering or jumping zero of each run",
     "noise": "nothing smooth: the rest is noise",
 }
 """Kinds of missing law (`diagnosis.facts.remainder.KINDS`)."""
-
-_ACTS_ON = {**CHANNELS, "sensor": "the reading"}
-ACTS_WHEN = {"always": "with or without wind", "wind_on": "only with the wind on"}
-"""The condition under which a cause acts."""
 
 
 def plain(*names: str) -> str:
@@ -307,8 +294,8 @@ def windy(document: Document) -> bool:
 
 
 def acts_on(document: Document, effect: str) -> str:
-    """The object and condition of an effect, such as ``the damping, with or without wind``; empty if unknown."""
+    """The object and condition of an effect, such as ``the damping, only with the wind on``; empty if unknown."""
     kind = {kind.name: kind for kind in known_effects()}.get(effect)
     if kind is None:
         return ""
-    return f"{_ACTS_ON[kind.channel]}{f', {ACTS_WHEN[kind.condition]}' if windy(document) else ''}"
+    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(document) else ''}"

@@ -36,24 +36,24 @@ def rest_words(document: Document) -> str:
     larger = excess > 1.0  # than the noise: people see it in the fit, whatever it does to the coefficients
     if larger and misfit is not None:
         size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
-    left = f"what remains ({size})" if named else "it"
+    left = f"the residual ({size})" if named else "it"
     explained = f"{'Not all is explained:' if larger else 'Explained;'} {left}" if named else "It"
     material = [name for name, move in moves.items() if move["material"]]
     known = [name for name, move in moves.items() if move["std"] is not None]
     if not causes:
         words = "No gap: nothing remains beyond the noise."
     elif not rest["significant"]:
-        words = "Explained; what remains is within the noise."
+        words = "Explained; the residual is within the noise."
     elif material:
         moved = _each({name: change_up_to(moves[name]["value"], after[name]) for name in material})
         start = f"Not all is explained: {left}" if named else "It"
-        words = f"{start} could move {moved}. Do not trust the coefficients beyond the intervals given."
+        words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
     elif not known:
-        words = f"{explained} concerns no coefficient that these runs determine."
+        words = f"{explained} changes no coefficient that these runs determine."
     else:
         most = {name: max(moves[name]["value"], moves[name]["std"] or 0.0) for name in known}
         bounds = _each({name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()})
-        words = f"{explained} moves {bounds}." if named else f"It hardly matters: it moves {bounds}."
+        words = f"{explained} changes {bounds}." if named else f"It is immaterial: it changes {bounds}."
     if rest["further"]:
         words += f" {plain(rest['further']).capitalize()} is significant beside it and too small to be named."
     return words
@@ -71,15 +71,15 @@ def closable_words(document: Document) -> str:
         return ""
     named = document["causes"] != ["unknown"] and document["decided"]
     beyond = " beyond the scatter between runs" if scattering(document["causes"]) else ""
-    left = "what the causes leave" if named else f"the gap{beyond}"
+    left = "the residual gap" if named else f"the gap{beyond}"
     ceilings = [ceiling(one) for one in found["ceilings"]]
     if found["kind"] == "noise":
         chosen = settings_of(document).remainder
         most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
         bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
         return (
-            f"No more than {bound} of {left} could be closed by any "
-            "smooth moment or error of the reading: the rest is noise."
+            f"A smooth moment or error of the reading could explain no more than {bound} of {left}: the rest is "
+            "noise."
         )
     of_others = _measured_otherwise(document, found["kind"], ceilings)
     return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found["line"])])
@@ -90,8 +90,8 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
     said = [
-        f"{percent(best.closed, best.std)} of {left} could be closed by {KINDS[kind]}, measured on {best.held_out} "
-        "held out of the fit."
+        f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on "
+        f"{best.held_out} held out of the fit."
     ]
     if found["alike"]:
         said.append(
@@ -100,7 +100,7 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     elif found["next_most"] is not None:
         alike = all(one.held_out == best.held_out for one in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        said.append(f"{other} would close more than {percent(max(found['next_most'], 0.0))}.")
+        said.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
@@ -108,7 +108,7 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     if law is not None:
         formula = law["effect"].get("moment") or law["effect"]["reading"]
         closes = percent(law["closed"], law["std"])
-        said.append(f"The formula {formula} closes {closes}{_with_values(law)}.")
+        said.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
     return said
 
 
@@ -152,8 +152,8 @@ def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) 
     if most.closed <= best.closed:
         return []
     return [
-        f"{KINDS[most.kind].capitalize()} would close {percent(most.closed, most.std)}, measured on "
-        f"{most.held_out}. One law of all runs is named before it from {part(chosen.common_first)} of that share "
+        f"{KINDS[most.kind].capitalize()} would explain {percent(most.closed, most.std)}, measured on "
+        f"{most.held_out}. A law common to all runs is preferred from {part(chosen.common_first)} of that share "
         "on, since it can be a property of the rig."
     ]
 
@@ -178,20 +178,17 @@ def ceiling(given: Document) -> Ceiling:
     return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
 
 
-def rest_line(document: Document) -> str:
-    """The remaining gap, from the document; empty for a document without it."""
-    return str((document["rest"] or {"words": ""})["words"])
-
-
 def closable_line(document: Document) -> str:
     """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
     if found := document.get("closable"):
-        return f"What could be closed: {found['words']}"
+        return f"What could be explained: {found['words']}"
     rest = document.get("rest")
     if not rest or not document["causes"]:
         return ""
     if not rest["significant"]:
-        return f"What could be closed: nothing beyond chance (p = {rest['p_value']:.2g})."
+        return f"What could be explained: nothing beyond chance (p = {rest['p_value']:.2g})."
     if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
-        return "What could be closed is not stated: beside a random moment any law would close something."
+        return (
+            "What could be explained is not stated: beside a random moment, any law would explain something."
+        )
     return ""

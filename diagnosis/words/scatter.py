@@ -7,7 +7,8 @@ from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import Document, listed, plain, probability
-from identification.printing import TextTable, concise, significant, with_std
+from identification.blocks import Table
+from identification.printing import concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.shapes import Share
 
@@ -244,10 +245,10 @@ def repeatability_line(document: Document) -> str:
     if not found or len(found["runs"]) < 2:
         return ""
     if repeats(document):
-        return "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
+        return "Repeatability: the runs repeat; no scatter of their frequency or damping shows."
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
     beyond = f"; beyond it: {found['outlier']}" if found["outlier"] else ""
-    return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}"
+    return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}."
 
 
 def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
@@ -255,23 +256,20 @@ def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
     return percent_of((sum(one[f"{name}_band"] ** 2 for one in runs) / len(runs)) ** 0.5)
 
 
-def repeatability_table(document: Document) -> TextTable:
+def repeatability_table(document: Document) -> Table:
     """Every run against the model; a table without rows where the runs repeat."""
     found, rows = document.get("repeatability"), []
-    for one in found["runs"] if found and not repeats(document) else ():
-        own = [
-            f"{_signed(one[name], one[f'{name}_std'])} (± {percent_of(one[f'{name}_band']).removesuffix(' %')})"
+    for run in found["runs"] if found and not repeats(document) else ():
+        deviations = [
+            f"{_signed(run[name], run[f'{name}_std'])} (± {percent_of(run[f'{name}_band']).removesuffix(' %')})"
             for name in ("frequency", "damping")
         ]
-        outlies = "deviates far beyond the others" if found and one["id"] == found["outlier"] else ""
-        rows.append((one["id"], "on" if one["windy"] else "off", *own, outlies))
-    marked = any(row[-1] for row in rows)
-    heads = ["run", "wind", "frequency [%]", "damping [%]", ""]
-    last = None if marked else -1
+        remark = "deviates far beyond the others" if found and run["id"] == found["outlier"] else ""
+        rows.append((run["id"], "on" if run["windy"] else "off", *deviations, remark))
+    heads = ("run", "wind", "frequency [%]", "damping [%]", "remark")
+    last = None if any(row[-1] for row in rows) else -1
     title = "Every run against the model, and its scatter by chance (one standard deviation)"
-    return TextTable(
-        title, tuple(heads[:last]), tuple(row[:last] for row in rows), ("frequency [%]", "damping [%]")
-    )
+    return Table(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
 
 
 def _signed(value: float, std: float) -> str:

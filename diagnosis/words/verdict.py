@@ -17,6 +17,7 @@ from diagnosis.words.causes import (
 )
 from diagnosis.words.numbers import (
     CHANNELS,
+    CONDITIONS,
     MISFITS,
     Document,
     beside_noise,
@@ -141,8 +142,7 @@ def _answer(document: Document, rest: str) -> str:
     sources = []
     for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
-        wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
-        wind = wind if found["both_winds"] else ""
+        wind = f", {CONDITIONS[kind.condition]}" if found["both_winds"] else ""
         sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
     part = "only in part " if document["rest"]["material"] else ""
     they_act = "They act on" if len(proper) > 1 else "It acts on"
@@ -196,8 +196,8 @@ def _nearly(found: Mapping[str, Any]) -> str:
     if found["rival"]:
         return f"{said}, and {plain(*found['rival'])} as much ({probability(found['rival_probability'])})."
     if found["misfit"]:
-        left = " and ".join(MISFITS[name] for name in found["misfit"])
-        return f"{said}, but leaves a significant misfit of {left}."
+        misfit = " and ".join(MISFITS[name] for name in found["misfit"])
+        return f"{said}, but leaves a significant misfit of {misfit}."
     return f"{said}: too little to name it."
 
 
@@ -357,15 +357,15 @@ def rival_lines(document: Document) -> list[str]:
     rivals, run = document["ambiguous_with"] if decided else (), document["next_run"]
     lines = []
     if rivals:
-        lines.append(f"These runs cannot distinguish it from: {', '.join(rivals)}")
+        lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
     if run is not None and run_to_make(document) is None:
         lines.append(too_close(run))
     elif run is not None:
         which = "A run that could" if decided else "A run that would distinguish the likely answers"
-        lines.append(f"{which}: {run_words(run)}")
+        lines.append(f"{which}: {run_words(run)}.")
     elif rivals:
         lines.append(
-            "The run that could cannot be computed from these runs: state every spring_stiffness, or add runs"
+            "The run that could cannot be computed from these runs: state every spring_stiffness, or add runs."
         )
     return lines
 
@@ -438,7 +438,5 @@ def next_steps(document: Document) -> list[str]:
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]
     if (document.get("rest") or {}).get("material"):
-        steps.append(
-            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
-        )
+        steps.append("Do not trust the coefficients beyond their intervals: the residual gap changes them.")
     return steps

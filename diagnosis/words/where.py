@@ -7,7 +7,7 @@ from math import degrees
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import BANDS, CONDITIONS, PLACES, Document, part, plain
+from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, Document, part, plain
 from diagnosis.words.scatter import scattering
 from identification.printing import p_text
 from tunnel_sim.effects import effect_class
@@ -75,7 +75,7 @@ def where_words(document: Document) -> str:
         listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in largest_first)
         parts.append(f"By frequency: {', '.join(listed)}.")
     channel, condition = reason(place["channel"]), reason(place["condition"])
-    words = PLACES.get(where["channel"] or "")
+    words = CHANNELS.get(where["channel"] or "")
     acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
     between = place["channel"]["kind"] in _BETWEEN_RUNS and bool(scattering(document["causes"]))
     if between:
@@ -148,7 +148,7 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     there = [kind for kind in kinds if where["channel"] in (kind.channel, *kind.resembles)]
     elsewhere: dict[str, list[str]] = {}
     for kind in (kind for kind in kinds if kind not in there):
-        elsewhere.setdefault(PLACES[kind.channel], []).append(kind.name)
+        elsewhere.setdefault(CHANNELS[kind.channel], []).append(kind.name)
     acting = [
         f"{plain(*names) if len(kinds) > 1 else 'it'} act{'s' * (len(names) == 1)} on {acts}"
         for acts, names in elsewhere.items()

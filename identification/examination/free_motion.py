@@ -166,7 +166,7 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         Outcome.NOTED,
         tuple(run.id for run in campaign.runs if run.id in compared),
         f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit}"
-        f"{words}; every run of the campaign is fitted with a zero of its own",
+        f"{words}; a separate zero is fitted to every run of the campaign",
         "state zero = 'common' under [sensor] if the zero cannot have moved between them",
     )
     return replace(campaign, sensor=replace(campaign.sensor, zero="per_run")), (remark,)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")
+_TIMES = re.compile(r"(?<=\d) × 10([⁻⁰¹²³⁴-⁹]+)")
+_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _POWER_OF_TEN = re.compile(r"× 10[⁻⁰¹²³⁴-⁹]+|\[10[⁻⁰¹²³⁴-⁹]+")
 
 
@@ -31,7 +33,8 @@ class Shown:
 
 def numbers(text: str) -> list[Shown]:
     """Every number of a text, in order."""
-    plain = _POWER_OF_TEN.sub(" ", text.replace("\u00a0", " "))
+    plain = _TIMES.sub(lambda m: f"e{m[1].translate(_DIGITS)}", text.replace("\u00a0", " "))
+    plain = _POWER_OF_TEN.sub(" ", plain)
     plain = _SCALED.sub(lambda m: f"{m[1]}e{m[3]} ± {m[2]}e{m[3]}", plain)
     return [_shown(found.replace("−", "-")) for found in _NUMBER.findall(plain)]
 

@@ -16,6 +16,7 @@ import tomli_w
 from nicegui import ui
 
 from diagnosis.words.numbers import plain
+from identification.blocks import Paragraph, typeset
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, left_out_of, options
 from tunnel_lab.bench.parts import (
@@ -24,10 +25,10 @@ from tunnel_lab.bench.parts import (
     address,
     button,
     heading,
+    show_blocks,
     show_command,
     show_facts,
     show_items,
-    show_parts,
 )
 from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
 from tunnel_lab.terminal.outputs import STEPS
@@ -38,11 +39,16 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
+    from diagnosis.result import ParameterEstimate
 
 
 WORK = "diagnosis"
 STOPPED = 130
-_AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
+_FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"))
+"""Sections below the figures, in groups side by side; the others are folded."""
+_ELSEWHERE = ("answer", "fit", "place", "closes", "next")
+"""Sections that the page shows in another way, or another page."""
+_AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
@@ -92,7 +98,7 @@ class DiagnosePage:
         if not state.running and (took := work.seconds_taken(self._log)) is not None:
             self._before = f"; the last diagnosis took {took:.0f} s"
         now = (replace(state, lines=(), printed=0.0), found.stages, written)
-        words = "Paused; it goes on where it was."
+        words = "Paused; it continues where it was."
         if state.running and not state.paused:
             begun = datetime.fromisoformat(state.started)
             elapsed = (datetime.now().astimezone() - begun).total_seconds()
@@ -102,7 +108,7 @@ class DiagnosePage:
                 left = found.reached.words(found.seconds + time.time() - state.printed)
             words = (
                 f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
-                "It runs in a process of its own: this page may be closed."
+                "It runs in a separate process: this page may be closed."
             )
         self._clock.set_text(f"{words} {_STOP}" if state.running else "")
         if now == self._shown:
@@ -114,7 +120,7 @@ class DiagnosePage:
                 words = "Diagnose again" if result.is_file() else "Diagnose"
                 button(words, self._start, main=True)
             elif state.paused:
-                button("Go on", lambda: work.go_on(self._log), main=True)
+                button("Continue", lambda: work.go_on(self._log), main=True)
             else:
                 button("Pause", lambda: work.pause(self._log))
             if state.running:
@@ -188,15 +194,15 @@ class Answer:
     """The answer in words and figures, and fits with causes chosen by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from diagnosis.words import remainder, scatter, tables, verdict
+        from diagnosis.words.cards import key_figures
+        from diagnosis.words.sections import sections
         from diagnosis.words.verdict import headline
-        from tunnel_lab.report.view import facts
 
         answer, kind = headline(document)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
             ui.label(answer).classes("answer")
             ui.label(document["verdict"])
-            show_facts((fact.value, fact.label, fact.note) for fact in facts(document))
+            show_facts((typeset(one.value), one.label, typeset(one.note)) for one in key_figures(document))
         if (document.get("maps") or {}).get("traces"):
             heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
@@ -205,14 +211,12 @@ class Answer:
             )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
-        show_parts([tables.where_line(document), *verdict.rival_lines(document)])
-        show_parts([tables.candidates_table(document), tables.parameters_table(document)])
-        show_parts([tables.waterfall_table(document), tables.coefficients_table(document)])
+        parts = {section.key: section.blocks for section in sections(document)}
+        for keys in _FIRST:
+            show_blocks(block for key in keys for block in parts.pop(key))
         with ui.expansion("What remains, the runs, and caveats"):
-            rest, closable = remainder.rest_line(document), remainder.closable_line(document)
-            show_parts([rest, closable, tables.closable_table(document)])
-            show_parts([scatter.repeatability_line(document), scatter.repeatability_table(document)])
-            show_parts([tables.gap_table(document), *tables.closing_lines(document)])
+            for key in (key for key in parts if key not in _ELSEWHERE):
+                show_blocks(parts[key])
         if document["gap"]["detected"]:
             ByHandPart(session, document)
 
@@ -301,20 +305,23 @@ class ByHandPart:
 
 def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
-    from diagnosis.words.numbers import misfit_shown
-    from tunnel_lab.report.view import estimate, percent
+    from diagnosis.words.numbers import misfit_shown, share
+    from identification.printing import estimated, unit_mark
+
+    def size(given: ParameterEstimate) -> str:
+        return typeset(estimated(given.to_json_dict(), "" if given.unit == "1" else unit_mark(given.unit)))
 
     show_facts(
         [
-            (percent(closure.closed), f"share closed, {closure.held_out}"),
-            (misfit_shown(document, closure.after), "left of the misfit, root mean square"),
+            (share(closure.closed), f"share closed, {closure.held_out}"),
+            (misfit_shown(document, closure.after), "residual misfit, root mean square"),
             (misfit_shown(document, closure.before), "with the nominal model"),
         ]
     )
     ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
     with ui.element("ul").classes("notes"):
         show_items(
-            f"{name.replace('_', ' ').replace('.', ': ')} = {estimate(given.to_json_dict())}"
+            f"{name.replace('_', ' ').replace('.', ': ')} = {size(given)}"
             for name, given in closure.parameters.items()
         )
 
@@ -328,7 +335,7 @@ def build_next_run(session: Session, frame: Frame) -> None:
     heading("What to do next")
     with ui.element("ol"):
         show_items(next_steps(document))
-    show_parts(rival_lines(document))
+    show_blocks(map(Paragraph, rival_lines(document)))
     if (run := run_to_make(document)) is not None:
         show_run(run)
     if why := unplannable(document):

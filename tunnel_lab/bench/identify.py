@@ -12,21 +12,13 @@ from typing import Any
 import tomli_w
 from nicegui import background_tasks, ui
 
+from identification.blocks import Block, Paragraph, Table
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import (
-    SYMBOLS,
-    TextTable,
-    repeatability_lines,
-    status_lines,
-    trade_off_line,
-    unit,
-    with_std,
-)
-from identification.status import Remark
+from identification.printing import SYMBOLS, notes, unit, with_std
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
-from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
+from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
 from tunnel_lab.terminal.outputs import budget_lines, budget_table
 from tunnel_sim.files.toml_input import load_toml
@@ -142,10 +134,10 @@ class IdentifyPage:
             documents = [read_result(path) for path in results if is_current(session, path)]
             shown = [document for document in documents if document is not None]
             if shown:
-                show_parts(side_by_side(shown))
+                show_blocks(side_by_side(shown))
             budget = read_result(budget_file) if is_current(session, budget_file) else None
             if budget is not None and "budget" in budget:
-                show_parts([budget_table(budget["budget"]), *budget_lines(budget["budget"])])
+                show_blocks([budget_table(budget["budget"]), *map(Paragraph, budget_lines(budget["budget"]))])
         self._frame.refresh(self._on)
 
 
@@ -164,7 +156,7 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
     await asyncio.gather(*(one(*order) for order in orders))
 
 
-def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
+def side_by_side(documents: Sequence[Document]) -> list[Block]:
     """Estimates of one campaign: the coefficients, ωn and ζ of the runs, and the notes of the estimators."""
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
@@ -172,25 +164,23 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
         (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(_cell(document[name]) for document in documents))
         for name in given
     )
-    notes: dict[str, list[str]] = {}
+    estimators: dict[str, list[str]] = {}  # by their notes
     for document in documents:
-        remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-        beside = [*repeatability_lines(document), trade_off_line(document, SYMBOLS)]
-        for line in filter(None, [*remarks, *beside, *status_lines(document)]):
-            notes.setdefault(line, []).append(document["estimator"])
+        for line in notes(document):
+            estimators.setdefault(line, []).append(document["estimator"])
     return [
-        TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
+        Table("Coefficients ± one standard deviation", ("quantity", *names), rows),
         _runs("ωn [rad/s] of the runs ± one standard deviation", "omega_n", documents, names),
         _runs("ζ [1] of the runs ± one standard deviation", "zeta", documents, names),
-        *(f"{', '.join(names)}: {line}" for line, names in notes.items()),
+        *(Paragraph(line, ", ".join(given)) for line, given in estimators.items()),
     ]
 
 
-def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> TextTable:
+def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> Table:
     by_run = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
     ids = list(dict.fromkeys(name for runs in by_run for name in runs))[:_MOST_RUNS]
     rows = tuple((name, *(_cell(runs.get(name)) for runs in by_run)) for name in ids)
-    return TextTable(title, ("run", *names), rows)
+    return Table(title, ("run", *names), rows)
 
 
 def _cell(quantity: Document | None) -> str:

@@ -8,14 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from html import escape
 from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
-from identification.printing import TextTable, as_html
+from identification.blocks import Block, as_html, brief
 from tunnel_lab.bench.workspace import STAGES, Session, closed
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -43,7 +42,6 @@ FIELDS = {
 """Labels of fields, without example and unit, by the equivalent option."""
 _OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"([^\"]*)\"))?")
 
-_NAMED = ("answer", "effect", "parameter", "added")  # columns of the names of effects and parameters
 _HEAD = """
 <link rel="stylesheet" href="/static/uplot/uPlot.min.css">
 <link rel="stylesheet" href="/static/bench/bench.css">
@@ -153,20 +151,11 @@ class Fault:
             self.show(error)
 
 
-def show_parts(parts: Iterable[str | TextTable]) -> None:
-    """Tables and paragraphs as the terminal prints them, with names such as ``coulomb friction`` as words."""
-    shown: list[str | TextTable] = []
-    for part in parts:
-        if isinstance(part, TextTable):
-            named = [heading in _NAMED for heading in part.columns]
-            rows = (
-                tuple(cell.replace("_", " ") if name else cell for cell, name in zip(row, named, strict=True))
-                for row in part.rows
-            )
-            shown.append(replace(part, rows=tuple(rows)))
-        else:
-            shown.append(part)
-    ui.html(as_html(shown), sanitize=False).classes("printed")  # its texts are escaped
+def show_blocks(blocks: Iterable[Block]) -> None:
+    """Blocks without figures and details."""
+    ui.html(f"<div>{as_html(brief(blocks))}</div>", sanitize=False).classes(
+        "printed"
+    )  # its texts are escaped
 
 
 def show_facts(facts: Iterable[tuple[str, ...]]) -> None:

@@ -16,8 +16,8 @@ from tunnel_lab.bench.parts import (
     Frame,
     address,
     button,
+    show_blocks,
     show_items,
-    show_parts,
 )
 from tunnel_lab.bench.uploads import drop_zone, more
 from tunnel_lab.bench.workspace import Session, rename
@@ -200,7 +200,7 @@ class RecordsPage:
         with self._table:
             from tunnel_lab.terminal.outputs import parts_table
 
-            show_parts([parts_table(imported)])
+            show_blocks([parts_table(imported)])
             with ui.element("ul").classes("notes"):
                 show_items(imported.remarks())
         return True

@@ -229,7 +229,7 @@ def build_start(folder: Path) -> None:
     ui.label(words).classes("lede")
     drop_zone(NEW, ui.navigate.to, Fault())
     place = folder if folder.name else folder.resolve()
-    words = f"Dropped files are kept in {place}, in a folder of their own beside the campaign."
+    words = f"Dropped files are kept in {place}, in a separate folder beside the campaign."
     ui.label(words).classes("soft")
     campaigns = sessions(folder)
     if campaigns:

@@ -17,9 +17,10 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import ending
-from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
@@ -37,14 +38,14 @@ def docs(
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the site goes, in its folder html.")
     ] = Path("tunnel-output/docs"),
     browser: Annotated[
-        bool, Option("--browser/--no-browser", help="Open the first page, or only say where it is.")
+        bool, Option("--browser/--no-browser", help="Open the first page, or only print its path.")
     ] = True,
 ) -> None:
     """Build the documentation site and open it.
 
     The site has all pages, an API reference and three notebooks, which are
-    executed. Pages that have not changed since the last time are not built again.
-    Nothing is written beside the pages. It needs the extra 'docs'.
+    executed. Only changed pages are built again. Nothing is written into the
+    source folder. It needs the extra 'docs'.
 
     [bold]Examples[/bold]
       tunnel docs
@@ -85,16 +86,13 @@ def doctor() -> None:
     [bold]Exit status[/bold]
       0 healthy, 1 the self-check failed, 2 bad input.
     """
-    rows = table("Installation", "part", "found")
-    for part, text in (*installed(), *extras()):
-        rows.add_row(part, text)
-    checks = table("Self-check", "check", "result")
-    works = True
-    for part, text, fine in self_check():
-        checks.add_row(part, text if fine else f"FAILED: {text}")
-        works = works and fine
-    show_tables(rows, checks)
-    if not works:
+    checks = tuple(self_check())
+    results = tuple((part, text if fine else f"FAILED: {text}") for part, text, fine in checks)
+    show_tables(
+        Table("Installation", ("part", "version or state"), (*installed(), *extras())),
+        Table("Self-check", ("check", "result"), results),
+    )
+    if not all(fine for _, _, fine in checks):
         raise typer.Exit(1)
 
 

@@ -14,24 +14,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.text import Text
 from typer import Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.outputs import (
     bar,
     console,
-    rich_table,
     say,
     say_written,
     show_tables,
     step_display,
-    table,
     truth_table,
 )
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from identification.estimate import Estimate
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.plan import CampaignPlan
@@ -59,16 +55,16 @@ def demo(
 ) -> None:
     """Plant two faults in the virtual rig, and find them from its records.
 
-    The rig is simulated with dry friction and with one spring that is softer than
-    stated. Then the records alone are identified and diagnosed: what is wrong, how
-    large it is, and how far the gap closes on runs held out of the fit. FOLDER
-    gets the report (report.html), the plan, the campaign, and both answers as
-    JSON. It takes a quarter of a minute.
+    The rig is simulated with dry friction and with a spring that is softer than
+    stated. The records alone are then identified and diagnosed: the causes, their
+    sizes, and how far the gap closes on runs held out of the fit. The report
+    (report.html), the plan, the campaign, and both answers as JSON are written to
+    FOLDER. It takes about 15 s.
 
-    With --estimators the paper's campaign, without faults, is identified by three
-    estimators instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are
-    shown beside the injected values, and FOLDER gets figures (PNG, PDF). tunnel
-    score compares all estimators, with the Cramér–Rao bound.
+    With --estimators, three estimators identify the paper's campaign, without
+    faults, instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are shown
+    beside the injected values, and figures (PNG, PDF) are written to FOLDER.
+    tunnel score compares all estimators with the Cramér–Rao bound.
 
     [bold]Examples[/bold]
       tunnel demo
@@ -76,8 +72,8 @@ def demo(
       tunnel demo --estimators
 
     [bold]Exit status[/bold]
-      0 success, 1 the faults were not found, an estimate failed, or one that is
-      checked missed the truth by more than four standard deviations, 2 bad input.
+      0 success, 1 the faults were not found, an estimate failed or missed the
+      truth by more than four standard deviations, 2 bad input.
     """
     from tunnel_sim.files.plan_file import load_plan, paper_plan
     from tunnel_sim.files.writing import output_folder
@@ -150,7 +146,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{document['verdict']}\n")
-    show_tables(found_table(plan, document), rich_table(waterfall_table(document)))
+    show_tables(found_table(plan, document), waterfall_table(document))
 
 
 def found_table(plan: CampaignPlan, document: Document) -> Table:
@@ -159,27 +155,26 @@ def found_table(plan: CampaignPlan, document: Document) -> Table:
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
     from tunnel_sim.effects.registry import effect_class
 
-    result = table(
-        "Planted and found, ± one standard deviation σ",
-        *("", "planted", "nominal model", "with the causes", "error"),
-        right=("planted", "error"),
-    )
+    rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in after:
         truth = getattr(plan.truth, name)
-        result.add_row(
-            Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"),
-            significant(truth),
-            with_std(before[name]["value"], before[name]["std"]),
-            with_std(after[name]["value"], after[name]["std"]),
-            in_stds(after[name]["value"] - truth, after[name]["std"]),
+        rows.append(
+            (
+                f"{SYMBOLS[name]} {unit(UNITS[name])}",
+                significant(truth),
+                with_std(before[name]["value"], before[name]["std"]),
+                with_std(after[name]["value"], after[name]["std"]),
+                in_stds(after[name]["value"] - truth, after[name]["std"]),
+            )
         )
     for (effect, name), (truth, found) in planted_and_found(plan, document).items():
         info = next(info for info in effect_class(effect).parameters() if info.name == name)
         error = in_stds(found["value"] - truth, found["std"]) if found and found["std"] else ""
         cell = "not found" if found is None else estimated(found)
-        result.add_row(Text(f"{info.symbol} {unit(info.unit)}"), significant(truth), "", cell, error)
-    return result
+        rows.append((f"{info.symbol} {unit(info.unit)}", significant(truth), "", cell, error))
+    heads = ("quantity", "planted", "nominal model", "with the causes", "error")
+    return Table("Planted and found, ± one standard deviation σ", heads, tuple(rows), ("planted", "error"))
 
 
 def planted_and_found(
@@ -306,7 +301,7 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
     from identification.printing import status_lines
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
-    show_tables(truth_table(estimates, vars(plan.truth)))
+    show_tables(*(truth_table(estimate, vars(plan.truth)) for estimate in estimates))
     for estimate in estimates:
         for line in status_lines(estimate.to_json_dict()):
             say(f"Note, {estimate.estimator}: {line}")

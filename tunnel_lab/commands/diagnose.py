@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identification.printing import TextTable, coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.blocks import Table
+from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
@@ -24,7 +25,7 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.outputs import rich_table, say, say_written, show_tables, step_display
+from tunnel_lab.terminal.outputs import say, say_written, show, show_tables, step_display
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def diagnose(
     ] = "",
     notes: Annotated[str, _output("--notes", metavar="TEXT", help="Notes for the head of the report.")] = "",
     effects: Annotated[
-        list[str] | None, _causes("--effects", metavar="A,B", help="Consider these effects only.")
+        list[str] | None, _causes("--effects", metavar="A,B", help="Consider only these effects.")
     ] = None,
     exclude: Annotated[
         list[str] | None,
@@ -133,7 +134,7 @@ def diagnose(
             "--propose",
             callback=ending(".toml"),
             metavar="LAW.toml",
-            help="Write the formula proposed for what no effect explains.",
+            help="Write the formula proposed for the residual gap.",
         ),
     ] = None,
 ) -> None:
@@ -143,11 +144,11 @@ def diagnose(
     the noise. Then the effects that tunnel effects lists, and sets of them, are fitted
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (none of these effects explains it), each with a probability.
-    Gap and coefficients are given before and after the effects are added. The gap
-    is predicted for runs, or stretches of time, held out of the fit. Where
-    something remains, the answer says whether it could move the coefficients, how
-    much of it could be closed, by what kind of moment or error of the reading, and
-    by which formula; --propose writes the formula for --effects-file.
+    The gap and the coefficients are given before and after the effects are added.
+    The gap is predicted for runs, or stretches of time, held out of the fit. For a
+    significant residual gap, the answer states whether it could change the
+    coefficients, and which kind of moment or error of the reading, and which
+    formula, could explain it; --propose writes the formula for --effects-file.
 
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
@@ -166,6 +167,7 @@ def diagnose(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
+    from diagnosis.words.sections import printed
     from tunnel_sim.files.writing import json_text, write_json
 
     del effects_file  # its effects are known already
@@ -210,7 +212,7 @@ def diagnose(
     if to_stdout:
         typer.echo(printable_json(json_text(document)), nl=False)
         return
-    show(document)
+    show(printed(document))
     if propose is not None and proposed is None:
         nothing = "nothing remains beyond chance, or beside a random moment, or nothing holds the body"
         say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
@@ -253,35 +255,6 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
     answer.model.write(path)
 
 
-def show(document: dict[str, Any]) -> None:
-    """Print an answer: the verdict in words, then the figures behind it."""
-    from diagnosis.words import remainder, tables, verdict
-
-    say(document["verdict"])
-    for line in (tables.where_line(document), *verdict.rival_lines(document)):
-        if line:
-            say(line)
-    say("")
-    answers = (tables.candidates_table, tables.parameters_table)
-    show_tables(*(rich_table(table(document)) for table in answers))
-    if line := tables.inclusion_line(document):
-        say(f"{line}\n")
-    if line := remainder.closable_line(document):
-        say(f"{line}\n")
-    behind = (
-        tables.closable_table, tables.waterfall_table, tables.gap_table, tables.coefficients_table,
-        tables.patch_table,
-    )  # fmt: skip
-    show_tables(*(rich_table(table(document)) for table in behind))
-    if line := tables.coefficients_line(document):
-        say(line)
-    for line in (*tables.patch_lines(document), *tables.closing_lines(document)):
-        say(line)
-    say("What to do next:")
-    for number, step in enumerate(verdict.next_steps(document), 1):
-        say(f"{number}. {step}")
-
-
 def compare(
     documents: Annotated[
         list[Path], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
@@ -289,10 +262,10 @@ def compare(
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.
 
-    For each diagnosis: the gap (its power over that of the noise) before and with the causes, the causes
-    with their parameters, and the coefficients with standard deviations. Then the
-    difference of each coefficient from the first diagnosis, for campaigns that are
-    independent of each other.
+    For each diagnosis: the gap (its power over that of the noise) without and with
+    the causes, the causes with their parameters, and the coefficients with standard
+    deviations. The last table shows the difference of each coefficient from the
+    first diagnosis; it assumes that the campaigns are independent.
 
     [bold]Examples[/bold]
       tunnel compare before.json after.json
@@ -312,10 +285,10 @@ def compare(
         names = stems
     if len(set(names)) < len(names):
         names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
-    show_tables(*(rich_table(table) for table in comparison_tables(names, diagnoses)))
+    show_tables(*comparison_tables(names, diagnoses))
 
 
-def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[TextTable]:
+def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[Table]:
     """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
 
     Args:
@@ -334,11 +307,14 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     pairs = list(zip(documents, explained, strict=True))
     answers = (
         ("gap [× noise power]", *(excess(d, "excess_before") for d in documents)),
-        ("left [× noise power]", *(excess(d, "excess_after") if known else _NONE for d, known in pairs)),
+        (
+            "residual gap [× noise power]",
+            *(excess(d, "excess_after") if known else _NONE for d, known in pairs),
+        ),
         ("share closed", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
         ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
         ("decided", *("yes" if d["decided"] else "no" for d in documents)),
-        ("or", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
+        ("or instead", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
         ("probability", *(probability(d["candidates"][0]["probability"]) for d in documents)),
     )
     parameters = []  # of each answer, by effect and name
@@ -378,8 +354,8 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     quantity, parameter = ("quantity",), ("effect", "parameter")
     change = f"Coefficients with the causes: difference from {names[0]}"
     return [
-        TextTable("Gap and answer", (*quantity, *names), answers),
-        TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
-        TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
-        TextTable(change, (*quantity, *names[1:]), tuple(differences)),
+        Table("Gap and answer", (*quantity, *names), answers),
+        Table("Parameters ± one standard deviation", (*parameter, *names), rows),
+        Table("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
+        Table(change, (*quantity, *names[1:]), tuple(differences)),
     ]

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
-from rich.text import Text
 from typer import Argument, Option
 
+from identification.blocks import Table
 from identification.printing import unit_mark
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -157,11 +156,14 @@ def run(
         say(f"reference:  {reference}")
     say("")
     right = ("typical", "from", "to", "default")
-    parameters = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
-    for info in kind.parameters():
-        numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
-        parameters.add_row(*map(Text, (info.name, info.symbol, unit_mark(info.unit), info.meaning, *numbers)))
-    show_tables(parameters)
+    rows = tuple(
+        (
+            *(info.name, info.symbol, unit_mark(info.unit), info.meaning),
+            *(f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default)),
+        )
+        for info in kind.parameters()
+    )
+    show_tables(Table("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right))
     say(ABOUT_DIRECTIONS)
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 
@@ -195,14 +197,12 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
 def listing(kinds: Sequence[type[Effect]]) -> Table:
     """Effects with equation and parameters, one row each."""
     last = "equation, then parameters [unit]"
-    result = table("Effects beyond the nominal model", "effect", "channel", "condition", last)
-    for column in result.columns[:3]:  # never folded, for copying names
-        column.no_wrap = True
+    rows = []
     for kind in kinds:
         parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]
-        cells = (kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters]))
-        result.add_row(*map(Text, cells), end_section=True)
-    return result
+        rows.append((kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters])))
+    names = ("effect", "channel", "condition")
+    return Table("Effects beyond the nominal model", (*names, last), tuple(rows), names=names, ruled=True)
 
 
 def example(kind: type[Effect]) -> str:

@@ -12,7 +12,7 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
-from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
+from tunnel_lab.terminal.outputs import parts_table, say, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
@@ -126,10 +126,10 @@ def import_files(
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
     Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
-    sample rate, runs and releases are found; what was found, and why, is printed
-    before anything is written. Options correct what was found wrongly. The campaign
-    gets a picture (import.png), the choices made (import.toml, for --recipe), and
-    comments in campaign.toml on what the files do not state, such as the stiffness.
+    sample rate, runs and releases are detected; the choices and their reasons are
+    printed before anything is written, and options correct them. The campaign has a
+    picture (import.png), the choices (import.toml, for --recipe), and comments in
+    campaign.toml on conditions that the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig
@@ -185,7 +185,7 @@ def import_files(
     given = kept | {key: value for key, value in stated.items() if value is not None}
     choices = validate(ImportChoices, given, Path("options"))
     imported = read_records(files, choices, conditions=conditions, name=out.resolve().name if out else "")
-    show_tables(rich_table(parts_table(imported)))
+    show_tables(parts_table(imported))
     for line in imported.remarks():
         say(f"Note: {line}")
     if preview is not None:

@@ -13,6 +13,7 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
+from identification.blocks import Paragraph, Table
 from identification.estimators import SUMMARIES, make_estimator
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
@@ -32,9 +33,9 @@ from tunnel_lab.terminal.outputs import (
     budget_lines,
     budget_table,
     console,
-    rich_table,
     say,
     say_written,
+    show,
     show_estimate,
     show_tables,
 )
@@ -104,8 +105,8 @@ def run(
     Every run gives its natural frequency ωn (rad/s) and damping ratio ζ. Runs
     with a stated spring, with the wind off and on, together give Cnβ and Cnr
     (1/rad), Izz (kg m²) and Cr (N m s/rad). Without spring_stiffness the runs
-    stay in normalised form: ωn and ζ. Every estimate has a standard deviation,
-    and every note says what to do.
+    give only ωn and ζ. Every estimate has a standard deviation, and every note
+    states a remedy.
 
     [bold]Estimators[/bold]
       {estimators}
@@ -118,10 +119,10 @@ def run(
       tunnel identify my-campaign --uncertainties known.toml --model conventional
 
     [bold]Uncertainty[/bold]
-      By default, standard deviations are due to sensor noise and to the scatter
-      between runs. --budget adds the choice of model. --uncertainties also adds
-      those of the stated Kr, V, ρ, A and l. The combined standard uncertainty is
-      then reported, and a table shows which source dominates.
+      By default, standard deviations include sensor noise and the scatter between
+      runs. --budget adds the choice of model, and --uncertainties those of the
+      stated Kr, V, ρ, A and l. The combined standard uncertainty is then reported,
+      and a table shows the dominant source.
 
     [bold]Exit status[/bold]
       0 identified, 1 nothing could be identified, or an estimator of your own failed, 2 bad input.
@@ -182,11 +183,7 @@ def run(
         show_estimate(data, estimate, windows=detailed, source=campaign)
         if found is not None:
             say("")
-            table = rich_table(budget_table(document["budget"]))
-            table.rows[-2].end_section = True
-            show_tables(table)
-            for line in budget_lines(document["budget"]):
-                say(line)
+            show((budget_table(document["budget"]), *map(Paragraph, budget_lines(document["budget"]))))
             say("The standard deviations above are the combined ones.")
         say_written(json)
     if estimate.status.failed:
@@ -196,7 +193,7 @@ def run(
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     """Identify turning points by their own likelihood: ωn and ζ, with the JSON of a run."""
     from identification.estimate import Estimate, Quantity, RunEstimate
-    from identification.printing import TextTable, with_std
+    from identification.printing import with_std
     from identification.signal.turning_points import fit_turning_points
     from identification.status import Status
     from tunnel_sim.files.writing import json_text, write_json
@@ -225,7 +222,7 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     cells = tuple((name, with_std(one.value, one.std)) for name, one in rows)
     heading = "value ± one standard deviation"
     title = f"{points.name}: {points.time_s.size} turning points"
-    show_tables(rich_table(TextTable(title, ("quantity", heading), cells, right=(heading,))))
+    show_tables(Table(title, ("quantity", heading), cells, right=(heading,)))
     for line in found.said:
         say(f"Note: {line}")
     say(

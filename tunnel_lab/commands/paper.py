@@ -11,7 +11,8 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
+from identification.blocks import Table
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line, shown
 
@@ -63,24 +64,15 @@ def show_springs(springs: SpringTable, source: str) -> None:
     from identification.printing import with_std
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)
-    rows = table(
-        f"Springs of {source}",
-        *("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", ""),
-        right=("Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]"),
-    )
+    rows = []
     for name, stiffness, frequency, residual, flag in zip(
         springs.names, springs.stiffness, springs.frequency_hz, fit.residual_percent, fit.flagged, strict=True
     ):
         square = (2.0 * math.pi * frequency) ** 2
-        rows.add_row(
-            name,
-            f"{stiffness:g}",
-            f"{frequency:g}",
-            f"{square:.2f}",
-            f"{residual:+.1f}",
-            "off the line" if flag else "",
-        )
-    show_tables(rows)
+        numbers = (f"{stiffness:g}", f"{frequency:g}", f"{square:.2f}", f"{residual:+.1f}")
+        rows.append((name, *numbers, "off the line" if flag else ""))
+    heads = ("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", "remark")
+    show_tables(Table(f"Springs of {source}", heads, tuple(rows), heads[1:-1]))
     if fit.inertia.value <= 0.0:
         problem = "stiffness does not rise with frequency, so this table gives no inertia: check it"
         say(problem, stderr=True)
@@ -177,12 +169,12 @@ def paper(
 ) -> None:
     """Reproduce the paper's tables and figures, ours beside theirs.
 
-    FOLDER gets a page (index.html) with a summary, Tables I to IV, Figs 1 to 6
-    and the slips of the equations, and its figures as pictures (PNG) and for
-    print (PDF). It says what cannot be reproduced, and why. The runs are
+    A page (index.html) with a summary, Tables I to IV, Figs 1 to 6 and the
+    misprints in the equations is written to FOLDER, with its figures as PNG and
+    PDF. It states which results cannot be reproduced, and why. The runs are
     simulated, and identified by the paper's two methods, in a minute or two.
-    What is finished is kept: after an interruption the same command does the
-    rest. Delete the folder to compute everything again.
+    After an interruption the same command computes the unfinished parts. Delete
+    the folder to compute everything again.
 
     [bold]Examples[/bold]
       tunnel paper
@@ -210,8 +202,6 @@ def paper(
             raise TunnelError(f"no part '{name}'", where="--only", remedy=did_you_mean(name, tuple(known)))
     with bar("paper") as progress:
         page, sections = write_paper(out, known, list(dict.fromkeys(only or known)), progress=progress)
-    summary = table("The paper, ours beside theirs", "item", "paper", "here", "outcome")
-    for section in sections.values():
-        summary.add_row(section.title, section.theirs, section.ours, section.outcome)
-    show_tables(summary)
+    rows = tuple((part.title, part.theirs, part.ours, part.outcome) for part in sections.values())
+    show_tables(Table("The paper, ours beside theirs", ("item", "paper", "here", "outcome"), rows))
     say_written(page)

@@ -60,12 +60,12 @@ def plot(
     picture (PNG) and for print (PDF), into FOLDER/<name of the campaign's
     folder>. Angles in rad, times in s, spectral density in rad²/Hz.
 
-    Of a diagnosis it writes fit-1 and so on, two runs to a page: what was
-    measured, what the nominal model and the model with the causes predict, and
-    their residuals in degrees, in the cycles where the models differ most; and
-    repeatability: frequency and damping of every run minus the model's, in per
-    cent, with the scatter between runs. Other figures of the report are drawn
-    by name, such as waterfall or where-backbones.
+    For a diagnosis it writes fit-1 and so on, two runs to a page: the measured
+    readings, the predictions of the nominal model and of the model with the
+    causes, and their residuals in degrees, in the cycles where the models differ
+    most. It also writes repeatability: frequency and damping of every run minus
+    the model's, in per cent, with the scatter between runs. Other figures of the
+    report are drawn by name, such as waterfall or where-backbones.
 
     [bold]Examples[/bold]
       tunnel plot my-campaign
@@ -74,8 +74,7 @@ def plot(
       tunnel plot answer.json repeatability waterfall
 
     [bold]Exit status[/bold]
-      0 drawn, 1 no run could be identified (windows is left out), 2 bad
-      input.
+      0 drawn, 1 no run could be identified (no figure of windows), 2 bad input.
     """
     from identification import identify
     from tunnel_lab.plotting import runs as figures
@@ -267,11 +266,11 @@ def bench(
 ) -> None:
     r"""Go from a logger's files to a report in the browser.
 
-    The stages are those of the commands, and write the same files: drop records
+    Each stage does the work of a command and writes the same files: drop records
     (import), state the conditions, identify, diagnose, find the run that would
-    distinguish the answers, and write the report. You can go on in a terminal at
-    any point. Only this machine's user can open the page: its address has a secret
-    in it. It needs the extra bench (.venv/bin/pip install '.[bench]' in the clone
+    distinguish the answers, and write the report. You can continue in a terminal
+    at any point. The address of the page contains a secret, so that only you can
+    open it. It needs the extra bench (.venv/bin/pip install '.[bench]' in the clone
     of the project), and no network.
 
     [bold]Examples[/bold]

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from identification.uncertainty.cramer_rao import CampaignBound
     from tunnel_sim.files.plan_file import PlanDocument
 
@@ -71,17 +70,18 @@ def simulate(
 ) -> None:
     r"""Simulate a campaign: springs × wind speeds × release angles × repeats.
 
-    The folder then holds campaign.toml, a file for each run (time in s, yaw
-    angle in rad), and truth.json with the injected values. The same plan and seed
-    give the same campaign, to the last bit.
+    Writes campaign.toml, a file for each run (time in s, yaw angle in rad), and
+    truth.json with the injected values. The same plan and seed give bit-identical
+    campaigns.
 
     A [drive] in the plan adds driven runs, which start at rest: springs × wind
-    speeds × amplitudes × repeats. Their files have an input column besides. Kinds
+    speeds × amplitudes × repeats. Their files also have an input column. Kinds
     are sine, stepped_sine, chirp, multisine, random, square and file.
 
-    A [scatter] makes the runs differ by chance, as real ones do: true wind speed,
-    spring and mechanical damping (relative standard deviations) and the sensor's
-    zero (rad). campaign.toml keeps what is stated; truth.json has every run's own.
+    A [scatter] makes the runs differ by chance, as real runs do: the true wind
+    speed, spring and mechanical damping (relative standard deviations) and the
+    sensor's zero (rad). campaign.toml has the stated values, truth.json the true
+    values of every run.
 
     [bold]A plan[/bold]
       name = "two-speeds"
@@ -187,16 +187,17 @@ def plan_drive(
 ) -> None:
     r"""Plan the drive that tells most about Cnβ and Cnr.
 
-    From a plan of free decays it makes one of driven runs with the same springs,
-    speeds, sensor and rig time: one run of each spring and speed instead of
-    several releases, so that pauses become record. The truth of the plan is the
+    A plan of free decays becomes a plan of driven runs with the same springs,
+    speeds, sensor and rig time: one run of each spring and speed replaces several
+    releases, so that less time is lost in pauses. The truth of the plan is the
     prior guess of the coefficients. The drive is the multisine, chirp, sine or
     stepped sine with the lowest Cramér–Rao bound, as large as both limits allow.
-    The response keeps to its limit if the prior guess is right: leave a margin.
+    The response stays within its limit if the prior guess is right: leave a margin.
 
-    Rig time is the records, 60 s for each, 300 s for a spring and 60 s for a speed.
-    With buffeting the bound is that in a random moment; identify the runs with
-    filter_error then. Other effects of the plan do not count.
+    Rig time is that of the records, plus 60 s for each record, 300 s for each change
+    of spring and 60 s for each change of speed. With buffeting, the bound includes
+    the random moment; identify the runs with filter_error. Other effects of the
+    plan are ignored.
 
     [bold]Examples[/bold]
       tunnel plan free.toml --drive --moment 0.5 --amplitude 0.3 --out driven.toml
@@ -308,10 +309,14 @@ def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) 
 
     names = tuple(f"std {SYMBOLS[name]}\n{unit(UNITS[name])}" for name in _COEFFICIENTS)
     heads = ("runs", "record\n[s]", "rig time\n[min]", *names)
-    result = table("Cramér–Rao bounds: the smallest standard deviations", "plan", *heads, right=heads)
-    for name, runs, record, spent, bound in rows:
-        deviations = (significant(bound.std(each), 3) for each in _COEFFICIENTS)
-        result.add_row(name, f"{runs}", f"{record:g}", f"{spent / 60.0:.1f}", *deviations)
-    found = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
-    result.add_row("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in found))
-    return result
+    cells = [
+        (
+            *(name, f"{runs}", f"{record:g}", f"{spent / 60.0:.1f}"),
+            *(significant(bound.std(each), 3) for each in _COEFFICIENTS),
+        )
+        for name, runs, record, spent, bound in rows
+    ]
+    ratios = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
+    cells.append(("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in ratios)))
+    title = "Cramér–Rao bounds: the smallest standard deviations"
+    return Table(title, ("plan", *heads), tuple(cells), right=heads)

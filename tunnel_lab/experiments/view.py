@@ -9,14 +9,15 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from identification.blocks import Block, Paragraph, as_html
 from tunnel_lab.plotting.style import save_both
 from tunnel_lab.report.page import page_of
-from tunnel_lab.terminal.outputs import say, show_tables, text_table
+from tunnel_lab.terminal.outputs import block_table, show, show_tables
 from tunnel_sim.files.writing import output_folder, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
 
 @dataclass(frozen=True)
@@ -24,13 +25,13 @@ class View:
     """What an experiment has found.
 
     Args:
-        parts: tables and lines, in their order.
+        parts: blocks, tables of a terminal and lines, in their order.
         figures: by name of their files, without suffix; drawn when they are written.
         data: contents of further files, by name.
     """
 
     title: str
-    parts: Sequence[Table | str]
+    parts: Sequence[Block | RichTable | str]
     figures: Mapping[str, Callable[[], Figure | None]] = field(default_factory=dict)
     data: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -50,14 +51,21 @@ class View:
     def show(self) -> None:
         """Print tables and lines."""
         for part in self.parts:
-            say(part) if isinstance(part, str) else show_tables(part)
+            if isinstance(part, str):
+                show([Paragraph(part)])
+            elif isinstance(part, Block):
+                show([part])
+            else:
+                show_tables(part)
 
     def _page(self, pictures: Sequence[Path]) -> str:
-        parts = [
-            f"<p>{escape(part)}</p>" if isinstance(part, str) else text_table(part).html()
-            for part in self.parts
-            if isinstance(part, str) or part.row_count
-        ]
+        blocks: list[Block] = []
+        for part in self.parts:
+            if isinstance(part, str):
+                blocks.append(Paragraph(part))
+            else:
+                blocks.append(part if isinstance(part, Block) else block_table(part))
+        parts = [as_html(blocks)]
         for path in pictures:
             name = escape(path.stem.replace("-", " "))
             content = b64encode(path.read_bytes()).decode()

@@ -125,7 +125,7 @@ def table_3(folder: Path) -> Section:
             "The paper takes the drift for the rig's nonlinearity, and it is right: on a linear rig the "
             "networks give constant columns within their noise. A spring that softens with the amplitude "
             "and a damping that grows with it make them drift as the paper's do. Other pairs of effects do so as "
-            "well; the tutorial on the paper's own gap compares them.",
+            "well; the tutorial on the gap in the paper compares them.",
             "The levels differ from the paper's: spring 5 is off the line of Table II, and the mechanical "
             "damping is a guess. ωn of windows 3 and 4 can be read in two ways in the scan. In brackets: "
             "one standard deviation in the last digits.",

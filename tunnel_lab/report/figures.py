@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.settings import settings_of
 from diagnosis.words.answers import ranked
+from diagnosis.words.cards import WITHIN_THE_NOISE
 from diagnosis.words.numbers import excess_std, plain, probability, unit_shown
 from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label, significant
@@ -47,7 +48,6 @@ from tunnel_lab.report.drawing import (
 )
 from tunnel_lab.report.friction import friction_figure
 from tunnel_lab.report.repeatability import repeatability_figure
-from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:

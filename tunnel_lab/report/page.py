@@ -4,50 +4,37 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.words.answers import set_out
-from diagnosis.words.numbers import Document, plain, reading_shown, unit_of
-from diagnosis.words.remainder import closable_line
-from diagnosis.words.scatter import repeatability_line, repeatability_table, repeats
-from diagnosis.words.tables import (
-    SOURCES,
-    closable_table,
-    coefficients_line,
-    hidden_table,
-    inclusion_line,
-    other_answers,
-    patch_lines,
-    patch_table,
-)
-from diagnosis.words.verdict import headline, next_steps
-from identification.printing import COEFFICIENTS, p_text, significant, trade_off_line, unit_mark
-from tunnel_lab.report import view
+from diagnosis.words.captions import captioned
+from diagnosis.words.cards import key_figures
+from diagnosis.words.numbers import Document
+from diagnosis.words.sections import sections
+from diagnosis.words.verdict import headline
+from identification.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
-from tunnel_lab.report.symbols import symbol_rows
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 
 DESCRIPTIONS = {
     "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
-    "waterfall": "What is left of the gap as the causes are added one after another.",
-    "fit": "What was measured and what both models predict against time, and below it their residuals.",
+    "waterfall": "The residual gap as the causes are added one after another.",
+    "fit": "The measured and predicted readings of both models against time, and below them the residuals.",
     "where-runs": "Heat map of the excess of every run over time.",
     "where-profiles": "Excess against time and against amplitude, and the missing moment against time.",
     "where-spectrum": "Residual power against frequency, with the nominal model and with the causes added.",
@@ -62,19 +49,6 @@ DESCRIPTIONS = {
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 """Text alternatives of the figures."""
-TESTS = {
-    "below": "residual power below half the frequency f₀ of the oscillation",
-    "f0": "residual power at f₀, from 0.5 to 1.5 f₀: the oscillation itself",
-    "2f0": "residual power at its second harmonic, from 1.5 to 2.5 f₀",
-    "3f0": "residual power at its third harmonic, from 2.5 to 3.5 f₀",
-    "above": "residual power above 3.5 f₀",
-    "offset": "whether the runs have a common zero",
-    "noise against amplitude": "whether the noise grows or shrinks with the amplitude of the motion",
-    "noise against rate": "whether the noise grows or shrinks with the rate of the motion",
-    "noise in bursts": "whether the noise comes in bursts",
-    "noise level": "whether the noise is above the level that the campaign states",
-}
-"""What each test of a gap looks at."""
 FAMILY = "DejaVu Sans"
 """matplotlib places the text of a figure by the widths of this font, which it ships."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -118,72 +92,62 @@ def render_report(
 
     With ``summary`` the page is limited to one printed page.
     """
-    (answer, kind), hidden = headline(document), hidden_table(document)
-    provenance = document.get("provenance") or {}
-    alarms = significant(document["gap"]["false_alarm_rate"], 2)
-    schema = ("schema of the document", document["schema_version"])
+    from markupsafe import Markup
+
+    byline, (answer, kind) = byline or Byline(), headline(document)
+    if summary:
+        drawings = summary_figures(document)
+        page = _page(drawings, {}, ["style.css", "summary.css"], "summary.js")
+    else:
+        page = _page(diagnosis_figures(document), fit_charts(document) | charts(document))
+    drawn, parts = page.pop("drawn"), {}
+    for section in sections(document, campaign):
+        blocks = section.blocks
+        if summary and section.key == "fit":
+            blocks = tuple(_summary_fit(drawn))
+        if section.key == "patch" and byline.patch and section.blocks:
+            blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
+        if summary:
+            blocks = tuple(block for block in blocks if not isinstance(block, Detail))
+        if html := as_html(blocks, drawn, titled=True):
+            parts[section.key] = {"title": section.title, "html": Markup(html), "opened": section.opened}
     context = {
         "document": document,
         "campaign": campaign,
-        "byline": byline or Byline(),
+        "byline": byline,
         "answer": answer,
         "kind": kind,
-        "verdict": view.typeset(str(document["verdict"])),
         "summary": summary,
-        "named": kind in ("open", "found"),
-        "facts": view.facts(document),
-        "found": view.causes_found(document),
-        "set_out": set_out(document),
-        "coefficients": view.coefficient_rows(document),
-        "coefficients_line": coefficients_line(document),
-        "symbols": symbol_rows(document),
-        "trade_off": trade_off_line(document, COEFFICIENTS),
-        "next_steps": next_steps(document),
-        "place": view.place_rows(document),
-        "lines": view.line_rows(document),
-        "candidates": view.candidate_rows(document),
-        "more": other_answers(document),
-        "causes": view.cause_paragraphs(document),
-        "inclusion": plain(inclusion_line(document)),
-        "repeats": repeats(document),
-        "repeatability": repeatability_line(document),
-        "repeatability_table": repeatability_table(document),
-        "steps": view.step_rows(document),
-        "closable": closable_table(document).rows,
-        "closable_words": closable_line(document),
-        "patch": patch_table(document),
-        "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
-        "rivals": [plain(name) for name in document["ambiguous_with"]],
-        "next_run": view.next_run_rows(document),
-        "runs": view.run_rows(document, campaign),
-        "windy": any(run.wind_on for run in campaign.runs),
-        "budget": budget(document),
-        "hidden": hidden,
-        "hidden_heads": [
-            head[:1].upper() + head[1:] + "#" * (head in hidden.right) for head in hidden.columns
-        ],
-        "tests": test_rows(document),
-        "false_alarms": f"{alarms} of the campaigns without a gap",
-        "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
-        "noise": noise_rows(document),
-        "versions": [*provenance.get("versions", {}).items(), schema],
-        "hashes": list(provenance.get("sha256", {}).items()),
+        "key_figures": key_figures(document),
+        "parts": parts,
+        "details": {key: part for key, part in parts.items() if key not in _OPEN},
     }
-    if summary:
-        parts = _parts(summary_figures(document), {}, ["style.css", "summary.css"], "summary.js")
-    else:
-        parts = _parts(diagnosis_figures(document), fit_charts(document) | charts(document))
-    return _rendered("page.html.j2", context | parts)
+    return _rendered("page.html.j2", context | page)
+
+
+_OPEN = ("answer", "found", "place", "closes", "coefficients-section", "next", "fit")
+"""Sections above the detail."""
+
+
+def _summary_fit(drawn: Mapping[str, str]) -> Iterator[Block]:
+    """The figures of the fit in several heights, of which a script shows the one that fits the printed page."""
+    for name in (name for name in drawn if name.startswith("fit")):
+        near = "The cycles in which the models differ most."
+        whole = f"The whole record, and below it {near[0].lower()}{near[1:]}"
+        yield Figure(name, near if "near" in name else whole)
 
 
 def render_fit(document: Document) -> str:
     """The fit over the data as a separate HTML page; without a chart where the document has no ``maps``."""
-    drawn = fit_figure(document)
-    parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
-    return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
+    from markupsafe import Markup
+
+    drawing = fit_figure(document)
+    page = _page({} if drawing is None else {"fit": drawing}, fit_charts(document))
+    fit = Markup(as_html((captioned("fit"),), page.pop("drawn")))
+    return _rendered("fit.html.j2", {"campaign": document["campaign"], "fit": fit} | page)
 
 
-def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
+def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Drawing:
     """One figure of the report.
 
     Args:
@@ -221,6 +185,7 @@ def _rendered(name: str, context: dict[str, Any]) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         loader=FunctionLoader(_resource),
     )  # fmt: skip
+    environment.filters["typeset"] = typeset
     return environment.get_template(name).render(context)
 
 
@@ -228,81 +193,30 @@ def _resource(name: str) -> str:
     return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
 
 
-def _parts(
-    drawn: Mapping[str, Figure],
+def _page(
+    drawings: Mapping[str, Drawing],
     shown: dict[str, list[Chart]],
     sheets: Sequence[str] = ("vendor/uPlot.min.css", "style.css"),
     script: str = "page.js",
 ) -> dict[str, Any]:
-    """Figures, styles and scripts: text included in the page unchanged."""
+    """The figures as HTML, styles and scripts: text included in the page unchanged."""
     from markupsafe import Markup
 
-    figures = {}
-    for name, figure in drawn.items():
+    drawn = {}
+    for name, figure in drawings.items():
         # A figure in another height, such as ``fit-near-1``, has the text of the first. The SVG is already escaped.
         text = DESCRIPTIONS.get(name) or DESCRIPTIONS[name.partition("-")[0]]
-        figures[name] = Markup(inline_svg(figure, name, text))
-    font = font_face(shown_text("".join(figures.values())))
+        chart = '<div class="charts"></div>' if name in shown else ""
+        drawn[name] = f'{chart}<div class="drawn" tabindex="0">{inline_svg(figure, name, text)}</div>'
+    font = font_face(shown_text("".join(drawn.values())))
     return {
-        "figures": figures,
+        "drawn": drawn,
         "style": Markup("\n".join([font, *map(_resource, sheets)])),
         "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
         "library": Markup(_resource("vendor/uPlot.iife.min.js")),
         "script": Markup(_resource(script)),
         "charts": shown,
     }
-
-
-def test_rows(document: Document) -> list[tuple[str, str, str]]:
-    """The tests of the gap: name, tested property, and p-value."""
-    tests = document["gap"]["tests"].items()
-    return [(name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests]
-
-
-def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
-    """The uncertainty budget of the coefficients of the answer; no rows where the document has no shares.
-
-    Returns:
-        Headings, and a row for each source: its standard deviation and its share of the variance, by coefficient.
-    """
-    heads: list[str] = []
-    columns = [[*SOURCES.values(), "combined standard deviation"]]
-    for name, given in document["coefficients"]["after"].items():
-        std, shares = given["std"], given.get("shares")
-        if std is None or not shares:
-            continue
-        heads.append(f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]")
-        cells = []
-        for share in (shares.get(source, 0.0) for source in SOURCES):
-            shown = f"{significant(std * math.sqrt(share), 2)} ({100.0 * share:.1f} %)"
-            cells.append("–" if share < 5e-4 else shown)
-        columns.append([*cells, significant(std, 2)])
-    return heads, list(zip(*columns, strict=True)) if heads else []
-
-
-def noise_rows(document: Document) -> list[tuple[str, str]]:
-    """The reference noise of the gap, and the model behind the excesses."""
-    noise, confirmation = document["noise"], document["confirmation"]
-    stated, unit = noise["stated_std"], unit_of(document)
-    rows = [
-        ("Noise of one sample", f"{reading_shown(noise['std'], 4, unit)} ({noise['source']})"),
-        ("Stated", "–" if stated is None else reading_shown(stated, 4, unit)),
-        ("Why this one", str(noise["reason"])),
-    ]
-    if confirmation["failure"]:
-        model = f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}"
-        return [*rows, ("Excesses computed by", model)]
-    apart, rms, allowed = (
-        view.typeset(reading_shown(confirmation[name], 2, unit))
-        for name in ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
-    )
-    apart, rms = f"{apart} at most", f"{rms} root mean square in {confirmation['run']}"
-    beside = f"{'within' if confirmation['agrees'] else 'beyond'} {allowed}"
-    return [
-        *rows,
-        ("Excesses computed by", "the MuJoCo model"),
-        ("Difference of the integrator used for fitting", f"{apart}; {rms}, {beside}"),
-    ]
 
 
 def font_face(characters: str) -> str:

@@ -170,7 +170,7 @@ def spectrum_figure(document: Document) -> Figure:
         after = np.maximum((array(values["after"]) + 1.0)[known], _LEAST_POWER)
         axes.plot(centre, after, color=AFTER, lw=1.2, label="with the causes")
     axes.set(xscale="log", yscale="log", xlim=(edges[0], edges[-1]), ylabel="residual power over noise")
-    axes.set_xlabel("frequency [Hz]; dark bar: the runs' own frequencies")
+    axes.set_xlabel("frequency [Hz]; dark bar: the natural frequencies of the runs")
     axes.legend(loc="upper right")
     grid(axes)
     return fig

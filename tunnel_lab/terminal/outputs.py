@@ -1,4 +1,4 @@
-"""Output of commands: lines, progress, and tables of estimates, imports and budgets with units and deviations."""
+"""Output of commands: blocks and lines, progress, and the tables of imports and budgets."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import io
 import re
 import shlex
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from html import escape
 from math import sqrt
 from pathlib import Path
@@ -19,30 +20,25 @@ from typing import TYPE_CHECKING, Any
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as RichTable
 from rich.text import Text
 
 from identification import printing
-from identification.printing import SYMBOLS, TextTable, concise, in_stds, significant, unit, with_std
+from identification.blocks import Block, Paragraph, Table, brief, lines
+from identification.printing import SYMBOLS, in_stds, significant, unit, with_std
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
 from tunnel_lab.terminal.time_left import Reached
-from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
     from rich.table import Column
 
-    from identification.estimate import Estimate, Quantity, RunEstimate, Status
+    from identification.estimate import Estimate, Quantity
     from tunnel_sim.files.importing.records import Imported
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-BRACKETS = (
-    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
-    "tunnel diagnose adds what the model may miss."
-)
-"""Printed once below tables in the short notation."""
 PROSE = 30
 """Columns: a longer cell is a sentence, which may be wrapped."""
 _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
@@ -77,13 +73,27 @@ def say_written(*paths: Path | None) -> None:
         say(f"Written: {path}")
 
 
-def show_tables(*tables: Table) -> None:
+def show(blocks: Iterable[Block]) -> None:
+    """Print blocks without figures and details; an empty line parts tables from the lines above."""
+    after_line = False
+    for block in brief(blocks):
+        if isinstance(block, Table):
+            if after_line:
+                say("")
+            show_tables(block)
+        for line in lines(block):
+            say(line)
+        after_line = not isinstance(block, Table)
+
+
+def show_tables(*tables: Table | RichTable) -> None:
     """Print tables that have rows, each followed by an empty line, in the format of ``--format``.
 
     A table of text that is wider than the terminal is printed row by row.
     """
     out = console()
-    for table in tables:
+    for given in tables:
+        table = rich_table(given) if isinstance(given, Table) else given
         if not table.row_count:
             continue
         if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
@@ -98,7 +108,7 @@ def show_tables(*tables: Table) -> None:
             out.print()
 
 
-def rendered(table: Table, kind: TableFormat) -> str:
+def rendered(table: RichTable, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
     plain = text_table(table)
     title, heads, rows = plain.title, list(plain.columns), plain.rows
@@ -125,16 +135,6 @@ def rendered(table: Table, kind: TableFormat) -> str:
     return stream.getvalue()
 
 
-def text_table(table: Table) -> TextTable:
-    """A table of texts without its style, each cell on one line."""
-    heads = tuple(_plain(column.header) for column in table.columns)
-    rows = tuple(zip(*(map(_plain, column.cells) for column in table.columns), strict=True))
-    right = tuple(
-        head for head, column in zip(heads, table.columns, strict=True) if column.justify == "right"
-    )
-    return TextTable(_plain(table.title or ""), heads, rows, right)
-
-
 def _as_markdown(text: str) -> str:
     """Text of a cell without HTML, links and ends of cells."""
     marked = escape(text.replace("\\", "\\\\"), quote=False)
@@ -145,9 +145,9 @@ def _plain(cell: object) -> str:
     return " ".join(str(cell).split())
 
 
-def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
+def table(title: str, *columns: str, right: Sequence[str] = ()) -> RichTable:
     """An empty table in the common style: headings have units, those of ``right`` align to the right."""
-    result = Table(
+    result = RichTable(
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
     )
     for column in columns:
@@ -156,93 +156,50 @@ def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
     return result
 
 
-def rich_table(plain: TextTable) -> Table:
-    """A plain table in the house's style."""
+def rich_table(given: Table) -> RichTable:
+    """A table without its details, in the common style."""
+    plain = given.without_detail()
     result = table(plain.title, *plain.columns, right=plain.right)
+    for column in result.columns:
+        column.no_wrap = str(column.header) in plain.names  # for copying
     for row in plain.rows:
-        result.add_row(*map(Text, row))
+        result.add_row(*map(Text, row), end_section=plain.ruled)
     return result
 
 
-def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
-    """Estimates beside the injected values.
+def block_table(table: RichTable) -> Table:
+    """A table of a terminal as a block, for pages."""
+    heads = tuple(_plain(column.header) for column in table.columns)
+    rows = zip(*((_plain(cell) for cell in column.cells) for column in table.columns), strict=True)
+    right = [column.justify == "right" for column in table.columns]
+    numbers = tuple(head for head, is_number in zip(heads, right, strict=True) if is_number)
+    return Table(_plain(table.title or ""), heads, tuple(rows), numbers)
+
+
+def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> Table:
+    """An estimate beside the injected values.
 
     Args:
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
     """
     from identification.estimate import UNITS
 
-    result = table(
-        "Estimates against the injected truth",
-        *("quantity", "truth", "estimate ± std", "error", "error/std"),
-        right=("truth", "error", "error/std"),
-    )
-    for estimate in estimates:
-        if result.row_count:
-            result.add_section()
-        result.add_row(Text(estimate.estimator, style="bold"))
-        for name, value in truth.items():
-            row = (Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"), significant(value))
-            quantity: Quantity | None = getattr(estimate, name)
-            if quantity is None:
-                result.add_row(*row, _status(estimate.status))
-                continue
-            error = quantity.value - value
-            relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
-            stds = in_stds(error, quantity.std)
-            result.add_row(*row, with_std(quantity.value, quantity.std), relative, stds)
-    return result
+    rows = []
+    for name, value in truth.items():
+        cells = (f"{SYMBOLS[name]} {unit(UNITS[name])}", significant(value))
+        quantity: Quantity | None = getattr(estimate, name)
+        if quantity is None:
+            rows.append((*cells, estimate.status.name.lower().replace("_", " "), "", ""))
+            continue
+        error = quantity.value - value
+        relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
+        rows.append((*cells, with_std(quantity.value, quantity.std), relative, in_stds(error, quantity.std)))
+    heads = ("quantity", "truth", "estimate ± std", "error", "error/std")
+    right = ("truth", "error", "error/std")
+    return Table(f"{estimate.estimator} against the injected truth", heads, tuple(rows), right)
 
 
-def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
-    """Natural frequency and damping ratio of every run."""
-    result = table(
-        f"Runs of {campaign.name}",
-        *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
-        right=("Kr\n[N m/rad]", "V\n[m/s]"),
-    )
-    for run, estimated in zip(campaign.runs, estimate.runs, strict=True):
-        result.add_row(
-            Text(run.id),
-            "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
-            f"{run.wind_speed:g}",
-            _concise(estimated.omega_n),
-            _concise(estimated.zeta),
-            _status(estimated.status),
-        )
-    return result
-
-
-def windows_table(run: RunEstimate) -> Table:
-    """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
-    cycles = run.windows[0].cycles if run.windows else 0
-    result = table(
-        f"{run.id}: windows of {counted(cycles, 'cycle')}",
-        *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
-        right=("from [s]", "to [s]"),
-    )
-    for window in run.windows:
-        result.add_row(
-            f"{window.start_s:.2f}",
-            f"{window.start_s + window.duration_s:.2f}",
-            _concise(window.amplitude),
-            _concise(window.zeta),
-            _concise(window.omega_n),
-        )
-    return result
-
-
-def _concise(quantity: Quantity | None) -> str:
-    """A quantity without its unit, which is in the heading."""
-    return "–" if quantity is None else concise(quantity.value, quantity.std)
-
-
-def _status(status: Status) -> str:
-    """A status in a few words; its remedy is printed below the table."""
-    return status.name.lower().replace("_", " ")
-
-
-def is_too_wide(table: Table, width: int) -> bool:
+def is_too_wide(table: RichTable, width: int) -> bool:
     """Whether cells other than sentences, or words of a heading, would be broken at this width."""
     needed = sum(_least_width(column) + _PADDING for column in table.columns)
     return needed + _BETWEEN * (len(table.columns) - 1) > width
@@ -256,7 +213,7 @@ def _least_width(column: Column) -> int:
     return max(widths, default=0)
 
 
-def stacked(table: Table, width: int) -> str:
+def stacked(table: RichTable, width: int) -> str:
     """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
 
     Sentences are wrapped to the width of the terminal; words are never broken.
@@ -293,20 +250,26 @@ def show_estimate(
         source: the path of the campaign, for commands to copy; None: there is no path.
     """
     document = estimate.to_json_dict()
-    show_tables(rich_table(printing.coefficients_table(document)), runs_table(campaign, estimate))
-    if windows:
-        show_tables(*map(windows_table, estimate.runs))
-    say(BRACKETS)
-    for line in printing.repeatability_lines(document):
-        say(line)
-    if line := printing.trade_off_line(document, SYMBOLS):
-        say(line)
-    command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
-    for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
-        say(f"Note: {line.replace(DIAGNOSE, command)}")
+    conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign.runs}
+    coefficients, runs, *notes = printing.estimate_blocks(document, conditions)
+    of_windows = map(printing.windows_table, document["runs"]) if windows else ()
+    command = DIAGNOSE if source is None else f"run tunnel diagnose {shlex.quote(str(source))}"
+    show(
+        (
+            coefficients,
+            runs,
+            *of_windows,
+            *(
+                replace(note, text=note.text.replace(DIAGNOSE, command))
+                if isinstance(note, Paragraph)
+                else note
+                for note in notes
+            ),
+        )
+    )
 
 
-def parts_table(imported: Imported) -> TextTable:
+def parts_table(imported: Imported) -> Table:
     """The runs of an import: samples, rate, begin and end, swing, conditions, and the file where several."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
     used = [part.run for part in imported.parts if part.run is not None]
@@ -328,10 +291,10 @@ def parts_table(imported: Imported) -> TextTable:
                 "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             ]
         rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
-    return TextTable("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
+    return Table("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
 
 
-def budget_table(budget: Document) -> TextTable:
+def budget_table(budget: Document) -> Table:
     """Standard uncertainties, a row for each source and one for all of them, in the quantities' units.
 
     A negative value is the reduction by a correlation.
@@ -351,7 +314,7 @@ def budget_table(budget: Document) -> TextTable:
         rows.append((component["name"], *cells))
     rows.append(("all together", *(significant(budget["combined_std"][name], 2) for name in names)))
     title = "Uncertainty budget: one standard uncertainty each"
-    return TextTable(title, ("source", *headings), tuple(rows), right=headings)
+    return Table(title, ("source", *headings), tuple(rows), right=headings)
 
 
 def budget_lines(budget: Document) -> list[str]:
@@ -359,15 +322,15 @@ def budget_lines(budget: Document) -> list[str]:
     from identification.estimate import UNITS
 
     components = budget["components"]
-    lines = []
+    said = []
     for name in (name for name in UNITS if name in budget["combined_std"]):
         variances = [float(component["variance"][name]) for component in components]
         largest, total = max(variances), sum(variances)
         share = largest / total if total > 0.0 else 0.0
         verb = "dominates" if share > _DOMINANT else "is the largest source"
         source = components[variances.index(largest)]["name"]
-        lines.append(f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance")
-    return [*lines, *(f"{part['name']}: {part['note']}" for part in components if part["note"])]
+        said.append(f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance")
+    return [*said, *(f"{part['name']}: {part['note']}" for part in components if part["note"])]
 
 
 @contextmanager

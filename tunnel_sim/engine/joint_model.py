@@ -287,7 +287,9 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
         terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
     if terms is None:
         what = "its restoring moment is not that of gravity and of springs up to the third power"
-        raise TunnelError(what, remedy="write tendons, dead bands and actuators as the joint's own stiffness")
+        raise TunnelError(
+            what, remedy="write tendons, dead bands and actuators as the stiffness of the joint"
+        )
     stiffness = terms.pop("b", 0.0)
     own, centre = int(model.dof_frictionloss[0] > 0.0), rest if middle is None else middle
     for x in np.linspace(centre - reach, centre + reach, _GRID // 4):  # nothing else may act within the reach
@@ -316,7 +318,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
     elsewhere = engine.moment(rest + 0.1) - engine.moment(rest + 0.1, rates[-1])
     if damping is None or abs(elsewhere - lost[-1]) > _EXACT * scale:
         raise TunnelError(
-            "it has losses other than the joint's own damping and frictionloss, such as a fluid's",
+            "it has losses other than the joint's damping and frictionloss, such as a fluid's",
             remedy="write them as damping, or leave them out: the diagnosis looks for them",
         )
     linear = damping.pop("r", 0.0)

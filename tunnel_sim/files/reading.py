@@ -156,7 +156,7 @@ def check_lines(content: bytes, where: str, remedy: str) -> None:
         end = content.rfind(b"\n", start, start + limits.LINE_BYTES + 1)
         if end < 0:
             what = f"{_line(content, start)} is longer than {limits.LINE_BYTES:,} bytes"
-            remedy = "give every sample a line of its own"
+            remedy = "write one sample on each line"
             raise TunnelError(what, where=where, remedy=remedy)
         start = end + 1
 

@@ -259,7 +259,7 @@ def _divided(run: RunSettings, number: float) -> RunSettings:
 
 def _too_fast(run: RunSettings, body: float, rod: float) -> TunnelError:
     by_rod = rod / ROD_TURN > body / BODY_TURN
-    what, rate = ("the rod's own oscillation", rod) if by_rod else ("the body's motion on its spring", body)
+    what, rate = ("the oscillation of the rod", rod) if by_rod else ("the body's motion on its spring", body)
     remedy = "give a larger compliance (0 for a rigid rod) or an inertia_share further from 0 and 1"
     if not by_rod:
         remedy = "check spring_stiffness (N m/rad), yaw_inertia (kg m2) and damping"

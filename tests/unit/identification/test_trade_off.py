@@ -109,7 +109,7 @@ def test_an_estimate_names_the_damping_of_two_near_wind_speeds_and_not_once_its_
     assert line.startswith("What trades off: Cn")
     shown = line.partition("(correlation ")[2].partition(")")[0]
     assert float(shown.replace("−", "-")) == pytest.approx(near.trade_off.correlation, abs=0.005)
-    assert line.endswith("add runs with the wind off or at another wind speed")
+    assert line.endswith("add runs with the wind off or at another wind speed.")
     assert line in str(near).replace("\n", " ")
     assert Estimate.from_json_dict(json.loads(json.dumps(document))) == near
 

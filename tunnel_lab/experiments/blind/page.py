@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.printing import TextTable
+from identification.blocks import Block, Paragraph, Table
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
-from tunnel_lab.terminal.outputs import rich_table
 from tunnel_sim.vocabulary.errors import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
-    from rich.table import Table
 
     from identification.statistics import Proportion
     from tunnel_lab.experiments.blind import Score
@@ -46,7 +44,7 @@ _DARK = 0.55  # share of the colour above which white text is legible
 
 
 @dataclass(frozen=True)
-class ScoreSection(TextTable):
+class ScoreSection(Table):
     """A table with a line below it.
 
     Args:
@@ -64,7 +62,7 @@ def sections(score: Score) -> list[ScoreSection]:
 def _section(
     title: str, headings: tuple[str, ...], rows: Iterable[tuple[str, ...]], note: str = ""
 ) -> ScoreSection:
-    return ScoreSection(title, headings, tuple(rows), headings[1:-1], note)
+    return ScoreSection(title, headings, tuple(rows), headings[1:-1], note=note)
 
 
 def _answer_sections(score: Score) -> list[ScoreSection]:
@@ -232,9 +230,9 @@ def _other_sections(score: Score) -> list[ScoreSection]:
 
 def blind_view(score: Score) -> View:
     """The view of a score, each table with its note."""
-    parts: list[Table | str] = [*origin_lines(score), ""]
+    parts: list[Block] = [Paragraph(line) for line in origin_lines(score)]
     for section in sections(score):
-        parts += [rich_table(section), *([section.note + "\n"] if section.note else [])]
+        parts += [section, Paragraph(section.note)]
     return View("Blind check", parts)
 
 

@@ -150,7 +150,7 @@ def read_records(
         said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
     if campaign.sensor.zero is not None:
         said.append(
-            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
+            "the runs' stated rests differ: a separate zero is fitted to every run (zero = 'per_run')"
         )
     said += [] if table is None else table.said
     if table is not None and table.ignored:

@@ -13,7 +13,9 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
-from diagnosis.words.tables import diagnosis_parts, hidden_line, hidden_table
+from diagnosis.words.lines import hidden_line
+from diagnosis.words.sections import printed
+from diagnosis.words.tables import hidden_table
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import CN_R, NOISE, campaign, nominal, precise, studied
 from tests.unit.diagnosis.noise.test_colour import colour, with_zero
@@ -107,7 +109,7 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     (row,) = hidden_table(given).rows
     assert row[0] == "unsteady aero lag"
     assert "0.0061" in row[-1]
-    assert any(line in str(part) for part in diagnosis_parts(given))
+    assert any(line in str(block) for block in printed(given))
     assert hidden_line(given | {"hidden": []}) == ""
 
 

@@ -6,15 +6,10 @@ from typing import Any
 
 import pytest
 
+from diagnosis.words.lines import diagnosis_brief, inclusion_line
 from diagnosis.words.remainder import closable_words
 from diagnosis.words.scatter import repeatability_line, repeatability_table, scatter_words, width_text
-from diagnosis.words.tables import (
-    candidates_table,
-    diagnosis_brief,
-    inclusion_line,
-    parameters_table,
-    waterfall_table,
-)
+from diagnosis.words.tables import candidates_table, parameters_table, waterfall_table
 from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
 from diagnosis.words.where import where_words
 from tests.support.diagnosis_document import CAUSE, scattering_document
@@ -163,7 +158,7 @@ def test_tables_state_widths_in_per_cent(given: Document) -> None:
     assert candidates_table(given).rows[0][0] == "quadratic_damping +\nscatter between runs"
     assert waterfall_table(given).rows[1][0] == "scatter between runs"
     given["inclusion"] |= {"wind_speed_scatter": 0.99, CAUSE: 0.93}
-    assert inclusion_line(given).endswith("wind_speed_scatter 99 %")
+    assert inclusion_line(given).endswith("wind speed scatter 99 %.")
     assert width_text({"width": 0.003, "interval": [0.003, 0.003]}) == "0.30 %"
 
 
@@ -178,11 +173,11 @@ def test_every_run_is_listed_against_the_model(given: Document) -> None:
     )
     frequency = (1.5e-4**2 + 3.9e-4**2 + 0.0013**2) / 3
     assert f"frequency ± {100 * frequency**0.5:.2g} %" in repeatability_line(given)
-    assert repeatability_line(given).endswith("; beyond it: beta")
+    assert repeatability_line(given).endswith("; beyond it: beta.")
     given["repeatability"]["spreads"] = []
     assert (
         repeatability_line(given)
-        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
+        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows."
     )
     assert not repeatability_table(given).rows
     given["repeatability"] = None
@@ -196,6 +191,6 @@ def test_what_could_be_closed_of_an_undecided_gap_is_beyond_the_scatter(given: D
         "kind": "angle", "words": "", "events": [], "curve": None, "law": None, "alike": [], "next_most": None,
         "line": None,
     }  # fmt: skip
-    assert "% of what the causes leave could be closed" in closable_words(given)
+    assert "% of the residual gap could be explained" in closable_words(given)
     given["decided"] = False
-    assert "% of the gap beyond the scatter between runs could be closed" in closable_words(given)
+    assert "% of the gap beyond the scatter between runs could be explained" in closable_words(given)

@@ -12,7 +12,7 @@ from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, Par
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
 from diagnosis.words.numbers import KINDS
-from diagnosis.words.remainder import closable_words, rest_line, rest_words
+from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.tables import closable_table
 from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
@@ -68,21 +68,19 @@ def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document
     text = placed(given, compared=["coulomb_friction", "gravity_stiffness", "quadratic_damping"], agrees=True)
     assert text.endswith(
         "Of the causes coulomb friction and quadratic damping act there, and gravity stiffness acts on the "
-        "restoring moment (stiffness)."
+        "restoring moment."
     )
     assert "does not agree" not in text
     text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)
     assert text.endswith(
         "That does not agree with cubic stiffness and sensor drift: cubic stiffness acts on the restoring moment "
-        "(stiffness) and sensor drift acts on the reading of the sensor."
+        "and sensor drift acts on the sensor reading."
     )
 
 
 def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
     text = placed(given, compared=["cubic_stiffness"], agrees=False)
-    assert text.endswith(
-        "That does not agree with cubic stiffness: it acts on the restoring moment (stiffness)."
-    )
+    assert text.endswith("That does not agree with cubic stiffness: it acts on the restoring moment.")
     assert placed(given, compared=[]).endswith("show it too.")
     given["where"] |= {"channel": None, "condition": None}
     text = placed(
@@ -200,28 +198,26 @@ def test_the_note_on_the_coefficients(given: Document) -> None:
 
 def test_what_remains(given: Document) -> None:
     assert rest_words(given) == (
-        "Explained; what remains (0.00946° root mean square) moves Cnβ by less than 0.28 % and Cnr by less than "
+        "Explained; the residual (0.00946° root mean square) changes Cnβ by less than 0.28 % and Cnr by less than "
         "4.6 %."
     )
     rest = given["rest"]
     large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
     assert rest_words(large).startswith(
-        "Not all is explained: what remains (0.544° root mean square, 21 times the noise) moves Cnβ by less than"
+        "Not all is explained: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less than"
     )
-    assert rest_words(given | {"causes": ["unknown"]}).startswith("It hardly matters: it moves Cnβ by")
+    assert rest_words(given | {"causes": ["unknown"]}).startswith("It is immaterial: it changes Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
     assert rest_words(calm) == (
-        "Explained; what remains is within the noise. Sensor drift is significant beside it and too small to be "
+        "Explained; the residual is within the noise. Sensor drift is significant beside it and too small to be "
         "named."
     )
     rest["moves"]["cn_r"]["material"] = True
     assert rest_words(given).startswith(
-        "Not all is explained: what remains (0.00946° root mean square) could move Cnr by 0."
+        "Not all is explained: the residual (0.00946° root mean square) could change Cnr by 0."
     )
     assert rest_words(given | {"rest": None}) == ""
-    assert rest_line(given | {"rest": None}) == ""
-    assert rest_line(given | {"rest": rest | {"words": "Explained."}}) == "Explained."
 
 
 CEILINGS = [
@@ -238,17 +234,15 @@ def test_what_could_be_closed(given: Document) -> None:
     def text(**changes: Any) -> str:
         return closable_words(given | {"closable": CLOSABLE | changes})
 
-    first = (
-        "85.0 ± 2.0 % of what the causes leave could be closed by a moment of the angle alone, measured on"
-    )
+    first = "85.0 ± 2.0 % of the residual gap could be explained by a moment of the angle alone, measured on"
     assert text().startswith(first)
-    assert text().endswith("No other kind measured on runs would close more than 31.0 %.")
+    assert text().endswith("No other kind measured on runs would explain more than 31.0 %.")
     larger = [*CEILINGS[:2], CEILINGS[2] | {"closed": 0.97, "std": 0.01}]
     said_both = text(ceilings=larger)
     assert said_both.startswith(first)
     assert said_both.endswith(
-        "A moment in time of each run's own would close 97.0 ± 1.0 %, measured on short gaps. One law of all runs "
-        "is named before it from four fifths of that share on, since it can be a property of the rig."
+        "A moment in time of each run would explain 97.0 ± 1.0 %, measured on short gaps. A law "
+        "common to all runs is preferred from four fifths of that share on, since it can be a property of the rig."
     )
     table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})
     assert "at most" not in table.title
@@ -258,7 +252,7 @@ def test_what_could_be_closed(given: Document) -> None:
     values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}
     law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
     assert text(law=law).endswith(
-        "The formula k*b^n closes 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
+        "The formula k*b^n explains 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
     )
     flat = law | {
         "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
@@ -282,10 +276,10 @@ def test_what_could_be_closed(given: Document) -> None:
     }  # fmt: skip
     assert "The line is at 7.2000 ± 0.0011 Hz, with an amplitude of 0.01375 ± 0.00057°" in text(line=line)
     assert text(kind="noise").startswith(
-        "No more than 89.0 % of what the causes leave could be closed by any smooth"
+        "A smooth moment or error of the reading could explain no more than 89.0 % of the residual gap:"
     )
     given["decided"] = False
-    assert " of the gap could be closed by" in text()
+    assert " of the gap could be explained by" in text()
     assert closable_words(given | {"closable": None}) == ""
 
 

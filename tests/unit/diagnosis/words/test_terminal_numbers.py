@@ -12,25 +12,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rich.table import Table
 
 from diagnosis.words import tables
+from diagnosis.words.lines import coefficients_line, hidden_line, inclusion_line, model_line, noise_line
 from diagnosis.words.numbers import probability, share
+from diagnosis.words.sections import printed
 from diagnosis.words.tables import (
     candidates_table,
-    closing_lines,
-    coefficients_line,
-    diagnosis_parts,
-    gap_table,
-    hidden_line,
     hidden_table,
-    inclusion_line,
     parameters_table,
+    runs_table,
     waterfall_table,
 )
 from diagnosis.words.verdict import rival_lines, run_words
+from identification.blocks import Paragraph, Table
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
-from identification.printing import TextTable, coefficients_table, status_lines
+from identification.printing import coefficients_table, status_lines, windows_table
+from identification.printing import runs_table as estimated_runs
 from identification.status import Status
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.support.shown_numbers import assert_shows
@@ -46,9 +44,9 @@ def given() -> Document:
     return copy.deepcopy(document())
 
 
-def rows(table: Table | TextTable) -> list[list[str]]:
-    """The cells of a table, units and brackets of units left out."""
-    plain = outputs.rich_table(table) if isinstance(table, TextTable) else table
+def rows(table: Table) -> list[list[str]]:
+    """The cells of a table in a terminal, units and brackets of units left out."""
+    plain = outputs.rich_table(table)
     columns = [[str(cell) for cell in column.cells] for column in plain.columns]
     return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
 
@@ -86,13 +84,15 @@ def test_parameters_of_the_answer(given: Document) -> None:
         "a.x": {"value": 0.25, "std": 0.01, "unit": "1"},
         "a.y": {"value": 2.5, "std": None, "unit": "1", "bound": "upper"},
         "b.x": {"value": 0.0, "std": None, "unit": "1", "determined": False},
+        "b.y": {"value": 21.0217, "std": 0.0, "unit": "N m/rad"},
     }
     found = rows(parameters_table(given))
-    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
+    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"], ["", "y"]]
     assert [row[2] for row in found] == [
         "0.250 ± 0.010",
         "2.500 (at its upper bound)",
         "not determined by these runs",
+        "21.02  (fixed)",
     ]
     given["candidates"] = given["candidates"][-2:]
     given["candidates"][0]["parameters"] = {}
@@ -101,8 +101,8 @@ def test_parameters_of_the_answer(given: Document) -> None:
 
 def test_effects_among_the_causes(given: Document) -> None:
     line = inclusion_line(given)
-    assert line.endswith(": quadratic_damping 93 %, coulomb_friction 7 %")
-    assert line.index("quadratic_damping") < line.index("coulomb_friction")
+    assert line.endswith(": quadratic damping 93 %, coulomb friction 7 %.")
+    assert line.index("quadratic damping") < line.index("coulomb friction")
     assert inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
 
 
@@ -146,7 +146,7 @@ def test_answers_that_have_no_probability_are_counted_with_theirs(given: Documen
 
 def test_the_gap(given: Document) -> None:
     gap = given["gap"]
-    whole, *runs = rows(gap_table(given))
+    whole, *runs = rows(runs_table(given))
     assert_shows(whole[1], both(gap["excess_before"]))
     assert_shows(whole[2], both(gap["excess_after"]))
     for cells, run in zip(runs, gap["runs"], strict=True):
@@ -154,14 +154,14 @@ def test_the_gap(given: Document) -> None:
         assert_shows(cells[1], both(run["before"]))
         assert_shows(cells[2], both(run["after"]))
     del gap["misfit"]  # a document of an earlier version
-    assert_shows(rows(gap_table(given))[0][1], [gap["excess_before"]])
+    assert_shows(rows(runs_table(given))[0][1], [gap["excess_before"]])
 
 
 def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
-    cells = rows(gap_table(given | {"causes": ["unknown"]}))
+    cells = rows(runs_table(given | {"causes": ["unknown"]}))
     assert [row[2] for row in cells] == ["–"] * 4
     given["gap"]["detected"] = False
-    assert rows(gap_table(given)) == []
+    assert rows(runs_table(given)) == []
 
 
 def test_coefficients(given: Document) -> None:
@@ -175,7 +175,7 @@ def test_coefficients(given: Document) -> None:
     before["cn_r"]["value"] = 0.0
     assert rows(tables.coefficients_table(given))[1][3] == "–"
     del after["cn_beta"]
-    assert len(rows(tables.coefficients_table(given))) == 1
+    assert rows(tables.coefficients_table(given))[0][2:] == ["–", "–"]
 
 
 @pytest.mark.parametrize(
@@ -210,13 +210,15 @@ def test_the_run_to_make(given: Document) -> None:
 
 
 def test_noise_and_confirmation(given: Document) -> None:
-    first, second = closing_lines(given)
-    assert_shows(first, [np.degrees(given["noise"]["std"]), given["noise"]["std"]])
-    assert_shows(second, [np.degrees(given["confirmation"]["largest_difference_rad"])])
+    assert_shows(noise_line(given), [np.degrees(given["noise"]["std"]), given["noise"]["std"]])
+    checked = given["confirmation"]
+    names = ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
+    assert_shows(model_line(given), [np.degrees(checked[name]) for name in names])
+    assert checked["run"] in model_line(given)
     given["gap"]["misfit"]["unit"] = "rad/s"
-    assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
+    assert "°/s (noise_std = 0.000412 rad/s)" in noise_line(given)
     given["confirmation"]["agrees"] = False
-    assert len(closing_lines(given)) == 1
+    assert model_line(given) == ""
 
 
 def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_separate_it(
@@ -229,11 +231,10 @@ def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_sep
     given["trade_off"] = {"parameters": names, "correlation": -0.976, "remedy": "drive it slower"}
     line = (
         "What trades off: damping and coulomb friction (friction moment) are poorly separable in these runs "
-        "(correlation −0.98): drive it slower"
+        "(correlation −0.98): drive it slower."
     )
-    assert line in diagnosis_parts(given)
-    assert line in closing_lines(given)
-    assert f"<p>{line}.</p>" in render_report(given, campaign())
+    assert Paragraph(line) in printed(given)
+    assert f"<p>{line}</p>" in render_report(given, campaign())
     assert "What trades off" not in render_report(given | {"trade_off": None}, campaign())
 
 
@@ -245,9 +246,9 @@ def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_tab
     assert line == (
         "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
         "other answers, by their probability. tunnel identify includes the noise, the scatter between runs and "
-        "what its own model misses, so that its ± may be far smaller or larger."
+        "what its model misses, so its ± may be far smaller or larger."
     )
-    assert line in [part for part in diagnosis_parts(given) if isinstance(part, str)]
+    assert Paragraph(line) in printed(given)
     assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
 
 
@@ -319,8 +320,9 @@ def test_coefficients_of_an_estimate() -> None:
 
 def test_errors_against_the_truth() -> None:
     found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
-    head, *cells = rows(outputs.truth_table([found], truth))
-    assert head[0] == "own"
+    table = outputs.truth_table(found, truth)
+    assert table.title.startswith("own")
+    cells = rows(table)
     for row, (name, value) in zip(cells, truth.items(), strict=True):
         own = getattr(found, name)
         error = own.value - value
@@ -333,8 +335,9 @@ def test_errors_against_the_truth() -> None:
 
 def test_runs_of_an_estimate() -> None:
     found = estimate()
+    conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign().runs}
     for cells, run, (spring, speed, *_) in zip(
-        rows(outputs.runs_table(campaign(), found)), found.runs, CONDITIONS, strict=True
+        rows(estimated_runs(found.to_json_dict(), conditions)), found.runs, CONDITIONS, strict=True
     ):
         assert cells[0] == run.id
         assert_shows(cells[1], [] if spring is None else [spring])
@@ -346,7 +349,7 @@ def test_runs_of_an_estimate() -> None:
 
 def test_windows_of_a_run() -> None:
     run = estimate().runs[0]
-    table = outputs.windows_table(run)
+    table = windows_table(run.to_json_dict())
     assert "3 cycles" in str(table.title)
     for cells, window in zip(rows(table), run.windows, strict=True):
         assert_shows(cells[0], [window.start_s])

@@ -16,13 +16,15 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import GapSummary, ParameterEstimate, RunGap
 from diagnosis.settings import Settings
+from diagnosis.words.cards import key_figures
 from diagnosis.words.causes import said_size
-from diagnosis.words.tables import candidates_table, diagnosis_brief, gap_table, parameters_table
+from diagnosis.words.lines import diagnosis_brief
+from diagnosis.words.tables import candidates_table, parameters_table, runs_table
 from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
+from identification.blocks import typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
-from tunnel_lab.report import view
 from tunnel_lab.report.page import render_report
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -93,8 +95,8 @@ def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
     given = document()
     given["gap"] |= found.to_json_dict()
     given["verdict"] = said("quadratic_damping", size=found)
-    words = view.typeset(given["verdict"])
-    before, _, closed, probability = view.facts(given | {"candidates": [{"probability": 0.9}]})
+    words = typeset(given["verdict"])
+    before, _, closed, probability = key_figures(given | {"candidates": [{"probability": 0.9}]})
     assert f"{before.value} root mean square, " in words
     assert before.note.split("; ")[1] in words
     assert "times the noise power" not in words
@@ -124,13 +126,13 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     given["gap"] |= {"closed_on": found.closed_on}
     for run in given["gap"]["runs"]:
         run["held_out"] = False
-    notes = [fact.note for fact in view.facts(given)]
+    notes = [fact.note for fact in key_figures(given)]
     assert notes.count(found.closed_on) == 1
     assert not any("on runs held out" in note for note in notes)
     page = render_report(given, campaign())
     assert "on runs held out" not in page
     assert "run held out" not in page
-    table = gap_table(given)
+    table = runs_table(given).without_detail()
     assert table.columns == ("run", "before", "after")
 
 
@@ -236,7 +238,7 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     assert headline(given)[0] == "Undecided: the damping, and more"
     given["common"]["effects"] = {"quadratic_damping": 0.93}
     assert headline(given)[0] == "Undecided: quadratic damping, and more"
-    labels = [fact.label for fact in view.facts(given)]
+    labels = [fact.label for fact in key_figures(given)]
     assert "With the most probable answer added" in labels
     assert "Probability of the most probable answer" in labels
     assert any("Do not repair" in step for step in next_steps(given))
@@ -254,11 +256,11 @@ def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is
     ).to_json_dict()
     listed = [row[:2] for row in candidates_table(given).rows[:2]]
     assert listed == [(most["effect"], "48 %"), (first["effect"], "33 %")]
-    assert [row["probability"] for row in view.candidate_rows(given)[:2]] == ["48 %", "33 %"]
+    assert [row[1] for row in candidates_table(given).rows[:2]] == ["48 %", "33 %"]
     called = "most probable set of effects"
     assert parameters_table(given).title.startswith(f"Parameters of the {called}")
     assert {f"With the {called} added", f"Probability of the {called}"} <= {
-        fact.label for fact in view.facts(given)
+        fact.label for fact in key_figures(given)
     }
     page = render_report(given, campaign())
     assert f"of the {called}</h2>" in page

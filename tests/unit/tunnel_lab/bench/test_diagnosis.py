@@ -16,7 +16,7 @@ from nicegui import Client, ui
 from starlette.requests import Request
 
 from diagnosis.words.verdict import next_steps, run_to_make
-from identification.printing import TextTable
+from identification.blocks import Table
 from tests.support.diagnosis_document import document
 from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work
@@ -100,7 +100,8 @@ def test_effects_are_words_on_the_page_and_runs_are_as_they_are_named(tmp_path: 
     (shown,) = [
         text
         for text in texts(
-            lambda *_: parts.show_parts([TextTable("", ("effect", "run"), rows)]), session(tmp_path)
+            lambda *_: parts.show_blocks([Table("", ("effect", "run"), rows, names=("effect",))]),
+            session(tmp_path),
         )
         if "table" in text
     ]

@@ -162,14 +162,14 @@ def test_a_diagnosis_survives_a_crash_is_paused_goes_on_and_is_stopped(browser: 
         one.click("Diagnose")
         one.page.wait_for_selector("button:has-text('Pause')", timeout=LONG_MS)
         one.click("Pause")
-        one.page.wait_for_selector("button:has-text('Go on')")
+        one.page.wait_for_selector("button:has-text('Continue')")
     assert work.work_of(log).paused
     with bench(folder) as served, tab(browser, served) as one:
         one.open("/dry/diagnose")
-        one.click("Go on")
+        one.click("Continue")
         one.page.wait_for_selector("button:has-text('Pause')")
         one.click("Stop")
-        one.page.wait_for_selector("text=a paused one goes on where it was")
+        one.page.wait_for_selector("text=a paused one continues where it was")
         assert not work.work_of(log).running
         one.click("Diagnose")
         one.page.wait_for_selector("a:has-text('Continue: Next run')", timeout=LONG_MS)

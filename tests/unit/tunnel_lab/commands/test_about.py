@@ -33,7 +33,7 @@ def test_the_doctor_finds_that_all_works(tunnel: Tunnel) -> None:
     installation, checks = ({row[head]: row for row in one["rows"] for head in list(row)[:1]}
                             for one in map(json.loads, out.splitlines()))  # fmt: skip
     assert (status, err) == (0, "")
-    assert installation["mujoco"]["found"].startswith("4.0")
+    assert installation["mujoco"]["version or state"].startswith("4.0")
     assert {f"extra {name}" for name in EXTRAS} < set(installation)
     assert checks["cn_beta"]["result"].endswith("standard deviations from the truth")
 

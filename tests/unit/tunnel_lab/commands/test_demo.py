@@ -95,10 +95,9 @@ def test_the_values_before_are_those_of_the_verdict(faulty: CampaignPlan) -> Non
     found = found_document()
     before = {"cn_beta": {"value": 0.4897, "std": 0.018, "unit": "1/rad"}}
     found["coefficients"]["before"] = before
-    heads = [str(column.header) for column in found_table(faulty, found).columns]
-    cells = [next(iter(column.cells)) for column in found_table(faulty, found).columns]
-    assert dict(zip(heads, map(str, cells), strict=True)) == {
-        "": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
+    table = found_table(faulty, found)
+    assert dict(zip(table.columns, table.rows[0], strict=True)) == {
+        "quantity": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
         "with the causes": "0.4719 ± 0.0010", "error": "+0.0 σ",
     }  # fmt: skip
     assert "(0.490 → 0.472)" in consequence(found)
@@ -146,7 +145,7 @@ def test_every_estimator_of_the_comparison_is_kept_and_shown(
     assert sorted(path.stem for path in tmp_path.glob("*.json")) == sorted(f"estimate-{n}" for n in SHOWN)
     show_simulated(campaign, [replace(estimates[0], statuses=(Status.MODEL_DEPARTS,)), *estimates[1:]], plan)
     shown = capsys.readouterr().out.splitlines()
-    assert [line.strip() for line in shown if line.strip() in SHOWN] == list(SHOWN)
+    assert [line.split()[0] for line in shown if "against the injected truth" in line] == list(SHOWN)
     assert [line for line in shown if line.startswith("Note")] == [
         f"Note, {SHOWN[0]}: {Status.MODEL_DEPARTS.value}"
     ]

@@ -186,20 +186,20 @@ def test_numbers_are_those_of_the_document(page):
     assert "0.003000 ± 0.000010 N m" in text
     assert "−0.310 ± 0.020" in text
     assert "an error of the clock" in text
-    assert "Spring stiffness 80.0 N m/rad" in text
+    assert "A run that could: spring of 80 N m/rad, wind off" in text
     assert effect_class(CAUSE).signature in text
 
 
 def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
     text = Page(page).text
-    assert "What could be closed: A moment." in text
+    assert "What could be explained: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "not determined" in text  # worse than nothing, and beyond any meaning
     explained = document | {"closable": None, "maps": None}
-    assert "What could be closed" not in written(explained)
+    assert "What could be explained" not in written(explained)
     page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
-    assert "What could be closed: nothing beyond chance (p = 0.43)." in Page(page).text
-    assert 'id="closable"' not in page
+    assert "What could be explained: nothing beyond chance (p = 0.43)." in Page(page).text
+    assert "kind of law" not in page
 
 
 MODEL = {
@@ -214,24 +214,27 @@ def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
     given = document | {"model": MODEL, "maps": None}
     text = Page(written(given, Byline(patch="out.xml"))).text
     assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
-    assert "yaw + 0.705°. Written to out.xml ." in text
+    assert "The model is written to out.xml." in text
+    assert "The reading is the position of yaw + 0.705°." in text
     assert "Changes to rig.xml" in text
     assert "joint frictionloss 0 0.004560 N m" in text
     assert "frictionloss is a soft constraint." in text
-    assert "Written to" not in written(given)
+    assert "is written to" not in written(given)
     unnamed = written(given | {"causes": ["unknown"]})
-    assert "No cause is written into the patched model, only what was free: inertia, damping." in unnamed
+    assert (
+        "No cause is written into the patched model, only the fitted parameters: inertia, damping." in unnamed
+    )
     assert "94.7 %" not in unnamed
 
 
 def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, written):
     assert "There is one run only." in page
     assert "the MuJoCo model" in page
-    assert "0.00069° at most" in page
-    assert "within 0.0023°" in page
+    assert "by 0.00069° at most" in page
+    assert "0.0023° is allowed" in page
     changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
     other = written(document | changed)
-    assert "beyond 0.0023°" in other
+    assert "MuJoCo model" not in other  # a caveat says more
     assert 'id="cautions"' not in other
 
 
@@ -285,8 +288,7 @@ def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
     page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
     assert "<p>Repeatability: the runs repeat; no scatter of their frequency or damping shows.</p>" in page
     assert 'data-figure="repeatability"' not in page
-    assert "How the runs repeat" not in page
-    assert "Repeatability" not in written(document | {"repeatability": None})
+    assert "How the runs repeat" not in written(document | {"repeatability": None})
 
 
 def test_figures_take_the_colours_of_the_theme(page):

@@ -7,11 +7,11 @@ import re
 
 import pytest
 
+from diagnosis.words.symbols import symbol_rows
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import render_report
 from tunnel_lab.report.drawing import inline_svg
 from tunnel_lab.report.figures import law_figure
-from tunnel_lab.report.symbols import symbol_rows
 from tunnel_lab.report.where import place_figure
 
 
@@ -21,11 +21,11 @@ def test_symbols_of_coefficients_and_causes_are_explained() -> None:
     assert "ωn" not in rows  # nothing in this document has it
     assert all(re.search(r"\[[^]]+\]", meaning) for meaning in rows.values())  # each has its unit
     page = render_report(document(), campaign())
-    folded = page.partition('<details class="symbols">')[2].partition("</details>")[0]
+    folded = page.partition('<details class="fold">')[2].partition("</details>")[0]
     for symbol, meaning in rows.items():
         assert f"<dt>{symbol}</dt>" in folded
         assert meaning.partition(" [")[0].split("'")[0] in folded
-    assert '<details class="symbols">' not in render_report(document(), campaign(), summary=True)
+    assert '<details class="fold">' not in render_report(document(), campaign(), summary=True)
 
 
 def test_of_runs_without_a_stated_spring_frequency_and_damping_are_explained() -> None:

@@ -88,7 +88,7 @@ def test_no_number_is_broken_in_a_narrow_terminal(
     assert status == 0
     assert max(map(len, out.splitlines())) <= width
     for row in whole:
-        assert "off the line" not in row[""] or "off the line" in out
+        assert "off the line" not in row["remark"] or "off the line" in out
         assert f"{row['ωn² [rad²/s²]']:.2f}" in out
 
 
@@ -114,7 +114,7 @@ def test_a_note_shows_the_command_of_its_remedy(tunnel: Tunnel, tiny_campaign: P
     ]
     run.write_text("\n".join([lines[0], *cubic]))
     out = tunnel("identify", spaced)[1]
-    assert f"run: tunnel diagnose '{spaced}'" in out
+    assert f"run tunnel diagnose '{spaced}'" in out
     assert "run the diagnosis" not in out
 
 

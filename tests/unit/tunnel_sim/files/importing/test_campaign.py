@@ -94,7 +94,7 @@ def test_a_rest_of_one_run_leaves_the_others_and_gives_every_run_its_own_zero(tm
     )
     imported = import_records(paths, tmp_path / "rig", read_recipe(tmp_path / "recipe.toml"))
     assert [part.rest for part in imported.parts] == [None, -0.02]
-    assert any("zero of its own" in line for line in imported.remarks())
+    assert any("a separate zero" in line for line in imported.remarks())
     campaign = read_campaign(tmp_path / "rig")
     assert campaign.sensor.zero == "per_run"
     for run, rest in zip(campaign.runs, (0.0, -0.02), strict=True):

@@ -1,0 +1,152 @@
+"""The head of a page: key figures and a card for each cause, and the vocabulary's description of effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+from diagnosis.words.answers import set_out
+from diagnosis.words.causes import said_size
+from diagnosis.words.numbers import (
+    Document,
+    acts_on,
+    beside_noise,
+    left_over,
+    misfit_of,
+    misfit_shown,
+    of_swing,
+    plain,
+    probability,
+    rms_shown,
+    share,
+    times_noise,
+)
+from diagnosis.words.scatter import (
+    BETWEEN_RUNS,
+    SCATTERS,
+    scattering,
+    spreads_of,
+    width_text,
+    without_scatter,
+)
+from diagnosis.words.verdict import size_words
+from identification.blocks import Card, Heading, Paragraph
+from tunnel_sim.effects import known_effects
+
+WITHIN_THE_NOISE = "within the noise"
+"""A residual gap that is not significant, in the words of the verdict."""
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """A figure at the head of a page."""
+
+    label: str
+    value: str
+    note: str = ""
+
+
+def key_figures(document: Document) -> list[KeyFigure]:
+    """The figures at the head of a page, each in the form in which the verdict states it."""
+    gap, causes = document["gap"], document["causes"]
+    decided = document.get("decided", True)
+    before, after = gap["excess_before"], gap["excess_after"]
+    label = "Misfit of the nominal model"
+    if causes:
+        shown = [_misfit_figure(document, label, before, times_noise(before))]
+    else:
+        shown = [KeyFigure(label, WITHIN_THE_NOISE, f"residual {beside_noise(before)}, root mean square")]
+    if causes and causes != ["unknown"]:
+        label = f"With {'the causes' if decided else f'the {set_out(document)}'} added"
+        if _calm(document):
+            shown.append(KeyFigure(label, WITHIN_THE_NOISE, left_over(after)))
+        else:
+            shown.append(_misfit_figure(document, label, after, left_over(after)))
+        shown.append(KeyFigure("Share of the gap closed", share(gap["closed"]), gap["closed_on"]))
+    if document["candidates"]:
+        rivals = decided and document["ambiguous_with"]
+        whose = "likeliest of these sets" if rivals else set_out(document)
+        first = document["candidates"][0]["probability"]
+        shown.append(KeyFigure(f"Probability of the {whose}", probability(first)))
+    return shown
+
+
+def _calm(document: Document) -> bool:
+    """Whether the residual gap is stated to be within the noise."""
+    return (document.get("rest") or {}).get("significant") is False
+
+
+def _misfit_figure(document: Document, label: str, value: float, powers: str) -> KeyFigure:
+    """A gap in customary units, with its power."""
+    misfit = misfit_of(document)
+    if misfit is None:
+        return KeyFigure(label, powers)
+    return KeyFigure(
+        label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}"
+    )
+
+
+def effect_cards(document: Document) -> list[Card]:
+    """The vocabulary's description of every cause and its rivals."""
+    known = {kind.name: kind for kind in known_effects()}
+    return [
+        Card(
+            (
+                Heading(plain(name), acts_on(document, name)),
+                Paragraph(f"{(known[name].__doc__ or '').splitlines()[0]} It adds: {known[name].equation}"),
+                Paragraph(known[name].signature),
+                *(Paragraph(reference, kind="small") for reference in known[name].references),
+            )
+        )
+        for name in [*document["causes"], *document["ambiguous_with"]]
+        if name in known
+    ]
+
+
+def cause_cards(document: Document) -> list[Card]:
+    """Every cause of the answer with its size and its effects; the scatter between runs last."""
+    if document["causes"] in ([], ["unknown"]):
+        return []
+    answer = document["candidates"][0]
+    names = answer["effect"].split(" + ")
+    does = {size["effect"]: size_words(document, size) for size in document.get("sizes", ())}
+    steps = document.get("waterfall", ())
+    gaps = [misfit_shown(document, step["excess"]) for step in steps]
+    if steps and _calm(document):
+        gaps[-1] = WITHIN_THE_NOISE
+    closes: dict[str, str] = {}
+    for step, (before, after) in zip(steps[1:], pairwise(gaps), strict=True):
+        added = step["effect"].split(" + ")
+        together = ", all together" if len(added) > 1 else ""
+        closes |= dict.fromkeys(added, f"Its addition takes the misfit from {before} to {after}{together}.")
+    cards = [
+        _cause(
+            plain(name),
+            acts_on(document, name),
+            said_size(document, answer, name),
+            does.get(name, ""),
+            closes.get(name, ""),
+        )
+        for name in without_scatter(names)
+    ]
+    if scatter := scattering(names):
+        spreads = [one for one in spreads_of(document) if one["effect"] in scatter]
+        widths = "; ".join(f"{plain(SCATTERS[one['effect']])} {width_text(one)}" for one in spreads)
+        cards.append(
+            _cause(
+                BETWEEN_RUNS,
+                "by chance",
+                widths,
+                "",
+                closes.get(scatter[0], "").replace(", all together", ""),
+            )
+        )
+    return cards
+
+
+def _cause(name: str, acts: str, size: str, does: str, closes: str) -> Card:
+    does = f"{does}." if does else ""
+    size = size[:1].upper() + size[1:]
+    return Card(
+        (Heading(name, acts), Paragraph(size, kind="size"), Paragraph(does), Paragraph(closes)), "cause"
+    )

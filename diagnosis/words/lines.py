@@ -1,0 +1,144 @@
+"""Single lines of a diagnosis beside its tables, and the answer in three lines, from its document."""
+
+from __future__ import annotations
+
+from diagnosis.settings import settings_of
+from diagnosis.words.answers import set_out
+from diagnosis.words.numbers import (
+    Document,
+    explained,
+    held_out_excess,
+    listed,
+    misfit_of,
+    of_swing,
+    plain,
+    probability,
+    reading_shown,
+    rms_shown,
+    share,
+    unit_of,
+)
+from diagnosis.words.scatter import named_answer, scattering
+from diagnosis.words.tables import SOURCES
+from identification.printing import COEFFICIENTS, significant, unit_mark
+
+_MOST = 0.5  # of a variance: more than all its other sources together
+_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
+
+
+def diagnosis_brief(document: Document) -> str:
+    """An answer in three lines: its causes, its gap, and the next step."""
+    gap, first = document["gap"], document["candidates"][0]
+    causes = document["causes"]
+    named = named_answer(causes).lower() if causes else "no gap"
+    decided = document.get("decided", True)
+    undecided = "" if decided else f"undecided, the {set_out(document)} is "
+    misfit, excess = misfit_of(document), gap["excess_before"]
+    size = f"{held_out_excess(excess)} times the noise power"
+    if misfit is not None:
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
+    closed = (
+        f", {share(gap['closed'])} of it closed {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
+    )
+    likely = probability(first["probability"])
+    return (
+        f"Diagnosis of {document['campaign']!r}: {undecided}{named} (probability {likely})\n"
+        f"  gap {size}{closed}\n"
+        "  print() shows all; .plot(), .write_report(path), .to_frame()"
+    )
+
+
+def inclusion_line(document: Document) -> str:
+    """The effects that may be among the causes, most probable first; empty where none is probable enough."""
+    least = settings_of(document).words.effect_listed
+    likely = dict(sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1]))
+    names = [name for name, value in likely.items() if value >= least]
+    last = scattering(names)  # scatter is common to every answer
+    ordered = [*(name for name in names if name not in last), *last]
+    shown = [f"{plain(name)} {probability(likely[name])}" for name in ordered]
+    return f"Among the causes, with probability: {', '.join(shown)}." if shown else ""
+
+
+def coefficients_line(document: Document) -> str:
+    """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
+
+    Empty where none is known.
+    """
+    after = {name: given for name, given in document["coefficients"]["after"].items() if given["std"]}
+    if not after:
+        return ""
+    parts = []
+    for source, words in SOURCES.items():
+        shares = {name: given.get("shares", {}).get(source, 0.0) for name, given in after.items()}
+        if max(shares.values()) >= _COUNTS:
+            mostly = listed(
+                [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
+            )
+            parts.append(f"{words} (most of that of {mostly})" if mostly else words)
+    if not parts:
+        return ""
+    return (
+        f"± includes {listed(parts)}. tunnel identify includes the noise, the scatter between runs and what its "
+        "model misses, so its ± may be far smaller or larger."
+    )
+
+
+def hidden_line(document: Document) -> str:
+    """The effect that could hide and moves a coefficient most, in a sentence; empty where none moves it."""
+    hidden, after = document.get("hidden", ()), document["coefficients"]["after"]
+    if not hidden:
+        return ""
+    first, moved = hidden[0], []
+    for name, given in after.items():
+        move = first["moves"].get(name)
+        if move is not None and given.get("std") and move["value"] > given["std"]:
+            by = f"{significant(move['value'], 2)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}"
+            moved.append(f"{COEFFICIENTS.get(name, name)} by {by.strip()}")
+    if not moved:
+        return ""
+    mark = "" if first["size"]["unit"] == "1" else unit_mark(first["size"]["unit"])
+    size = f"{significant(abs(first['size']['value']), 2)} {mark}".strip()
+    return (
+        f"What could hide: {plain(first['effect'])} of up to {size}{explained({first['size']['unit']})}, which "
+        f"these runs do not exclude, would change {' and '.join(moved)}. The intervals allow for it."
+    )
+
+
+def patch_line(document: Document) -> str:
+    """The share of the gap that the patched model closes; empty without a model."""
+    model = document.get("model")
+    if model is None:
+        return ""
+    if document["causes"] in ([], ["unknown"]):
+        fitted = ", ".join(model["free"])
+        said = f"No cause is written into the patched model, only the fitted parameters: {fitted}."
+    else:
+        closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
+        said = (
+            f"The patched model, simulated by MuJoCo, closes {closed} of the gap {model['closed_on']}; the fit "
+            f"itself {by_fit}."
+        )
+    zero = f"{'−' if model['zero_rad'] < 0.0 else '+'} {reading_shown(abs(model['zero_rad']), 3)}"
+    return f"{said} The reading is the position of {model['joint']} {zero}."
+
+
+def noise_line(document: Document) -> str:
+    """The noise to which the gap is compared, and its origin."""
+    noise, unit = document["noise"], unit_of(document)
+    size = f"{reading_shown(noise['std'], 3, unit)} (noise_std = {noise['std']:.3g} {unit_mark(unit)})"
+    return f"Noise: {size}, {noise['source']} ({noise['reason']})."
+
+
+def model_line(document: Document) -> str:
+    """The model that the gaps are computed with; empty where a caveat says more about it."""
+    checked, unit = document["confirmation"], unit_of(document)
+    if not checked["agrees"]:
+        return ""
+    most, rms, allowed = (
+        reading_shown(checked[name], 2, unit)
+        for name in ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
+    )
+    return (
+        f"The gaps are computed by the MuJoCo model. The integrator of the fits differs from it by {most} at most "
+        f"({rms} root mean square in run {checked['run']}; {allowed} is allowed)."
+    )
