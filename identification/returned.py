@@ -14,8 +14,8 @@ import numpy as np
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, raised_line
+from tunnel_sim.vocabulary.quantities import PerParameter, Square
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import PerParameter, Square
 
 RUN_UNITS: Mapping[str, str] = {
     "omega_n": "rad/s",

@@ -20,8 +20,8 @@ from identification.estimate import Estimate, NoiseLevel, Quantity
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.quantities import PerParameter, PerUnknown, Square, Vector
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import PerParameter, PerUnknown, Square, Vector
 
 _WORST_CONDITION = 1e13
 # Greatest variance or information whose square root and inverse still have full precision.

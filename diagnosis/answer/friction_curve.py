@@ -15,8 +15,8 @@ from diagnosis.model.similarity import Similarity
 from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.vocabulary.quantities import Angles, Rates
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles, Rates
 
 _PLACES = 80  # of the curve
 _BELOW = 0.5  # of the least rate among the points: where the curve begins

@@ -13,8 +13,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, project_release
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
+from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Seconds
 
 _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s

@@ -25,8 +25,8 @@ from identification.campaign.between_runs import (
     likeliest_widths,
     marginal,
 )
+from tunnel_sim.vocabulary.quantities import PerKind
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import PerKind
 
 #: Share of a column's power that deviations of the runs must fail to explain. Smaller differences are
 #: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may

@@ -15,8 +15,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
+from tunnel_sim.vocabulary.quantities import Vector
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,8 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.run_data import RunData
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.quantities import Angles, Rates, Times
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles, Rates, Times
 
 _WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
 _LARGE = 30.0  # noise variances of a block mean: larger residuals must not be smoothed away

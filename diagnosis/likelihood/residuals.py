@@ -18,8 +18,8 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.run_data import RunData
+from tunnel_sim.vocabulary.quantities import Frequencies, Hertz, Seconds
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Frequencies, Hertz, Seconds
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
 

@@ -23,8 +23,8 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import AnglePerRun, KgM2
 
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData

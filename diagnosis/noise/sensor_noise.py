@@ -20,8 +20,8 @@ from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
 from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
-from tunnel_sim.vocabulary.shapes import Hertz
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise

@@ -22,8 +22,8 @@ from diagnosis.search.scatter import with_scatter
 from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
+from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Hertz
 
 Events = tuple[Mapping[str, Any], ...]
 """By run, the largest part first: ``run``, its ``share`` of the explained part, and ``from_s`` and ``to_s`` since

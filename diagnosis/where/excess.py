@@ -21,8 +21,8 @@ from diagnosis.noise.bands import chance
 from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Hertz
 
 #: Bands by their upper edges in multiples of the run's own frequency.
 BANDS: tuple[tuple[str, float], ...] = (

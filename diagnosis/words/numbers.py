@@ -10,7 +10,7 @@ from typing import Any
 from diagnosis.facts.closure import Misfit
 from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
-from tunnel_sim.vocabulary.shapes import Share
+from tunnel_sim.vocabulary.quantities import Share
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")

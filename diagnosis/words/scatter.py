@@ -10,7 +10,7 @@ from diagnosis.words.numbers import Document, listed, plain, probability
 from identification.blocks import Table
 from identification.printing import concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.vocabulary.shapes import Share
+from tunnel_sim.vocabulary.quantities import Share
 
 SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
 """The quantity that differs between runs, by the name of the scatter."""

@@ -31,8 +31,8 @@ from identification.statistics import determined, inverse, scaled_solve, student
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.quantities import PerParameter
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import PerParameter
 
 # Smallest singular value of two columns of unit length, for two runs whose springs or speeds are just
 # different.

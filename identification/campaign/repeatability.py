@@ -36,8 +36,8 @@ from identification.estimate import Quantity, RunScatter
 from identification.statistics import inverse, student_factor
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Repeatability, Run
+from tunnel_sim.vocabulary.quantities import PerParameter
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import PerParameter
 
 _STEP = 0.02  # of ln(width), for the finite differences of the curvature
 _ZERO = 1e-9  # width, relative to the usual one, that counts as none

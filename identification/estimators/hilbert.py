@@ -28,8 +28,8 @@ from identification.signal.noise import reading_noise
 from identification.signal.run_fit import CYCLES, modal_quantities
 from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles
 
 _CARRIED_ON = 6.0  # cycles past either end
 _GROWTH = 3.0  # a fast decay is extended backwards only until it has grown by e³

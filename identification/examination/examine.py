@@ -20,8 +20,8 @@ from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.errors import counted
+from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
-from tunnel_sim.vocabulary.shapes import Seconds
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
 _ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves

@@ -20,8 +20,8 @@ from identification.signal.free_decay import envelope_amplitude
 from identification.signal.frequency import PencilDecay, pencil_decay, starting_frequency, thinned_reading
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.quantities import Frequencies
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
-from tunnel_sim.vocabulary.shapes import Frequencies
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
 _LEAST_SAMPLES = 30  # in a part of a record whose poles are found separately

@@ -16,8 +16,8 @@ from identification.policy import LEAST_ENERGY
 from identification.signal.decay_fit import Reading, block_means
 from identification.signal.frequency import starting_frequency
 from identification.status import Status
+from tunnel_sim.vocabulary.quantities import Times
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.shapes import Times
 
 WINDOWS = 32
 LEAST_WINDOWS = 4

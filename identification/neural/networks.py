@@ -26,8 +26,8 @@ from identification.neural.three_cycles import cycles_time, network_inputs
 from tunnel_sim.files.reading import as_described, parse_json, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.quantities import RadPerS, Seconds, Vector
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import RadPerS, Seconds, Vector
 
 DAMPING, FREQUENCY = "damping", "frequency"
 SIZES = {DAMPING: (100, 5, 5, 1), FREQUENCY: (2, 2, 5, 1)}

@@ -39,8 +39,8 @@ from tunnel_sim.files.reading import parse_json, read_regular
 from tunnel_sim.files.writing import json_line
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.quantities import Vector
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Vector
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -31,8 +31,8 @@ from identification.signal.forcing import (
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, embed, inner, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.quantities import Angles, Gain, PerParameter, Vector
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
-from tunnel_sim.vocabulary.shapes import Angles, Gain, PerParameter, Vector
 
 ZeroKind = Literal["shared", "own", "known"]
 """Whether the sensor's zero is an unknown of all runs together, of every run, or known."""

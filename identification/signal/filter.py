@@ -25,8 +25,8 @@ from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_D
 from identification.signal.free_decay import Decay, response_rows
 from identification.statistics import inner, inverse, scaled_solve
 from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles
 
 _GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is made
 _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter

@@ -23,8 +23,8 @@ from identification.signal.free_decay import Decay, response_rows, sensitivity_w
 from identification.statistics import determined, eliminate
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.quantities import Angles, Gain, Rad, RadPerS, Times, Vector
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.shapes import Angles, Gain, Rad, RadPerS, Times, Vector
 
 if TYPE_CHECKING:
     from identification.signal.decay_fit import RunFit

@@ -18,8 +18,8 @@ from identification.estimate import NoiseLevel
 from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from identification.statistics import inner
 from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.quantities import Angles, Seconds
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.shapes import Angles, Seconds
 
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and the number of samples per degree of freedom:

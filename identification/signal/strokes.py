@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles
 
 _WINDOW = 0.12  # of the time between reversals, on both sides of one: the motion is a parabola there
 _FEWEST = 2  # samples on either side

@@ -24,8 +24,8 @@ from identification.estimate import PARAMETERS, Estimate, Quantity
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.quantities import PerParameter
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.shapes import PerParameter
 
 _Relative = Annotated[
     float,

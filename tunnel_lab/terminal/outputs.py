@@ -110,7 +110,7 @@ def show_tables(*tables: Table | RichTable) -> None:
 
 def rendered(table: RichTable, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
-    plain = text_table(table)
+    plain = block_table(table)
     title, heads, rows = plain.title, list(plain.columns), plain.rows
     if kind is TableFormat.JSON:
         from tunnel_sim.files.writing import json_line

@@ -15,8 +15,8 @@ from identification import policy
 from identification.examination.self_excited import Swing
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.shapes import Angles
 
 _WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
 _FEWEST = 6  # phases of a run
