@@ -16,7 +16,7 @@ from rich.table import Table
 
 from benchmarks.throughput import interleaved, row, stepping
 from diagnosis import diagnose
-from tests.unit.own_effects import CUBIC, DETENT
+from tests.support.own_effects import CUBIC, DETENT
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.mechanics import CubicStiffness
 from tunnel_sim.engine.model import build_model

@@ -40,7 +40,7 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     from tunnel_sim.engine import joint_model
 
     joint_model.prepare()
-    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
+    monkeypatch.setattr(joint_model, "in_sandbox", lambda work, given, parts, **_: work(given, parts))
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
 def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
 
-    It changes neither causes nor coefficients, and has tests of its own (``test_closable.py``).
+    It changes neither causes nor coefficients, and has tests of its own (``test_explain.py``).
     """
     from diagnosis.remainder import ways
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
 from diagnosis.likelihood.problem import Problem
@@ -15,6 +16,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,12 +132,11 @@ def damped_step(
     return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
 
 
-def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> Array:
+def bounded_step(matrix: Array, gradient: Vector, lower: Array, upper: Array) -> Array:
     """The solution of the normal equations; parameters that would leave their range are fixed at its end.
 
     Args:
         matrix: symmetric, shape (n, n).
-        gradient: shape (n,).
         lower: least steps, at most 0, shape (n,).
         upper: greatest steps, at least 0, shape (n,).
     """
@@ -151,11 +152,10 @@ def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> 
     return step
 
 
-def project_release(change: Array, slopes: Array) -> Array:
+def project_release(change: Vector, slopes: Array) -> Array:
     """The part of a change of one run's prediction that its release cannot absorb.
 
     Args:
-        change: shape (n,).
         slopes: derivatives to the release, shape (n, own).
     """
     left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
@@ -239,17 +239,28 @@ class Fit:
             known: precision of these differences as the runs show them, as in `Between.cost`, shape
                 (runs, kinds, kinds).
         """
-        return 0.0 if self.between is None else self.between.cost(known)
+        return 0.0 if self.between is None else self.between.cost(known, self.shown)
 
     @property
     def compared(self) -> int:
         """Number of effects that chance differences between runs could imitate: no single run shows them."""
+        return 0 if self.between is None else sum(not seen for seen in self._shown_by_runs.values())
+
+    @property
+    def shown(self) -> NDArray[np.bool_]:
+        """The common parameters of effects that single runs show beside chance differences, shape (common,)."""
+        by_runs = self._shown_by_runs
+        return np.array([by_runs.get(name.split(".")[0], False) for name in self.problem.names], np.bool_)
+
+    @cached_property
+    def _shown_by_runs(self) -> dict[str, bool]:
+        """Whether single runs show an effect: its size differs from zero by their evidence alone."""
         if self.between is None:
-            return 0
+            return {}
         shown = self.between.shown(self.point.common, self.settings.scatter.shown_stds)
         by_itself = dict(zip(self.problem.names, shown.tolist(), strict=True))
-        sizes = (f"{kind.name}.{kind.parameters()[0].name}" for kind in self.problem.effects)
-        return sum(not by_itself.get(size, True) for size in sizes)
+        sizes = {kind.name: f"{kind.name}.{kind.parameters()[0].name}" for kind in self.problem.effects}
+        return {name: by_itself.get(size, True) for name, size in sizes.items()}
 
     @property
     def unlikelihood(self) -> float:

@@ -23,6 +23,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _HELD = 1e18  # precision of fixed deviations
 _MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
+_ABSORBED = 2  # steps, after which the first order of an effect is absorbed to the order in which it shows
 _NEARER = 0.02  # share of an effect's size by linear theory
 
 
@@ -173,8 +174,10 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
     scaled, replaced = tried.scaled, tried.replaced
     moved = None
     if trial.second_order:
-        moved = absorbed(base, change)
-        change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
+        moved = base.point
+        for _ in range(_ABSORBED):
+            moved = absorbed(base, change, moved)
+            change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
     added = _added(base, change)
     if added is None or (moved is not None and added.slope <= 0.0):
         return None
@@ -314,14 +317,19 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
     return np.concatenate([common, values])
 
 
-def absorbed(base: Fit, change: Sequence[Array]) -> Point:
-    """The point at which a fit's parameters absorb a change of the scaled prediction, by one Gauss–Newton step."""
+def absorbed(base: Fit, change: Sequence[Array], point: Point | None = None) -> Point:
+    """The point at which a fit's parameters absorb a change of the scaled prediction, by one Gauss–Newton step.
+
+    Args:
+        change: at the point.
+        point: where the step starts; None: at the fit's.
+    """
     products = base.products
     if base.problem.scatter:  # chance differences may contribute to the absorbed change
         precision = base.problem.parameters.precision
         products = Products.of(base.jacobian, np.where(precision > 0.0, _HELD, 0.0))
     return damped_step(
-        base.problem, base.point, [-c for c in change], base.jacobian, 0.0, products, linear=True
+        base.problem, point or base.point, [-c for c in change], base.jacobian, 0.0, products, linear=True
     )
 
 

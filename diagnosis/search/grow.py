@@ -150,15 +150,15 @@ def _worth_fitting(
     )
     if parent.effects or parent.explains_runs:
         own, beyond = own_gain(parent.fit.problem), {}
-        for (
-            kind,
-            starts,
-        ) in scored:  # the chance gain of the effect's parameters per run does not count
+        for kind, starts in scored:  # the chance gain of the effect's parameters per run does not count
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
         if not parent.effects:
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
             return [item for item in likely if beyond[item[0].name] > 0.0]
-        return [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
+        worth = [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
+        # deviations of the runs absorb most of a first-order prediction of such an effect, but not of the effect
+        absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
+        return worth + [item for item in absorbed if item not in worth and beyond[item[0].name] > 0.0]
     limit = chosen.predicted_share * parent.fit.total
     return [
         item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit

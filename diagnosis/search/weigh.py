@@ -159,10 +159,10 @@ def misfit_scale(
 ) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
-    Beside chance it allows a model error: a share of the amplitude of the gap, since no real effect has its
-    textbook form, or the common misfit of all sets if that is larger, up to a share of the motion. Where the runs
-    differ by chance, chance alone is also an answer, and the likelihood decides between them: the weight of a
-    small χ² is half of it.
+    Beside chance it allows a model error: a share of the amplitude of the gap in the same channel, since no real
+    effect has its textbook form, or the common misfit of all sets if that is larger, up to a share of the motion.
+    An error of the frequency must not hide a cause in the damping. Where the runs differ by chance, chance alone is
+    also an answer, and the likelihood decides between them: the weight of a small χ² is half of it.
 
     Args:
         nominal: misfit of the nominal model, and the motion.
@@ -171,9 +171,9 @@ def misfit_scale(
     """
     needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
     by_chance = needless if chance is None else chance
-    by_form = chosen.form_error**2 * float(np.sum(np.maximum(nominal.excess, 0.0)))
-    error = min(max(by_form, common), chosen.model_error**2 * nominal.motion)
-    return np.asarray(np.broadcast_to(by_chance, 6) + error, np.float64)
+    by_form = chosen.form_error**2 * _leaked(nominal.excess, ALL_CHANNELS, chosen.leak)
+    error = np.minimum(np.maximum(by_form, common), chosen.model_error**2 * nominal.motion)
+    return np.asarray(by_chance + error, np.float64)
 
 
 def log_weight(
@@ -211,6 +211,15 @@ def log_misfit(left: Array, scale: Array, leaking: Array, leak: float) -> float:
         leaking: 1 for the channels with leakage, else 0, shape (6,): `OF_MOTION` or `ALL_CHANNELS`.
         leak: share of the misfit in other channels that counts in a channel.
     """
-    above = np.maximum(left, 0.0)
+    return float(np.sum(np.log1p(_leaked(left, leaking, leak) / scale)))
+
+
+def _leaked(excess: Array, leaking: Array, leak: float) -> Array:
+    """χ² by channel with the share of the other channels that counts in it, shape (6,), dimensionless.
+
+    Args:
+        excess: χ² beyond noise by channel, shape (6,), dimensionless.
+    """
+    above = np.maximum(excess, 0.0)
     shared = leaking * above
-    return float(np.sum(np.log1p((above + leak * leaking * (shared.sum() - shared)) / scale)))
+    return np.asarray(above + leak * leaking * (shared.sum() - shared), np.float64)

@@ -376,7 +376,7 @@ class WeighingSettings:
     )
     form_error: float = setting(
         0.1,
-        "Misfit of a channel that needs no cause, as a share of the gap.",
+        "Misfit of a channel that needs no cause, as a share of the gap in that channel.",
         "judgement",
         "A real effect departs from its textbook form by about a tenth. 20 small causes and the open "
         "records, which do not test it, do not separate 0.05 from 0.3.",

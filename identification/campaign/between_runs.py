@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
@@ -89,6 +90,19 @@ class Marginal:
     def likelihood(self) -> float:
         """−2 ln L at the likeliest common parameters, up to a constant: compares sets of common parameters."""
         return self.log_determinant + self.quadratic
+
+    def log_information_given(self, given: NDArray[np.bool_]) -> float:
+        """ln|H| of the other common parameters, where some are given.
+
+        Args:
+            given: the given parameters, shape (common,); each has a variance above 0.
+        """
+        covariance = self.covariance[np.ix_(given, given)]
+        size = np.sqrt(np.diag(covariance))
+        correlation = np.linalg.eigvalsh(covariance / np.outer(size, size))
+        return self.log_information + float(
+            2.0 * np.log(size).sum() + np.log(np.maximum(correlation, _NULL)).sum()
+        )
 
     @property
     def restricted(self) -> float:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from decay_oracle import Oracle
 
+from tests.analytic.decay_oracle import Oracle
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.plan import AeroDerivatives

@@ -7,9 +7,9 @@ it was held for long, such a spring pulls the body back to that side, less and l
 from __future__ import annotations
 
 import numpy as np
-from law_cases import RIG
 from scipy.integrate import solve_ivp
 
+from tests.analytic.law_cases import RIG
 from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.simulate import simulate_motions
 from tunnel_sim.physics.forward import forward_motion

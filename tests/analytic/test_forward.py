@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from law_cases import CASES, REVERSING, RIG, SAMPLE_RATE, Case
 
+from tests.analytic.law_cases import CASES, REVERSING, RIG, SAMPLE_RATE, Case
 from tests.marks import slow
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.engine.model import build_model

@@ -5,10 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from decay_oracle import AREA, LENGTH
-from law_cases import DURATION, RIG, SAMPLE_RATE, Case, Oracle
 from scipy.linalg import expm
 
+from tests.analytic.decay_oracle import AREA, LENGTH
+from tests.analytic.law_cases import DURATION, RIG, SAMPLE_RATE, Case, Oracle
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.moment_law import state_names, state_vector

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from decay_oracle import AREA, LENGTH, closed_form
 
+from tests.analytic.decay_oracle import AREA, LENGTH, closed_form
 from tunnel_sim.engine.model import build_model, load_plugin
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig

@@ -7,9 +7,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from decay_oracle import Oracle
-from law_cases import CASES, DURATION, FREE_PLAY, FRICTION, RIG, SAMPLE_RATE, Case
 
+from tests.analytic.decay_oracle import Oracle
+from tests.analytic.law_cases import CASES, DURATION, FREE_PLAY, FRICTION, RIG, SAMPLE_RATE, Case
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.forward import forward_motion

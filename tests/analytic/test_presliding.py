@@ -7,8 +7,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from law_cases import RIG, Case
 
+from tests.analytic.law_cases import RIG, Case
 from tests.marks import slow
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting, reading

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from law_cases import RIG
 
+from tests.analytic.law_cases import RIG
 from tests.marks import slow
 from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import parameter_vector

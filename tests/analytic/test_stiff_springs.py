@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from decay_oracle import AREA, LENGTH, closed_form
 
+from tests.analytic.decay_oracle import AREA, LENGTH, closed_form
 from tunnel_sim.engine.simulate import simulate, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion

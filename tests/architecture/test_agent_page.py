@@ -6,11 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from test_tutorials import printed, steps
 
 from docs.studies.campaign_agent import fill
 from docs.studies.learning_curves import curves, from_csv
 from docs.studies.learning_curves import fill as filled_with_curves
+from tests.architecture.test_tutorials import printed, steps
 from tunnel_lab.envs.policies import packaged_agent
 
 DOCS = Path(__file__).parents[2] / "docs"

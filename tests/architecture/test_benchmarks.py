@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = {"benchmarks.causes"}  # with commands of its own; tests/unit/experiments/test_causes.py
+PACKAGES = {"benchmarks.causes"}  # with commands of its own; tests/unit/benchmarks/test_causes.py
 NAMED = re.findall(r"^python -m (benchmarks\.\w+)", (ROOT / "benchmarks/README.md").read_text(), re.MULTILINE)
 COMMANDS = [name for name in NAMED if name not in PACKAGES]
 

@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from test_env_pages import rows
-from test_readme import assert_same
-from test_tutorials import printed, steps
+
+from tests.architecture.test_env_pages import rows
+from tests.architecture.test_readme import assert_same
+from tests.architecture.test_tutorials import printed, steps
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "reference" / "envs" / "campaign.md"

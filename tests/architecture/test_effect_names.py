@@ -6,8 +6,8 @@ import ast
 from pathlib import Path
 
 import pytest
-from test_layers import PACKAGES
 
+from tests.architecture.test_layers import PACKAGES
 from tunnel_sim.effects import ALL_EFFECTS
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import grimp
-from test_layers import PACKAGES, imported_by
+
+from tests.architecture.test_layers import PACKAGES, imported_by
 
 HOMES = ("tunnel_sim.envs", "tunnel_lab.envs")
 

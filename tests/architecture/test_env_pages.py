@@ -8,8 +8,9 @@ from math import pi
 from pathlib import Path
 
 import pytest
-from test_readme import assert_same
-from test_tutorials import printed, steps
+
+from tests.architecture.test_readme import assert_same
+from tests.architecture.test_tutorials import printed, steps
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "envs" / "free-decay.md"
 TEXT = PAGE.read_text(encoding="utf-8")

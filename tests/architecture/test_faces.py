@@ -7,7 +7,8 @@ import importlib
 import inspect
 
 import pytest
-from test_layers import imported_by
+
+from tests.architecture.test_layers import imported_by
 
 FACES = ("tunnel_sim", "identification", "diagnosis")
 

@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from test_faces import FACES
 
 import tunnel_lab
 from identification import ALL_ESTIMATORS
+from tests.architecture.test_faces import FACES
 from tunnel_sim.effects import ALL_EFFECTS
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "glossary.md"

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 import typer.main
-from test_readme import BLOCK, script_output
 
+from tests.architecture.test_readme import BLOCK, script_output
 from tunnel_lab.cli import app
 
 ROOT = Path(__file__).parents[2]

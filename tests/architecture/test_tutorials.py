@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from test_readme import assert_same, script_output
+
+from tests.architecture.test_readme import assert_same, script_output
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "tutorials"

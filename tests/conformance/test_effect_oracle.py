@@ -211,7 +211,7 @@ def test_a_law_that_jumps_needs_the_tolerance_that_its_class_states() -> None:
 def test_every_effect_is_compared() -> None:
     compared = {name for name, _, _ in VARIANTS} | {*RANDOM, "sensor_quantisation"}
     assert compared == SOLVED
-    # those of actuators in tests/unit/driven/test_actuators.py
+    # those of actuators in tests/unit/tunnel_sim/physics/test_actuator.py
     assert compared | set(REFERRED) | ON_DRIVEN_RUNS == set(VOCABULARY)
 
 

@@ -9,7 +9,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.random_moments import follows_the_motion, overdispersion
-from tests.unit.gap_campaigns import campaign, nominal
+from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
 KIND = effect_class("quadratic_damping")

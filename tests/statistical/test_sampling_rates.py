@@ -9,7 +9,7 @@ from scipy.stats import binom
 from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
-from tests.unit.gap_campaigns import judged
+from tests.support.gap_campaigns import judged
 
 NOISE = 4e-4
 SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setting(20.0, 20.0))

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from diagnosis import Diagnosis, diagnose, vocabulary
 from identification import Estimate, identify
 from tests.marks import slow
-from tests.unit.gap_campaigns import campaign
+from tests.support.gap_campaigns import campaign
 from tunnel_sim import Campaign, TunnelError, write_campaign
 from tunnel_sim.effects import effect_from
 

@@ -100,9 +100,8 @@ def show_tables(*tables: Table) -> None:
 
 def rendered(table: Table, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
-    heads = [_plain(column.header) for column in table.columns]
-    rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
-    title = _plain(table.title or "")
+    plain = text_table(table)
+    title, heads, rows = plain.title, list(plain.columns), plain.rows
     if kind is TableFormat.JSON:
         from tunnel_sim.files.writing import json_line
 
@@ -124,6 +123,16 @@ def rendered(table: Table, kind: TableFormat) -> str:
     texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
     csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
+
+
+def text_table(table: Table) -> TextTable:
+    """A table of texts without its style, each cell on one line."""
+    heads = tuple(_plain(column.header) for column in table.columns)
+    rows = tuple(zip(*(map(_plain, column.cells) for column in table.columns), strict=True))
+    right = tuple(
+        head for head, column in zip(heads, table.columns, strict=True) if column.justify == "right"
+    )
+    return TextTable(_plain(table.title or ""), heads, rows, right)
 
 
 def _as_markdown(text: str) -> str:

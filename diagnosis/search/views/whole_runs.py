@@ -98,7 +98,7 @@ class WholeRuns(View):
         repeat, the likeliest are compared beside such differences.
         """
         if self.unscattered is not None or self.first is not None:
-            return self.with_moments(super().sets(clock), clock)
+            return _with_moments(super().sets(clock), clock)
         explained: list[Hypothesis] = []
         beyond: list[float] = []
 
@@ -116,12 +116,17 @@ class WholeRuns(View):
                 : self.base.settings.search.beside_scatter
             ]
         if explained:
-            return self._beside_scatter(likely, self.likeliest_part(explained), clock)
+            return _with_moments(self._beside_scatter(likely, self.likeliest_part(explained), clock), clock)
         found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
-        plain = self.with_moments(found, clock)
-        if plain.weighed[0].effects != UNKNOWN or beyond or self.scattering is None:
+        beside: Sets | None = None
+        if found.weighed[0].effects == UNKNOWN and not beyond and self.scattering is not None:
+            beside = self._beside_scatter(likely, None, clock)
+            if any(one.effects and self._explains(one) for one in beside.hypotheses):
+                return _with_moments(beside, clock)  # nothing remains for a random moment
+        plain = _with_moments(found, clock)
+        if plain.weighed[0].effects != UNKNOWN or beside is None:
             return plain
-        beside = self._beside_scatter(likely, None, clock)
+        beside = _with_moments(beside, clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
 
     def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
@@ -201,14 +206,14 @@ class WholeRuns(View):
         Args:
             likely: sets in runs that repeat, the likeliest first.
             explained: the set that explains every run by itself, from which larger ones are grown; None: there is
-                none, and they are grown from scatter alone, as long as one explains the runs.
+                none, and they are grown from scatter alone, as long as one nearly explains the runs.
         """
         assert self.scattering is not None
         none = Hypothesis((), self.scattering, repeating=self.base)
         view = replace(self, base=self.scattering, unscattered=self.base, first=explained or none)
 
         def unexplained(level: Sequence[Hypothesis]) -> bool:
-            return any(one.effects for one in level) and not any(map(self._explains, level))
+            return any(one.effects for one in level) and not any(map(self._nearly_explains, level))
 
         with clock.step("effects"):
             grown = grow(view, clock.progress, unexplained)
@@ -216,14 +221,7 @@ class WholeRuns(View):
             found: dict[tuple[str, ...], Hypothesis] = {}
             for one in filter(None, (none, *others, *grown)):
                 found[one.names] = of_more_weight(found.get(one.names), one, self._scattering_gap)
-        return view.with_moments(Sets(view, tuple(found.values())), clock)
-
-    def with_moments(self, found: Sets, clock: Clock) -> Sets:
-        """Sets, and the random moments that may act beside them."""
-        with clock.step("random moments"):
-            random = weigh_random_moments(self, found.hypotheses)
-            sets = without_the_random_moment(random, found.hypotheses, self.gap)
-        return replace(found, random=tuple(random), hypotheses=tuple(sets))
+        return Sets(view, tuple(found.values()))
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis:
         """The set, unchanged."""
@@ -261,3 +259,13 @@ class WholeRuns(View):
             log_misfit(misfit(one).excess, scale, OF_MOTION, weighing.leak) for one in (differing, repeats)
         )
         return weighing.steepness * (without - left) > weighing.set_price
+
+
+def _with_moments(found: Sets, clock: Clock) -> Sets:
+    """Sets, and the random moments that may act beside them."""
+    view = found.view
+    assert isinstance(view, WholeRuns)
+    with clock.step("random moments"):
+        random = weigh_random_moments(view, found.hypotheses)
+        sets = without_the_random_moment(random, found.hypotheses, view.gap)
+    return replace(found, random=tuple(random), hypotheses=tuple(sets))

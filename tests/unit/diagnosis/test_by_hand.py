@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.by_hand import ByHand
-from tests.unit.gap_campaigns import campaign
+from tests.support.gap_campaigns import campaign
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.errors import TunnelError
 

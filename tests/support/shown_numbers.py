@@ -1,0 +1,52 @@
+"""Reads numbers as a person would: from text, with the half unit of the last digit that is shown."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")
+_POWER_OF_TEN = re.compile(r"× 10[⁻⁰¹²³⁴-⁹]+|\[10[⁻⁰¹²³⁴-⁹]+")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number as it stands in a text.
+
+    Args:
+        value: what the digits say.
+        half: half a unit of the last digit.
+    """
+
+    value: float
+    half: float
+
+    def means(self, value: float) -> bool:
+        """Whether the digits are those of a value, rounded."""
+        return math.isclose(self.value, value, rel_tol=1e-9, abs_tol=1.02 * self.half)
+
+
+def numbers(text: str) -> list[Shown]:
+    """Every number of a text, in order."""
+    plain = _POWER_OF_TEN.sub(" ", text.replace("\u00a0", " "))
+    plain = _SCALED.sub(lambda m: f"{m[1]}e{m[3]} ± {m[2]}e{m[3]}", plain)
+    return [_shown(found.replace("−", "-")) for found in _NUMBER.findall(plain)]
+
+
+def _shown(digits: str) -> Shown:
+    mantissa, _, power = digits.partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return Shown(float(digits), 0.5 * 10.0 ** (int(power or 0) - decimals))
+
+
+def assert_shows(text: str, values: Sequence[float]) -> None:
+    """A text's numbers are these, in this order, and no others."""
+    found = numbers(text)
+    assert len(found) == len(values), (text, values)
+    for one, value in zip(found, values, strict=True):
+        assert one.means(value), (text, one, value)
+        # a number so coarse that anything would pass for it says nothing
+        assert one.half <= 0.06 * abs(value) or one.value == value, (text, one, value)

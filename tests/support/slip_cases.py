@@ -1,0 +1,288 @@
+"""Everyday slips by name: those that an attack on the program found, and further ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tests.support.slip_rig import (
+    INERTIA,
+    NOISE,
+    SPEEDS,
+    SPRINGS,
+    ZERO,
+    Condition,
+    Slip,
+    both,
+    clocking,
+    exchanged,
+    high_passed,
+    honest,
+    padded,
+    reading,
+    repeated,
+    scaling,
+    sensing,
+    stating,
+    twice,
+    wrapped,
+)
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class Case:
+    """A slip, and what the examination must say.
+
+    Args:
+        given: the campaign without the slip.
+        says: words of the remark.
+        runs: ids that the remark must name.
+        refused: whether the campaign is refused; otherwise it goes on without the fault, or with a question.
+    """
+
+    given: Campaign
+    slip: Slip
+    says: str
+    runs: tuple[str, ...]
+    refused: bool = True
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign with the slip."""
+        return self.slip(self.given)
+
+
+def _clock(change: float, *springs_and_speeds: tuple[float, float]) -> Campaign:
+    """A campaign whose clock drifts in some conditions; in all where none is named."""
+    return honest(
+        [
+            Condition(k, v, clock=change * (not springs_and_speeds or (k, v) in springs_and_speeds))
+            for k in SPRINGS
+            for v in SPEEDS
+        ]
+    )
+
+
+def _speeds(*actual: float) -> Campaign:
+    """A campaign whose runs have these wind speeds, two of each spring."""
+    springs = np.repeat(SPRINGS, 2).tolist()
+    return honest([Condition(spring, speed) for spring, speed in zip(springs, actual, strict=True)])
+
+
+def _several_speeds() -> Campaign:
+    return honest([Condition(k, v) for k in SPRINGS for v in (0.0, 10.0, 15.0, 20.0)])
+
+
+def _with_noise(std: float) -> Slip:
+    rng = np.random.default_rng(17)
+    return twice(lambda time, yaw: (time, yaw + rng.normal(0.0, std, yaw.size)))
+
+
+def _unplugged(yaw: Array) -> Array:
+    at, rng = round(0.7 * yaw.size), np.random.default_rng(18)
+    return np.concatenate([yaw[:at], ZERO + rng.normal(0.0, NOISE, yaw.size - at)])
+
+
+def _holding(begin: int, end: int, value: float | None = None) -> Slip:
+    """Samples of the first run that keep one value; their first one where None."""
+
+    def change(yaw: Array) -> Array:
+        stuck = yaw.copy()
+        stuck[begin:end] = yaw[begin] if value is None else value
+        return stuck
+
+    return reading(change, "r1")
+
+
+def _nothing(data: Campaign) -> Campaign:
+    return data
+
+
+PLAIN = honest()
+"""Four honest runs, the same for all slips."""
+ALL = ("r1", "r2", "r3", "r4")
+ON, OFF = ("r2", "r4"), ("r1", "r3")
+WIND = {"wind_speed": 15.0, "air_density": 1.2}
+
+TABLE: dict[str, Case] = {
+    "springs in N mm/rad": Case(PLAIN, scaling(spring_stiffness=1e3), "Cn_beta = 495", ON, refused=False),
+    "springs in N cm/rad": Case(PLAIN, scaling(spring_stiffness=1e2), "Cn_beta = 49.5", ON, refused=False),
+    "springs in N m/deg": Case(
+        PLAIN, scaling(spring_stiffness=np.pi / 180.0), "spring_stiffness in N m/deg", OFF, refused=False
+    ),
+    "time in minutes": Case(PLAIN, clocking(lambda t: t / 60.0), "time_s in minutes", OFF, refused=False),
+    "fan off in every run": Case(
+        _speeds(0.0, 0.0, 0.0, 0.0), stating(*ON, **WIND), "check whether the fan was on", ON, refused=False
+    ),
+    "one speed in km/h": Case(PLAIN, stating("r2", wind_speed=54.0), "54 of r2 as 15 m/s (in km/h)", ("r2",)),
+    "one speed of the stiff spring in km/h": Case(
+        PLAIN, stating("r4", wind_speed=54.0), "54 of r4 as 15 m/s (in km/h)", ("r4",)
+    ),
+    "1.5 for 15 m/s": Case(PLAIN, stating("r2", wind_speed=1.5), "1.5 of r2 as 15 m/s", ("r2",)),
+    "wind labels exchanged": Case(
+        PLAIN,
+        both(stating(*OFF, **WIND), stating(*ON, wind_speed=0.0)),
+        "the runs with the wind on and off are exchanged",
+        ALL,
+    ),
+    "wind labels exchanged of one spring": Case(
+        PLAIN,
+        exchanged("r1", "r2", "wind_speed", "air_density"),
+        "wind_speed of r1 and r2 exchanged",
+        ("r1", "r2"),
+    ),
+    "one sign inverted": Case(PLAIN, reading(lambda y: -y, "r2"), "sign of the sensor is inverted", ("r2",)),
+    "one sign inverted, release stated": Case(
+        honest(release=True), reading(lambda y: -y, "r2"), "sign of the sensor is inverted", ("r2",)
+    ),
+    "half of the runs mirrored": Case(
+        PLAIN, reading(lambda y: -y, "r1", "r2"), "sign of the sensor is inverted", ("r1", "r2")
+    ),
+    "one spring's label wrong": Case(
+        PLAIN, stating("r2", spring_stiffness=44.84), "44.84 of r2 as 16.12 N m/rad", ("r2",)
+    ),
+    "last third zeros": Case(
+        PLAIN, reading(padded(1.0 / 3.0)), "the reading stands at 0 rad", ("r1",), refused=False
+    ),
+    "last third held": Case(
+        PLAIN, reading(padded(1.0 / 3.0, None), "r3"), "the reading stands at", ("r3",), refused=False
+    ),
+    "repeated with noise of 1e-9": Case(
+        PLAIN, _with_noise(1e-9), "so counted once", ("again",), refused=False
+    ),
+    "repeated and rounded": Case(
+        PLAIN, twice(lambda t, y: (t, np.round(y, 4))), "so counted once", ("again",), refused=False
+    ),
+    "repeated and cut by 50 samples": Case(
+        PLAIN, twice(lambda t, y: (t[50:], y[50:])), "so counted once", ("again",), refused=False
+    ),
+    "repeated times 1.001": Case(
+        PLAIN, twice(lambda t, y: (t, 1.001 * y)), "so counted once", ("again",), refused=False
+    ),
+    "wraps at pi": Case(PLAIN, reading(wrapped()), "jumps by whole turns", ALL, refused=False),
+    "clock drifts by 0.5 %": Case(_clock(0.005), _nothing, "the clock of the logger drifts", ALL),
+    "AC-coupled": Case(PLAIN, reading(high_passed(1.0, held=False)), "AC-coupled", ALL),
+    "AC-coupled, held before": Case(PLAIN, reading(high_passed(1.0, held=True)), "AC-coupled", ALL),
+    "resolution of 0.5 rad": Case(
+        PLAIN, sensing(resolution=0.5), "resolution = 0.5 rad contradicts", ("r1",), refused=False
+    ),
+    "release on the other side": Case(
+        honest(release=True), stating("r2", release_angle=-0.26), "the other side", ("r2",), refused=False
+    ),
+}
+
+FURTHER: dict[str, Case] = {
+    "one speed in mph": Case(PLAIN, scaling("r4", wind_speed=2.2369), "of r4 as 15 m/s (in mph)", ("r4",)),
+    "one speed in knots": Case(PLAIN, scaling("r2", wind_speed=1.9438), "of r2 as 15 m/s (in knots)", ("r2",)),
+    "one speed in ft/s": Case(PLAIN, scaling("r2", wind_speed=3.2808), "of r2 as 15 m/s (in ft/s)", ("r2",)),
+    "150 for 15 m/s": Case(PLAIN, stating("r4", wind_speed=150.0), "150 of r4 as 15 m/s", ("r4",)),
+    "fan off in one run": Case(
+        _speeds(0.0, 0.0, 0.0, 15.0), stating("r2", **WIND), "15 of r2 as 0 m/s (with the wind off)", ("r2",)
+    ),
+    "wind on in a wind-off run": Case(
+        _speeds(15.0, 15.0, 0.0, 15.0), stating("r1", wind_speed=0.0), "0 of r1 as 15 m/s", ("r1",)
+    ),
+    "one spring in N mm/rad": Case(PLAIN, scaling("r3", spring_stiffness=1e3), "of r3 as 44.84", ("r3",)),
+    "one spring in N m/deg": Case(
+        PLAIN, scaling("r2", spring_stiffness=np.pi / 180.0), "of r2 as 16.12", ("r2",)
+    ),
+    "one spring's decimal point": Case(PLAIN, scaling("r1", spring_stiffness=0.1), "of r1 as 16.12", ("r1",)),
+    "a spring's decimal point in all its runs": Case(
+        PLAIN, scaling("r3", "r4", spring_stiffness=0.1), "4.484 of r3, r4 as 44.84", ("r3", "r4")
+    ),
+    "two of twelve speeds in km/h": Case(
+        repeated(), scaling("r4", "r11", wind_speed=3.6), "54 of r4, r11 as 15 m/s (in km/h)", ("r4", "r11")
+    ),
+    "one setting in km/h": Case(
+        _several_speeds(), scaling("r2", "r6", wind_speed=3.6), "36 of r2, r6 as 10 m/s (in km/h)", ("r2", "r6")
+    ),
+    "one 20 stated as 10": Case(_several_speeds(), stating("r4", wind_speed=10.0), "10 of r4 as 20", ("r4",)),
+    "one 15 stated as 20": Case(_several_speeds(), stating("r7", wind_speed=20.0), "20 of r7 as 15", ("r7",)),
+    "two speeds exchanged": Case(
+        _several_speeds(), exchanged("r2", "r8", "wind_speed"), "of r2 and r8 exchanged", ("r2", "r8")
+    ),
+    "two files exchanged": Case(
+        _several_speeds(),
+        exchanged("r2", "r8", "wind_speed", "spring_stiffness"),
+        "spring_stiffness and wind_speed of r2 and r8 exchanged",
+        ("r2", "r8"),
+    ),
+    "one density's decimal point": Case(
+        _several_speeds(), scaling("r3", air_density=10.0), "air_density = 12 of r3 as 1.2", ("r3",)
+    ),
+    "one run in minutes": Case(PLAIN, clocking(lambda t: t / 60.0, "r3"), "time_s of r3 in minutes", ("r3",)),
+    "one run in milliseconds": Case(
+        PLAIN, clocking(lambda t: 1e3 * t, "r3"), "time_s of r3 in milliseconds", ("r3",)
+    ),
+    "one run at another rate": Case(
+        PLAIN, clocking(lambda t: 2.0 * t, "r2"), "of r2 of a run sampled 2 times as fast", ("r2",)
+    ),
+    "one run in degrees": Case(
+        honest([Condition(k, v, release=0.05) for k in SPRINGS for v in SPEEDS]),
+        reading(np.degrees, "r3"),
+        "degrees",
+        ("r3",),
+    ),
+    "one run backwards": Case(PLAIN, reading(lambda y: y[::-1], "r1"), "grows with the wind off", ("r1",)),
+    "one spring's label in all runs": Case(
+        PLAIN, stating(spring_stiffness=16.12), "they state equal springs and winds", ALL
+    ),
+    "no wind in all runs": Case(PLAIN, stating(wind_speed=0.0), "they state equal springs and winds", ALL),
+    "AC-coupled at 0.3 s": Case(PLAIN, reading(high_passed(0.3, held=False)), "AC-coupled", ALL),
+    "AC-coupled in one run": Case(PLAIN, reading(high_passed(3.0, held=False), "r3"), "AC-coupled", ("r3",)),
+    "clock drifts by -0.3 %": Case(_clock(-0.003), _nothing, "the clock of the logger drifts", ALL),
+    "clock of one run drifts": Case(_clock(0.003, (44.84, 0.0)), _nothing, "clock of the logger", ("r3",)),
+    "last tenth zeros": Case(PLAIN, reading(padded(0.1)), "stands at 0 rad", ("r2",), refused=False),
+    "sensor unplugged": Case(PLAIN, reading(_unplugged, "r3"), "stands at 0.00", ("r3",), refused=False),
+    "reading stuck for a second": Case(
+        PLAIN, _holding(2000, 2600), "the reading keeps one value", ("r1",), refused=False
+    ),
+    "zeros in the middle": Case(
+        PLAIN, _holding(2000, 2400, 0.0), "the reading keeps one value", ("r1",), refused=False
+    ),
+    "repeated with noise of 1e-4": Case(PLAIN, _with_noise(1e-4), "so counted once", ("again",), refused=False),
+    "repeated and mirrored": Case(
+        PLAIN, twice(lambda t, y: (t, -y), "r2"), "so counted once", ("again",), refused=False
+    ),
+    "repeated under another wind": Case(
+        PLAIN,
+        twice(lambda t, y: (t, np.round(y, 4)), wind_speed=20.0, air_density=1.2),
+        "the same record, by its noise",
+        ("again",),
+    ),
+    "repeated and thinned": Case(
+        PLAIN, twice(lambda t, y: (t[::2], y[::2])), "so counted once", ("again",), refused=False
+    ),
+    "its middle repeated": Case(
+        PLAIN, twice(lambda t, y: (t[500:4000], y[500:4000]), "r3"), "so counted once", ("again",), refused=False
+    ),
+    "wraps at a whole turn": Case(
+        PLAIN,
+        reading(lambda y: y % (2.0 * np.pi), "r4"),
+        "jumps by whole turns",
+        ("r4",),
+        refused=False,
+    ),
+    "resolution in degrees": Case(PLAIN, sensing(resolution=0.03), "contradicts", ("r1",), refused=False),
+    "half of twelve mirrored": Case(
+        repeated(), reading(lambda y: -y, "r1", "r2", "r4", "r5", "r7", "r10"), "sign of the sensor", ("r1", "r3")
+    ),
+    "one of twelve mirrored": Case(repeated(), reading(lambda y: -y, "r8"), "sign of the sensor", ("r8",)),
+    "area in cm2": Case(
+        PLAIN,
+        lambda d: replace(d, rig=replace(d.rig, frontal_area=360.0)),
+        "frontal_area in cm2",
+        OFF,
+        refused=False,
+    ),
+    "length in cm": Case(
+        PLAIN, lambda d: replace(d, rig=replace(d.rig, reference_length=62.5)), "reference_length in cm", OFF,
+        refused=False,
+    ),
+    "springs in kgf m/rad": Case(
+        honest(inertia=INERTIA), scaling(spring_stiffness=1.0 / 9.80665), "in kgf m/rad", OFF, refused=False
+    ),
+}  # fmt: skip

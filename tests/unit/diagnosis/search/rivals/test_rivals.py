@@ -1,0 +1,133 @@
+"""Rivals from outside the vocabulary: two springs that are off, and one of one's own in this file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from diagnosis import diagnose
+from diagnosis.facts.found import as_stated
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import misfit
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import investigate
+from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.two_springs import AnotherSpring, TwoSprings
+from diagnosis.search.weigh import UNKNOWN, FittedSet, weigh
+from diagnosis.settings import Settings
+from tests.support.gap_campaigns import campaign, nominal
+from tunnel_reference.draw import Mixture, draw_campaign
+from tunnel_reference.make import as_campaign, simulate_set
+from tunnel_sim.effects import effect_class, known_effects
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
+ERRORS = (0.01, 0.0, -0.015)
+KINDS = [effect_class(name) for name in ("gravity_stiffness", "rod_flexibility", "spring_miscalibration")]
+
+
+@pytest.fixture(scope="module")
+def two_off():
+    """Three springs, two of them not as stiff as stated, from the reference simulator."""
+    drawn = draw_campaign(np.random.default_rng(1), kind="none", mixture=Mixture(variety=0.0))
+    stated = drawn.conditions.spring_stiffness
+    scale = 1.0 + np.array(ERRORS)[np.unique(stated, return_inverse=True)[1]]
+    moved = replace(drawn, conditions=replace(drawn.conditions, duration=5.0, stiffness_scale=scale))
+    return as_campaign(simulate_set([moved])[0], "two-springs")
+
+
+def test_two_springs_off_are_unknown_and_said_in_words(two_off):
+    kept = {(run.spring_stiffness, run.wind_on): run for run in two_off.runs}  # enough to tell the springs
+    found = diagnose(replace(two_off, runs=tuple(kept.values())), kinds=KINDS)
+    assert tuple(found.causes) == UNKNOWN
+    stated = sorted({run.spring_stiffness for run in two_off.runs})
+    assert "Two springs that are not as stiff as stated would explain the gap: for example, " in found.verdict
+    named = [spring for spring in stated if f"{spring:.4g} N m/rad is " in found.verdict]
+    assert len(named) == 2
+
+
+@pytest.mark.slow
+def test_without_the_rival_two_springs_off_take_false_names(two_off):
+    assert set(diagnose(two_off, kinds=KINDS, rivals=()).causes) == {
+        "gravity_stiffness",
+        "spring_miscalibration",
+    }
+
+
+def test_two_springs_tell_no_alternative():
+    base = nominal(campaign())
+    assert len(base.problem.data.springs) == 2
+    assert TwoSprings().hypotheses([], [], base) == []
+
+
+def test_what_is_outside_is_probable_of_unknown():
+    base = nominal(campaign())
+    left = np.zeros(6)
+    found = misfit(base)
+    gap = replace(found, chi2=found.chi2 + 1e3 * (20.0 + 1e-6 * found.motion))
+    inside = FittedSet(("a", "b"), 0.01, left)
+    alone = {w.effects: w.probability for w in weigh([inside], gap, Settings().weighing)}
+    both = {
+        w.effects: w.probability
+        for w in weigh([inside, FittedSet(("c", "d"), 0.01, left, outside=True)], gap, Settings().weighing)
+    }
+    assert both.keys() == alone.keys() == {("a", "b"), UNKNOWN}
+    assert sum(both.values()) == pytest.approx(1.0)
+    assert both["a", "b"] == pytest.approx(0.5 * alone["a", "b"], rel=0.05)
+
+
+def test_the_alternative_is_no_effect_of_the_vocabulary():
+    assert AnotherSpring not in known_effects()
+
+
+class OneRunOff(Rival):
+    """The stiffness of a single run is not the one stated."""
+
+    def hypotheses(self, likely, known, nominal):
+        del likely, known
+        data = nominal.problem.data
+
+        def changed(index, error):
+            run = data.runs[index]
+            other = replace(run, spring_stiffness=run.spring_stiffness * (1.0 + error))
+            runs = (*data.runs[:index], other, *data.runs[index + 1 :])
+            return fit(Problem(data.with_runs(runs)), nominal.point)
+
+        def best(index):
+            found = minimize_scalar(
+                lambda error: changed(index, error).total, bounds=(-0.05, 0.05), method="bounded"
+            )
+            return changed(index, found.x)
+
+        fits = {run.id: best(index) for index, run in enumerate(data.runs)}
+        run = min(fits, key=lambda run: fits[run].total)
+        return [Hypothesis((f"spring of {run}",), fits[run])]
+
+    def fact(self, best, similarity):
+        del similarity
+        return as_stated(f"The {best.effects[0]} would explain the gap: measure it again.")
+
+
+def one_run_off():
+    """The rig has another spring in its fourth run than its record says."""
+    data = campaign(duration=5.0)
+    run = data.runs[3]
+    runs = (*data.runs[:3], replace(run, spring_stiffness=1.01 * run.spring_stiffness), *data.runs[4:])
+    return replace(data, runs=runs)
+
+
+def test_a_rival_of_ones_own_is_weighed_counts_for_unknown_and_is_said():
+    kinds = [effect_class(name) for name in ("quadratic_damping", "spring_miscalibration")]
+    with_rival, without = (investigate(one_run_off(), kinds, rivals=one) for one in ((OneRunOff(),), ()))
+    (found,) = with_rival.rivals
+    (hypothesis,) = found.hypotheses
+    assert hypothesis.effects == ("spring of r4",)
+    assert hypothesis.fit.excess < 0.01 * with_rival.nominal.excess
+    assert hypothesis.names not in [answer.effects for answer in with_rival.answers]
+    before, after = (study.of(UNKNOWN).probability for study in (without, with_rival))
+    assert before < 0.05  # the other springs explain the gap as well
+    assert 0.4 < after < 0.6
+    said = diagnose(one_run_off(), kinds=kinds, rivals=(OneRunOff(),))
+    assert said.verdict.endswith("The spring of r4 would explain the gap: measure it again.")

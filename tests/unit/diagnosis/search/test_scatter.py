@@ -1,0 +1,174 @@
+"""Runs that do not repeat: scatter is named, hides no cause, is no gap where it is stated, and is no drift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from diagnosis import diagnose, vocabulary
+from diagnosis.answer.next_run import separation
+from diagnosis.search.clock import Clock
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.search.study import Study
+from diagnosis.search.views.whole_runs import WholeRuns
+from tests.marks import slow
+from tests.reference.free_decays import damped_cosine
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
+from tunnel_sim.vocabulary.campaign import (
+    Campaign,
+    Repeatability,
+    RigProperties,
+    Run,
+    SensorProperties,
+)
+from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
+INERTIA, DAMPING, NOISE, RATE = 0.1, 0.03, 3e-4, 100.0
+SPRINGS = (16.0, 16.0, 16.0, 30.0, 30.0, 44.0, 44.0, 44.0)
+FEW = vocabulary(
+    ["cubic_stiffness", "coulomb_friction", "spring_miscalibration", "stiffness_scatter", "damping_scatter"]
+)
+"""What could be taken for scatter, where the whole vocabulary adds nothing but time."""
+SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
+STIFFNESS, DAMPED = "stiffness_scatter", "damping_scatter"
+
+
+@cache
+def campaign(
+    *,
+    scatter: float = 1.0,
+    drift: float = 0.0,
+    cubic: float = 0.0,
+    repeatability: Repeatability | None = None,
+) -> Campaign:
+    """Decays in closed form or by SciPy's integrator, whose springs and dampers differ from run to run.
+
+    Args:
+        scatter: factor on the standard deviations.
+        drift: relative change of the damping from the first to the last run.
+        cubic: κ of a hardening spring, 1/rad².
+    """
+    rng, time = np.random.default_rng(52), np.arange(0.0, 8.0, 1.0 / RATE)
+    order = np.linspace(-0.5, 0.5, len(SPRINGS))
+    runs = []
+    for number, stiffness in enumerate(SPRINGS):
+        spring = stiffness * (1.0 + scatter * SPRING * rng.standard_normal())
+        damper = DAMPING * (1.0 + scatter * DAMPER * rng.standard_normal() + drift * order[number])
+
+        def rates(_: float, y: np.ndarray, k: float = spring, c: float = damper) -> list[float]:
+            return [y[1], -(k * (y[0] + cubic * y[0] ** 3) + c * y[1]) / INERTIA]
+
+        if cubic:
+            swing = solve_ivp(rates, (0.0, time[-1]), (0.3, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
+        else:
+            swing = damped_cosine(time, damper / INERTIA, spring / INERTIA, 0.3, 0.0)
+        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        runs.append(Run(f"r{number}", record, 0.0, spring_stiffness=stiffness))
+    return Campaign(
+        "again", RigProperties(), SensorProperties(RATE), tuple(runs), repeatability=repeatability
+    )
+
+
+@pytest.mark.parametrize("kinds", [FEW, slow(ALL_EFFECTS)])
+def test_scatter_alone_is_named_with_its_size_and_nothing_else(kinds: Sequence[type[Effect]]) -> None:
+    found = diagnose(campaign(), kinds=kinds)
+    assert set(found.causes) == {STIFFNESS, DAMPED}
+    assert found.repeatability is not None
+    for spread in found.repeatability.spreads:
+        width = {STIFFNESS: SPRING, DAMPED: DAMPER}[spread.effect]
+        assert spread.interval[0] < width < spread.interval[1]
+        assert 1.0 / 2.5 < spread.width / width < 2.5  # eight runs tell a standard deviation to a quarter
+
+
+@cache
+def studied(*, scatter: float = 1.0, cubic: float = 0.0) -> Study:
+    return investigate(campaign(scatter=scatter, cubic=cubic), FEW)
+
+
+def test_scatter_hides_no_cause() -> None:
+    found = studied(cubic=0.1)
+    assert "cubic_stiffness" in found.causes
+    assert {*found.causes} <= {"cubic_stiffness", STIFFNESS, DAMPED}
+    name = "cubic_stiffness.coefficient"
+    assert abs(found.chosen.value(name) - 0.1) < 4.0 * found.chosen.std(name)
+
+
+def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
+    """In runs that repeat a wrong spring explains some of the differences; beside them it explains nothing."""
+    cubic, spring = effect_class("cubic_stiffness"), effect_class("spring_miscalibration")
+    view = WholeRuns.after(nominal_study(campaign(cubic=0.1), FEW).prepared, None, Clock())
+    assert view is not None
+    (alone,) = sets_with_one_more([view.smallest], [cubic])
+    (both,) = sets_with_one_more([alone], [spring])
+    beside = view.beside(both)
+    assert beside is not None
+    assert beside.effects == ("cubic_stiffness", "spring_miscalibration")
+    assert view.likeliest_part([beside]).effects == ("cubic_stiffness",)
+
+
+def test_runs_that_repeat_show_none() -> None:
+    found = diagnose(campaign(scatter=0.0), kinds=FEW)
+    assert found.causes == ()
+    assert found.repeatability is not None
+    assert found.repeatability.spreads == ()
+
+
+def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
+    stated = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
+    within = diagnose(campaign(repeatability=stated), kinds=FEW)
+    assert not within.gap.detected
+    assert within.causes == ()
+    beyond = diagnose(campaign(scatter=8.0, repeatability=stated), kinds=FEW)
+    assert beyond.gap.detected
+    assert set(beyond.causes) <= {STIFFNESS, DAMPED}
+    assert beyond.causes
+
+
+def test_intervals_hold_the_scatter() -> None:
+    """The inertia's standard deviation is that of a spring over the root of the number of runs, at least."""
+    study, repeats = (studied(scatter=size) for size in (1.0, 0.0))
+    own = study.similarity.own(1.0, "kg m2")
+    value, std = (own * one for one in (study.chosen.value("yaw_inertia"), study.chosen.std("yaw_inertia")))
+    assert std > 0.7 * INERTIA * SPRING / np.sqrt(len(SPRINGS))
+    assert abs(value - INERTIA) < 4.0 * std
+    assert repeats.similarity.own(repeats.chosen.std("yaw_inertia"), "kg m2") < 0.1 * std
+
+
+def test_a_further_run_is_predicted_without_a_deviation() -> None:
+    fitted = studied(cubic=0.1).chosen
+    assert fitted.problem.scatter
+    run = fitted.problem.data.runs[0]
+    assert separation(fitted, fitted, run, 0.3) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
+    found = diagnose(campaign(scatter=0.0, drift=0.2), kinds=FEW)
+    assert found.causes == ("unknown",)
+    assert found.repeatability is not None
+    (trend,) = found.repeatability.trends
+    assert trend.effect == DAMPED
+    assert trend.change == pytest.approx(0.2, abs=0.01)
+    assert trend.only
+    assert "by chance" not in found.verdict
+
+
+def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
+    runs = campaign()
+    faulty = campaign(scatter=40.0).runs[4]
+    changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
+    found = diagnose(replace(runs, runs=changed), kinds=FEW)
+    assert found.repeatability is not None
+    assert found.repeatability.outlier == faulty.id
+    others = found.repeatability.without_outlier
+    assert others is not None
+    assert set(others.causes) <= {STIFFNESS, DAMPED}
+    assert f"Run {faulty.id} deviates far beyond the others" in found.verdict
+    assert "Without it " in found.verdict

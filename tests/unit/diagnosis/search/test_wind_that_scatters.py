@@ -1,0 +1,154 @@
+"""Wind speeds that differ from run to run: fits find what acts between runs, and vortices keep their phase."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from diagnosis.likelihood import least_squares
+from diagnosis.likelihood.between_runs import width_prior
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model import chance
+from diagnosis.model.parameters import Point
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import nominal_study
+from diagnosis.search.scatter import scattered
+from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
+
+INERTIA, DAMPING, NOISE, RATE, DENSITY = 0.1, 0.02, 3e-4, 100.0, 1.2
+CN_BETA, CN_R, STROUHAL = 0.45, -0.1, 0.06
+SPEEDS = (0.0, 0.0, 12.0, 16.0, 16.0, 20.0, 20.0, 24.0)
+SPRINGS = (16.0, 30.0) * 4
+SCATTER = 3e-3  # of the speed, relative, one standard deviation
+BODY = load_rig().body
+
+
+@cache
+def blown(
+    *, offset: float = 0.0, shedding: float = 0.0, lead: float = 0.0, sensor_error: float = 0.0
+) -> Campaign:
+    """Decays by SciPy's integrator in winds that differ from what is stated.
+
+    Args:
+        offset: by which the true wind is faster, m/s.
+        shedding: coefficient of the moment of vortices.
+        lead: time constant by which the moment leads the angle, in l/V.
+        sensor_error: cubic error of the readings, 1/rad².
+    """
+    rng, time = np.random.default_rng(7), np.arange(0.0, 8.0, 1.0 / RATE)
+    runs = []
+    for number, (stated, spring) in enumerate(zip(SPEEDS, SPRINGS, strict=True)):
+        wind = (stated + offset) * (1.0 + SCATTER * rng.standard_normal()) if stated else 0.0
+        pressure = 0.5 * DENSITY * wind**2 * BODY.frontal_area * BODY.length
+        lever = BODY.length / wind if wind else 0.0
+        turn, phase = 2.0 * np.pi * STROUHAL * wind / BODY.width, rng.uniform(0.0, 2.0 * np.pi)
+
+        def rates(
+            t: float,
+            y: np.ndarray,
+            k: float = spring - pressure * CN_BETA,
+            c: float = DAMPING - pressure * lever * CN_R,
+            forcing: tuple[float, float, float] = (pressure * shedding, turn, phase),
+            ahead: tuple[float, float] = (pressure * CN_BETA, lead * lever),
+        ) -> list[float]:
+            size, rate, start = forcing
+            stiffness, constant = ahead
+            behind = (y[0] - y[2]) if constant else 0.0
+            moment = -k * y[0] - c * y[1] + size * np.sin(rate * t + start) + stiffness * behind
+            return [y[1], moment / INERTIA, behind / constant if constant else 0.0]
+
+        start = (0.3, 0.0, 0.3)
+        swing = solve_ivp(rates, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
+        record = Record(time, swing + sensor_error * swing**3 + rng.normal(0.0, NOISE, time.size))
+        runs.append(
+            Run(
+                f"r{number}", record, stated, air_density=DENSITY if stated else None, spring_stiffness=spring
+            )
+        )
+    rig = RigProperties(frontal_area=BODY.frontal_area, reference_length=BODY.length, width=BODY.width)
+    return Campaign("blown", rig, SensorProperties(RATE), tuple(runs))
+
+
+def beside_scatter(found: Campaign, effect: str) -> tuple[Fit, Fit]:
+    """The nominal model and one effect, fitted beside speeds that scatter; the effect from nearly none of it."""
+    nominal = nominal_study(found, known_effects()).prepared.nominal
+    base = scattered(nominal, known_effects())
+    assert base is not None
+    start = starting_points(base, effect_class(effect))[0]
+    assert start.scaled is not None
+    common = start.point.common.copy()
+    common[start.scaled] *= 0.1
+    fitted = try_fit(start.problem, Point(common, start.point.release))
+    assert fitted is not None
+    return base, fitted
+
+
+@cache
+def off() -> tuple[Fit, Fit]:
+    """Beside a speed that is 2 m/s off."""
+    return beside_scatter(blown(offset=2.0), "wind_speed_offset")
+
+
+def away(fitted: Fit) -> float:
+    """How far linear theory still moves the last parameter, in standard deviations."""
+    here = fitted.columns.at(fitted.widths, width_prior(fitted.problem))
+    return float(abs(here.found.common[-1]) / fitted.std(fitted.problem.names[-1]))
+
+
+def test_a_fit_beside_scatter_reaches_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Deviations absorb a speed that is off nearly as well: the valley of χ² is long and bent."""
+    base, fitted = off()
+    assert away(fitted) < 0.1
+    assert abs(fitted.value("wind_speed_offset.offset") - 2.0) < 3.0 * fitted.std("wind_speed_offset.offset")
+    assert base.unlikelihood - fitted.unlikelihood > 14.0
+    monkeypatch.setattr(least_squares, "_CORRECTIONS", 0)
+    assert away(beside_scatter(blown(offset=2.0), "wind_speed_offset")[1]) > 2.0
+
+
+def test_vortices_keep_time_with_the_true_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the stated speed their phase is lost within some cycles."""
+    nominal = nominal_study(blown(shedding=0.05), known_effects()).prepared.nominal
+    base = scattered(nominal, known_effects())
+    assert base is not None
+    (start,) = starting_points(base, effect_class("vortex_shedding"))
+    followed = try_fit(start.problem, start.point)
+    assert followed is not None
+    assert followed.value("vortex_shedding.strouhal_number") == pytest.approx(STROUHAL, rel=3.0 * SCATTER)
+    monkeypatch.setattr(chance, "_KEEPING_TIME", ())
+    stated = try_fit(start.problem, start.point)
+    assert stated is not None
+    assert followed.excess < 0.1 * stated.excess
+
+
+def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Cnr absorbs its first order, and the deviations of the runs most of a prediction from there."""
+    _, base = beside_scatter(blown(lead=0.3, sensor_error=-0.07), "sensor_nonlinearity")
+    lag = effect_class("unsteady_aero_lag")
+    (start,) = starting_points(base, lag)
+    assert start.predicted_drop < base.settings.search.least_drop
+    assert sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag]) == []
+    monkeypatch.setattr(Hypothesis, "explains_runs", True)
+    (child,) = sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag])
+    assert base.unlikelihood - child.fit.unlikelihood > 1.2 * start.predicted_drop
+    assert abs(child.fit.value("unsteady_aero_lag.lag") + 0.3) < 3.0 * child.fit.std("unsteady_aero_lag.lag")
+
+
+def test_which_effects_only_the_comparison_of_runs_shows() -> None:
+    """A speed that is off does to every run what a deviation does; the vortices' line is in each of them."""
+    assert off()[1].compared == 1
+    assert not off()[1].shown.any()
+    base, shed = beside_scatter(blown(shedding=0.05), "vortex_shedding")
+    assert (base.compared, shed.compared) == (0, 0)
+    of_effect = [name.startswith("vortex_shedding.") for name in shed.problem.names]
+    assert any(of_effect)
+    assert shed.shown.tolist() == of_effect

@@ -1,0 +1,201 @@
+"""What is said of runs that do not repeat: causes proper first, then the scatter, the outlier and the drift."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from diagnosis.words.remainder import closable_words
+from diagnosis.words.scatter import repeatability_line, repeatability_table, scatter_words, width_text
+from diagnosis.words.tables import (
+    candidates_table,
+    diagnosis_brief,
+    inclusion_line,
+    parameters_table,
+    waterfall_table,
+)
+from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
+from diagnosis.words.where import where_words
+from tests.support.diagnosis_document import CAUSE, scattering_document
+
+Document = dict[str, Any]
+SPEED, SPRING, DAMPING = range(3)
+
+
+@pytest.fixture
+def given() -> Document:
+    return scattering_document()
+
+
+def alone(given: Document) -> Document:
+    """The same campaign where nothing but scatter is named."""
+    given["causes"].remove(CAUSE)
+    given["credible"][0]["effect"] = " + ".join(given["causes"])
+    return given
+
+
+def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document) -> None:
+    text = verdict(given, "What remains is small.")
+    assert (
+        "is explained by quadratic damping (probability 91 %). It acts on the damping, with the wind on and off. "
+        "Beside it" in text
+    )
+    assert (
+        "Beside it the runs differ by chance: the wind speed by 0.29 % (0.13 to 0.62 %), beta −0.6 % and gamma "
+        "+0.5 % most; the damping by 1.0 % (0.62 to 1.8 %), beta −2 % and alpha +1 % most."
+    ) in text
+    assert "the intervals of the coefficients allow for them" in text
+    assert "With it added and these differences allowed for, 98.8 % of the gap closes" in text
+    assert "What remains is small. Cnβ rises by" in text
+    assert headline(given) == ("quadratic damping, and scatter between runs", "found")
+    given["causes"].append("coulomb_friction")
+    assert "Beside them the runs differ by chance: " in verdict(given, "")
+    given["causes"].pop()
+    assert "quadratic damping, and scatter between runs (probability 91 %)" in diagnosis_brief(given)
+
+
+def test_scatter_alone_is_said_to_be_all(given: Document) -> None:
+    text = verdict(alone(given), "")
+    assert (
+        "The runs differ from each other by chance, and by nothing else (probability 91 %): the wind" in text
+    )
+    assert "is explained" not in text
+    assert headline(given) == ("Scatter between runs", "found")
+    given["rest"]["material"] = True
+    assert "by nothing else" not in verdict(given, "")
+
+
+def test_an_outlier_is_named_with_its_deviation(given: Document) -> None:
+    text = verdict(given, "")
+    assert "Run beta deviates far beyond the others: frequency −1.2 % against the model of all runs." in text
+    assert any(step.startswith("Repeat run beta, ") for step in next_steps(given))
+    given["repeatability"]["outlier"] = ""
+    assert "far beyond" not in verdict(given, "")
+    assert not any("Repeat run" in step for step in next_steps(given))
+
+
+def test_what_is_stated_is_compared(given: Document) -> None:
+    spreads = given["repeatability"]["spreads"]
+    spreads[SPEED]["stated"] = 0.001
+    assert "0.62 %), beyond the 0.1 % stated, beta" in scatter_words(given)
+    for one in spreads:
+        one |= {"shown": False, "stated": 0.003}
+    given["causes"] = []
+    text = verdict(given, "")
+    assert text.startswith("No gap: ")
+    assert "differ from each other within what is stated (the wind speed 0.3 %, the spring 0.3 %" in text
+
+
+def test_numbers_told_apart_poorly_are_said_to_be(given: Document) -> None:
+    spreads = given["repeatability"]["spreads"]
+    assert (
+        "These runs do not show whether the spring differs as well; by up to 0.064 % it may."
+        in scatter_words(given)
+    )
+    spreads[SPRING]["shown"] = True
+    assert "as well" not in scatter_words(given)
+    assert "poorly" not in scatter_words(given)
+    spreads[SPEED]["interval"] = [1e-4, 2e-3]
+    assert "tell the wind speed and the spring apart poorly" in scatter_words(given)
+    spreads[SPRING]["shown"], spreads[SPEED]["shown"] = True, False
+    given["causes"] = sorted({*given["causes"], "stiffness_scatter"} - {"wind_speed_scatter"})
+    assert any(step.startswith("Log the wind speed of every run") for step in next_steps(given))
+
+
+def test_a_drift_alone_is_not_said_to_be_by_chance(given: Document) -> None:
+    trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0002}
+    repeatability = given["repeatability"]
+    repeatability["trends"] = [trend | {"only": True}]
+    repeatability["spreads"] = repeatability["spreads"][:1]
+    text = scatter_words(given)
+    assert text == (
+        "The runs drift and do not scatter: the wind speed rises by 0.810 ± 0.060 % from the first to the last run "
+        "(does the lab warm up, or the fan drift?). The intervals of the coefficients allow for it."
+    )
+    repeatability["trends"] = [trend]
+    assert "by chance" in scatter_words(given)
+
+
+def test_a_drift_is_not_by_chance(given: Document) -> None:
+    trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0012}
+    given["repeatability"]["trends"] = [trend]
+    text = scatter_words(given)
+    assert (
+        "That is not all by chance: the wind speed rises by 0.810 ± 0.060 % from the first to the last run (does "
+        "the lab warm up, or the fan drift?), and differs by 0.12 % beside that."
+    ) in text
+    assert "gamma +0.5 %" not in text  # the drift says it better
+    trend["change"] = -0.0081
+    assert "the wind speed falls by" in scatter_words(given)
+
+
+def test_undecided_answers_share_the_scatter(given: Document) -> None:
+    both = " + ".join(sorted(set(given["causes"]) - {CAUSE}))
+    given["decided"] = False
+    given["credible"] = [
+        {"effect": given["candidates"][0]["effect"], "probability": 0.5},
+        {"effect": both, "probability": 0.4},
+    ]
+    given["common"] = {
+        "effects": {"wind_speed_scatter": 0.9},
+        "channels": {"damping": 0.9, "calibration": 0.9},
+    }
+    text = undecided_words(given)
+    assert "quadratic damping (50 %) or scatter between runs (40 %)." in text
+    assert "wind speed scatter" not in text
+    assert "Whatever the cause, the runs differ from each other by chance: " in verdict(given, "")
+
+
+def test_the_place_of_differences_between_runs_is_between_them(given: Document) -> None:
+    given["found"]["place"]["channel"] = {"kind": "damping between runs"}
+    text = where_words(given)
+    assert "Most of it is between the runs: each run alone is linear." in text
+    assert "not agree with one model" not in text
+    assert "That agrees" not in text
+    given["causes"] = ["unknown"]
+    assert "not agree with one model" in where_words(given)
+
+
+def test_tables_state_widths_in_per_cent(given: Document) -> None:
+    rows = {row[0]: row[1:] for row in parameters_table(given).rows}
+    assert rows["wind_speed_scatter"] == ("spread", "0.29 % (0.13 to 0.62 %)")
+    assert candidates_table(given).rows[0][0] == "quadratic_damping +\nscatter between runs"
+    assert waterfall_table(given).rows[1][0] == "scatter between runs"
+    given["inclusion"] |= {"wind_speed_scatter": 0.99, CAUSE: 0.93}
+    assert inclusion_line(given).endswith("wind_speed_scatter 99 %")
+    assert width_text({"width": 0.003, "interval": [0.003, 0.003]}) == "0.30 %"
+
+
+def test_every_run_is_listed_against_the_model(given: Document) -> None:
+    table = repeatability_table(given)
+    assert [row[0] for row in table.rows] == ["alpha", "beta", "gamma"]
+    assert table.rows[1][1:] == (
+        "on",
+        "−1.19000(13) (± 0.039)",
+        "−0.4300(97) (± 0.39)",
+        "deviates far beyond the others",
+    )
+    frequency = (1.5e-4**2 + 3.9e-4**2 + 0.0013**2) / 3
+    assert f"frequency ± {100 * frequency**0.5:.2g} %" in repeatability_line(given)
+    assert repeatability_line(given).endswith("; beyond it: beta")
+    given["repeatability"]["spreads"] = []
+    assert (
+        repeatability_line(given)
+        == "Repeatability: the runs repeat; no scatter of their frequency or damping shows"
+    )
+    assert not repeatability_table(given).rows
+    given["repeatability"] = None
+    assert repeatability_line(given) == ""
+    assert not repeatability_table(given).rows
+
+
+def test_what_could_be_closed_of_an_undecided_gap_is_beyond_the_scatter(given: Document) -> None:
+    given["closable"] = {
+        "excess": 1.2, "ceilings": [{"kind": "angle", "closed": 0.85, "std": 0.02, "held_out": "runs"}],
+        "kind": "angle", "words": "", "events": [], "curve": None, "law": None, "alike": [], "next_most": None,
+        "line": None,
+    }  # fmt: skip
+    assert "% of what the causes leave could be closed" in closable_words(given)
+    given["decided"] = False
+    assert "% of the gap beyond the scatter between runs could be closed" in closable_words(given)

@@ -1,0 +1,333 @@
+"""Sentences from a document: where the gap is, caveats, what remains, and all text fields at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from diagnosis.facts.closure import Confirmation, NoiseSummary
+from diagnosis.facts.found import Fact, Found, Noted, Nowhere
+from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, Where
+from diagnosis.settings import settings_of
+from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
+from diagnosis.words.numbers import KINDS
+from diagnosis.words.remainder import closable_words, rest_line, rest_words
+from diagnosis.words.tables import closable_table
+from diagnosis.words.verdict import next_steps
+from diagnosis.words.where import REASONS, reason, where_words
+from diagnosis.words.written import sentences
+from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document
+
+Document = dict[str, Any]
+
+
+@pytest.fixture
+def given() -> Document:
+    return document()
+
+
+def placed(given: Document, **changes: Any) -> str:
+    """Where the gap is, with changes of the facts of its place."""
+    given["found"]["place"] |= changes
+    return where_words(given)
+
+
+def test_where_the_gap_is_says_runs_places_bands_and_reasons(given: Document) -> None:
+    assert where_words(given) == (
+        "88 % of the gap is in 2 of 3 runs (alpha, gamma); 4.2 times as much power with the wind on as with it "
+        "off. Four fifths of it lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
+        "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on "
+        "the damping: the damping shifts along the decay more than the frequency does. It is there with the wind "
+        "on and off: the 2 wind-off runs, fitted alone, show it too. That agrees with quadratic damping."
+    )
+
+
+def test_the_runs_that_show_the_gap(given: Document) -> None:
+    given["where"]["runs"] = ["alpha"]
+    assert placed(given).startswith("88 % of the gap is in one run of 3 (alpha); ")
+    assert "nearly all of it with the wind on." in placed(given, wind={"on": 9.0, "off": 0.1})
+    given["where"]["runs"] = list(IDS)
+    assert placed(given, wind={}).startswith("All 3 runs show the gap. ")
+    assert "with the wind" not in placed(given, wind={})
+    assert placed(given, runs=13).startswith("88 % of the gap is in 3 of 13 runs (alpha, beta, gamma)")
+    given["where"]["runs"] = [f"r{number}" for number in range(13)]
+    assert placed(given, runs=20).startswith("88 % of the gap is in 13 of 20 runs.")
+    given["where"]["runs"] = []
+    assert placed(given).startswith("No single run is beyond chance (false-alarm rate 1 % over all runs)")
+
+
+def test_only_what_locates_the_gap_is_said(given: Document) -> None:
+    assert "of it lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
+    text = placed(given, narrow=[], bands={})
+    assert "of it lie" not in text
+    assert "By frequency" not in text
+
+
+def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document) -> None:
+    text = placed(given, compared=["coulomb_friction", "gravity_stiffness", "quadratic_damping"], agrees=True)
+    assert text.endswith(
+        "Of the causes coulomb friction and quadratic damping act there, and gravity stiffness acts on the "
+        "restoring moment (stiffness)."
+    )
+    assert "does not agree" not in text
+    text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)
+    assert text.endswith(
+        "That does not agree with cubic stiffness and sensor drift: cubic stiffness acts on the restoring moment "
+        "(stiffness) and sensor drift acts on the reading of the sensor."
+    )
+
+
+def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
+    text = placed(given, compared=["cubic_stiffness"], agrees=False)
+    assert text.endswith(
+        "That does not agree with cubic stiffness: it acts on the restoring moment (stiffness)."
+    )
+    assert placed(given, compared=[]).endswith("show it too.")
+    given["where"] |= {"channel": None, "condition": None}
+    text = placed(
+        given, channel={"kind": "frequency between runs"}, condition={"kind": "one run", "run": "beta"}
+    )
+    assert "What it acts on cannot be determined: each run alone is linear" in text
+    assert text.endswith("; whether it needs wind cannot be determined from one run alone (beta).")
+
+
+@pytest.mark.parametrize(
+    ("within_step", "end"),
+    [
+        (
+            False,
+            "consistent with the noise (p = 0.42 for the run that differs most, corrected for their number).",
+        ),
+        (True, "corrected for their number), but within the steps of the readings."),
+    ],
+)
+def test_without_a_gap_it_is_nowhere(given: Document, within_step: bool, end: str) -> None:
+    given["found"] |= {"place": None, "nowhere": {"runs": 3, "p_value": 0.42, "within_step": within_step}}
+    text = where_words(given)
+    assert text.startswith("Nowhere: in 3 runs the residual is")
+    assert text.endswith(end)
+
+
+FIGURES = {
+    "runs": 2, "run": "beta", "from_s": 1.0, "to_s": 2.0, "frequency_hz": 50.0, "words": "So it is.", "ratio": 3.5,
+    "quantity": "rate", "reason": "it is too heavy", "records_rad": 1e-9, "fits_rad": 1e-5, "failure": "it grows",
+    "rms_rad": 2e-5, "tolerance_rad": 1e-5, "tolerance": 0.1, "driven": False, "windy": True, "effects": [RIVAL],
+    "std_rad": 1e-3, "fewer": 1, "uncertainty_rad": 1e-5, "stated_rad": 2e-3, "least_rad": 1e-3, "most_rad": 3e-3,
+    "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93, "left": 0.4,
+    "below_per_s": 4.2e-3, "unit": "rad",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("table", [CAUTIONS, PATCH])
+def test_every_caveat_and_note_is_a_sentence_of_its_figures(table: Any) -> None:
+    for kind in table:
+        text = said(table, {"kind": kind, **FIGURES})
+        assert text.endswith(".")
+        assert text[0].isupper() or text.startswith("frictionloss")
+        assert "{" not in text
+
+
+def test_every_reason_is_a_clause_of_its_figures() -> None:
+    for texts in (
+        [reason({"kind": kind, **FIGURES}) for kind in REASONS],
+        [said(NOISE, {"kind": kind, **FIGURES}) for kind in NOISE],
+    ):
+        assert not any(text.endswith(".") or "{" in text or text[0].isupper() for text in texts)
+        assert len(set(texts)) == len(texts)
+
+
+def test_caveats_state_their_figures() -> None:
+    few = {"kind": "few runs", "runs": 1, "driven": False, "windy": False}
+    assert said(CAUTIONS, few).endswith("Add runs with other springs and release angles.")
+    assert said(CAUTIONS, few).startswith(
+        "There is one run only: causes are distinguished by the form of the decay"
+    )
+    assert said(CAUTIONS, few | {"runs": 2, "windy": True}).endswith(
+        "springs, wind speeds and release angles."
+    )
+    assert said(CAUTIONS, few | {"driven": True}).endswith(
+        "form of the motion alone. Add runs with other inputs."
+    )
+    left_out = said(CAUTIONS, {"kind": "another mode", "ratio": 1.5, "runs": ["r1", "r3"]})
+    assert "1.5 times as fast as the same spring with the wind off or faster: r1, r3." in left_out
+    differs = said(CAUTIONS, {"kind": "not confirmed", **FIGURES})
+    assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in differs
+    rates = said(CAUTIONS, {"kind": "not confirmed", **FIGURES}, "rad/s")
+    assert "by 0.0011 °/s (root mean square over beta)" in rates
+
+
+def test_remarks_on_the_noise_have_their_remedies() -> None:
+    folded = {"kind": "folded hum", "line_hz": 100.0, "places_hz": [40.0, 60.0], "runs": ["a", "b"]}
+    found = remark(folded)
+    assert found.runs == ("a", "b")
+    assert found.what.endswith("is above half the sample rate and appears at 40 to 60 Hz")
+    assert found.remedy == "sample faster to see it where it is"
+
+
+@pytest.mark.parametrize(
+    ("beta", "words"),
+    [
+        ("cn_beta", ""),
+        ("", ""),
+        (
+            "cn_beta_area",
+            "states no frontal_area, so Cnβ·A and Cnr·A are identified, not Cnβ and Cnr. State it to",
+        ),
+        ("cn_beta_length", "states no reference_length, so Cnβ·l and Cnr·l² are identified"),
+        (
+            "cn_beta_area_length",
+            "no frontal_area and no reference_length, so Cnβ·A·l and Cnr·A·l² are identified",
+        ),
+    ],
+)
+def test_what_unstated_sizes_leave_open(beta: str, words: str) -> None:
+    assert words in size_note(beta)
+    assert bool(size_note(beta)) == bool(words)
+
+
+def test_the_note_on_the_coefficients(given: Document) -> None:
+    assert coefficient_note(given | {"causes": []}).startswith(
+        "With no cause these agree with the values of identify"
+    )
+    assert coefficient_note(given | {"causes": ["unknown"]}) == ""
+    cycling = given | {"found": given["found"] | {"limit_cycles": [{"runs": ["a"], "what": "it settles"}]}}
+    assert (
+        coefficient_note(cycling)
+        == "no damping ratio and no derivative is stated, since no run is a free decay"
+    )
+
+
+def test_what_remains(given: Document) -> None:
+    assert rest_words(given) == (
+        "Explained; what remains (0.00946° root mean square) moves Cnβ by less than 0.28 % and Cnr by less than "
+        "4.6 %."
+    )
+    rest = given["rest"]
+    large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
+    assert rest_words(large).startswith(
+        "Not all is explained: what remains (0.544° root mean square, 21 times the noise) moves Cnβ by less than"
+    )
+    assert rest_words(given | {"causes": ["unknown"]}).startswith("It hardly matters: it moves Cnβ by")
+    assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
+    calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
+    assert rest_words(calm) == (
+        "Explained; what remains is within the noise. Sensor drift is significant beside it and too small to be "
+        "named."
+    )
+    rest["moves"]["cn_r"]["material"] = True
+    assert rest_words(given).startswith(
+        "Not all is explained: what remains (0.00946° root mean square) could move Cnr by 0."
+    )
+    assert rest_words(given | {"rest": None}) == ""
+    assert rest_line(given | {"rest": None}) == ""
+    assert rest_line(given | {"rest": rest | {"words": "Explained."}}) == "Explained."
+
+
+CEILINGS = [
+    {"kind": "angle", "closed": 0.85, "std": 0.02, "held_out": "runs"},
+    {"kind": "rate", "closed": 0.31, "std": 0.03, "held_out": "runs"},
+    {"kind": "event", "closed": 0.9, "std": 0.7, "held_out": "short gaps"},
+]
+CLOSABLE = {
+    "kind": "angle", "ceilings": CEILINGS, "events": [], "law": None, "alike": [], "next_most": 0.31, "line": None,
+}  # fmt: skip
+
+
+def test_what_could_be_closed(given: Document) -> None:
+    def text(**changes: Any) -> str:
+        return closable_words(given | {"closable": CLOSABLE | changes})
+
+    first = (
+        "85.0 ± 2.0 % of what the causes leave could be closed by a moment of the angle alone, measured on"
+    )
+    assert text().startswith(first)
+    assert text().endswith("No other kind measured on runs would close more than 31.0 %.")
+    larger = [*CEILINGS[:2], CEILINGS[2] | {"closed": 0.97, "std": 0.01}]
+    said_both = text(ceilings=larger)
+    assert said_both.startswith(first)
+    assert said_both.endswith(
+        "A moment in time of each run's own would close 97.0 ± 1.0 %, measured on short gaps. One law of all runs "
+        "is named before it from four fifths of that share on, since it can be a property of the rig."
+    )
+    table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})
+    assert "at most" not in table.title
+    assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
+    assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
+    stated = {"moment": "k*b^n", "parameters": {"k": {"unit": "N m"}, "n": {"unit": "1"}}}
+    values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}
+    law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
+    assert text(law=law).endswith(
+        "The formula k*b^n closes 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
+    )
+    flat = law | {
+        "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
+    }
+    assert text(law=flat).endswith(
+        "with k = -0.2457 ± 0.0012 N m, n = 3.000 ± 0.020 and d and q not determined by these runs."
+    )
+    with_law = given | {"causes": ["unknown"], "decided": True, "closable": CLOSABLE | {"law": law}}
+    assert any(
+        step.startswith("Write the formula as an effect with --propose") for step in next_steps(with_law)
+    )
+    without = with_law | {"closable": CLOSABLE}
+    assert not any("formula" in step for step in next_steps(without))
+    events = [{"run": "beta", "share": 0.9, "from_s": 1.0, "to_s": 2.5}] * 2
+    assert text(events=events).endswith(
+        "Most of it is in 2 runs, the largest part in run beta (1.00 to 2.50 s)."
+    )
+    line = {
+        "frequency_hz": 7.2, "frequency_std_hz": 0.0011, "amplitude": 2.4e-4, "amplitude_std": 1e-5, "unit": "rad",
+        "false_alarm_rate": 0.01,
+    }  # fmt: skip
+    assert "The line is at 7.2000 ± 0.0011 Hz, with an amplitude of 0.01375 ± 0.00057°" in text(line=line)
+    assert text(kind="noise").startswith(
+        "No more than 89.0 % of what the causes leave could be closed by any smooth"
+    )
+    given["decided"] = False
+    assert " of the gap could be closed by" in text()
+    assert closable_words(given | {"closable": None}) == ""
+
+
+def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
+    found = sentences(given)
+    assert found.verdict.startswith("The gap (0.135° root mean square, 2.9 % of the swing)")
+    assert found.rest in found.verdict
+    assert found.where == where_words(given)
+    assert found.noise == "the campaign states no noise"
+    assert [text.partition(":")[0] for text in found.cautions] == ["There are 2 runs only"]
+    assert found.remarks[0].what.startswith("sampled too slowly")
+    assert (found.closable, found.patch) == ("", ())
+    assert CAUSE.replace("_", " ") in found.verdict
+
+
+def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None:
+    changed = given | {"provenance": {"settings": {"where.interval_share": 0.75, "words.runs_listed": 1}}}
+    assert settings_of(changed).where.interval_share == 0.75
+    text = where_words(changed)
+    assert "Three quarters of it lie between" in text
+    assert "in 2 of 3 runs;" in text
+
+
+def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
+    noise = NoiseSummary(4e-4, None, "estimated")
+    value = {"cn_beta": ParameterEstimate(0.5, 0.001, "1/rad")}
+    found = Found(
+        nowhere=Nowhere(3, 0.5, within_step=False),
+        noise=Fact("not stated"),
+        cautions=(Fact("cut"),),
+        noted=(Noted(("a",), Fact("not judged")),),
+    )
+    answer = Diagnosis(
+        "c", (), GapSummary(False, 0.01, 0.01, 0.0, "", (), 1e-3, 0.5), Where(None, None),
+        (Candidate("none", 1.0, 0.01, 0.0),), (), None,
+        Coefficients(value, value), Confirmation(True, 0.0, "a", 0.0, 1e-5), noise, found=found,
+    )  # fmt: skip
+    once = answer.in_words()
+    assert once.verdict.startswith("No gap: ")
+    assert once.where.words.startswith("Nowhere: in 3 runs")
+    assert once.noise.reason == "the campaign states no noise"
+    assert once.coefficients.note.startswith("With no cause these agree")
+    assert [text.partition(" ")[0] for text in once.cautions] == ["The"]
+    assert [remark.runs for remark in once.remarks] == [("a",)]
+    assert once.in_words() == once

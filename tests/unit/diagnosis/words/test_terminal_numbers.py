@@ -1,0 +1,374 @@
+"""Every number of the tables in a terminal is the one of the document or the estimate.
+
+Truth: a document and an estimate written by hand; cells are read back as a person reads them.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.table import Table
+
+from diagnosis.words import tables
+from diagnosis.words.numbers import probability, share
+from diagnosis.words.tables import (
+    candidates_table,
+    closing_lines,
+    coefficients_line,
+    diagnosis_parts,
+    gap_table,
+    hidden_line,
+    hidden_table,
+    inclusion_line,
+    parameters_table,
+    waterfall_table,
+)
+from diagnosis.words.verdict import rival_lines, run_words
+from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
+from identification.printing import TextTable, coefficients_table, status_lines
+from identification.status import Status
+from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.support.shown_numbers import assert_shows
+from tunnel_lab.report.page import render_report
+from tunnel_lab.terminal import outputs
+
+Document = dict[str, Any]
+Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")
+
+
+@pytest.fixture
+def given() -> Document:
+    return copy.deepcopy(document())
+
+
+def rows(table: Table | TextTable) -> list[list[str]]:
+    """The cells of a table, units and brackets of units left out."""
+    plain = outputs.rich_table(table) if isinstance(table, TextTable) else table
+    columns = [[str(cell) for cell in column.cells] for column in plain.columns]
+    return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
+
+
+def short(text: str) -> tuple[float, float]:
+    """Value and standard deviation of the short notation."""
+    found = re.fullmatch(r"(-?\d+\.?(\d*))\((\d+\.?\d*)\)", text)
+    assert found, text
+    unit = 1.0 if "." in found[3] else 10.0 ** -len(found[2])
+    return float(found[1]), unit * float(found[3])
+
+
+def test_answers(given: Document) -> None:
+    *listed, last = rows(candidates_table(given))
+    assert len(listed) == 4
+    for cells, candidate in zip(listed, given["candidates"], strict=False):
+        assert cells[0] == candidate["effect"]
+        assert cells[1] == f"{100.0 * candidate['probability']:.0f} %"
+        fitted = candidate["effect"] not in ("none", "unknown")
+        assert_shows(cells[2], [100 * candidate["closed"]] if fitted else [])
+    assert_shows(last[0], [3])
+    assert last[1] == "< 1 %"
+
+
+def test_several_effects_of_an_answer_have_a_line_each(given: Document) -> None:
+    given["candidates"][0]["effect"] = "free_play + mains_hum + sensor_drift"
+    assert rows(candidates_table(given))[0][0] == "free_play +\nmains_hum +\nsensor_drift"
+
+
+def test_parameters_of_the_answer(given: Document) -> None:
+    ((effect, name, text),) = rows(parameters_table(given))
+    assert (effect, name) == (given["causes"][0], "coefficient")
+    assert_shows(text, [0.003125, 1.7e-5])
+    given["candidates"][0]["parameters"] = {
+        "a.x": {"value": 0.25, "std": 0.01, "unit": "1"},
+        "a.y": {"value": 2.5, "std": None, "unit": "1", "bound": "upper"},
+        "b.x": {"value": 0.0, "std": None, "unit": "1", "determined": False},
+    }
+    found = rows(parameters_table(given))
+    assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
+    assert [row[2] for row in found] == [
+        "0.250 ± 0.010",
+        "2.500 (at its upper bound)",
+        "not determined by these runs",
+    ]
+    given["candidates"] = given["candidates"][-2:]
+    given["candidates"][0]["parameters"] = {}
+    assert rows(parameters_table(given)) == []
+
+
+def test_effects_among_the_causes(given: Document) -> None:
+    line = inclusion_line(given)
+    assert line.endswith(": quadratic_damping 93 %, coulomb_friction 7 %")
+    assert line.index("quadratic_damping") < line.index("coulomb_friction")
+    assert inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
+
+
+def test_the_gap_as_the_causes_are_added(given: Document) -> None:
+    table = waterfall_table(given)
+    assert given["waterfall_on"] in table.title
+    first, second, third = rows(table)
+    assert_shows(first[1], both(28.45))
+    assert_shows(" ".join(second[1:]), [*both(2.75), *both(21.85)])
+    assert_shows(" ".join(third[1:]), [*both(0.1345), *both(2.85)])
+    assert rows(waterfall_table(given | {"waterfall": given["waterfall"][:1]})) == []
+
+
+def both(excess: float) -> list[float]:
+    """A gap in degrees, by the noise of the document, and in noise powers."""
+    return [np.degrees(4.5e-4) * np.sqrt(max(excess, 0.0)), excess]
+
+
+def test_coefficients_that_are_not_determined(given: Document) -> None:
+    given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
+    cells = rows(tables.coefficients_table(given))[1]
+    assert cells[2:] == ["not determined by these runs", "–"]
+
+
+def test_answers_that_have_no_probability_are_counted_with_theirs(given: Document) -> None:
+    for candidate in given["candidates"][1:]:
+        candidate["probability"] = 0.0046
+    *listed, last = rows(candidates_table(given))
+    assert len(listed) == 1
+    assert_shows(last[0], [6])
+    assert last[1] == "3 %"
+    for candidate in given["candidates"]:
+        candidate["probability"] = 0.005
+    assert len(rows(candidates_table(given))) == 7  # six and the rest
+    for candidate in given["candidates"]:
+        candidate["probability"] = 0.0
+    assert len(rows(candidates_table(given))) == 2  # one always, and the rest
+    given["candidates"] = given["candidates"][:1]
+    assert len(rows(candidates_table(given))) == 1
+
+
+def test_the_gap(given: Document) -> None:
+    gap = given["gap"]
+    whole, *runs = rows(gap_table(given))
+    assert_shows(whole[1], both(gap["excess_before"]))
+    assert_shows(whole[2], both(gap["excess_after"]))
+    for cells, run in zip(runs, gap["runs"], strict=True):
+        assert cells[0] == run["id"] + ("" if run["held_out"] else " (fitted)")
+        assert_shows(cells[1], both(run["before"]))
+        assert_shows(cells[2], both(run["after"]))
+    del gap["misfit"]  # a document of an earlier version
+    assert_shows(rows(gap_table(given))[0][1], [gap["excess_before"]])
+
+
+def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
+    cells = rows(gap_table(given | {"causes": ["unknown"]}))
+    assert [row[2] for row in cells] == ["–"] * 4
+    given["gap"]["detected"] = False
+    assert rows(gap_table(given)) == []
+
+
+def test_coefficients(given: Document) -> None:
+    before, after = given["coefficients"]["before"], given["coefficients"]["after"]
+    for cells, name in zip(rows(tables.coefficients_table(given)), before, strict=True):
+        old, new = before[name], after[name]
+        assert_shows(cells[1], [old["value"], old["std"]])
+        assert_shows(cells[2], [new["value"], new["std"]])
+        change = 100 * (abs(new["value"]) / abs(old["value"]) - 1.0)
+        assert_shows(cells[3].replace("+", ""), [change])
+    before["cn_r"]["value"] = 0.0
+    assert rows(tables.coefficients_table(given))[1][3] == "–"
+    del after["cn_beta"]
+    assert len(rows(tables.coefficients_table(given))) == 1
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "shown"),
+    [
+        (-0.122, -0.114, "-6.6 %"),  # the size falls, as the verdict says
+        (-0.114, -0.122, "+7 %"),
+        (0.590, 0.537, "-9 %"),
+        (-0.1, 0.02, "other sign"),
+        (0.5, 0.5, "0 %"),
+    ],
+)
+def test_a_coefficient_changes_by_its_size(given: Document, one: float, two: float, shown: str) -> None:
+    given["coefficients"]["before"]["cn_r"]["value"] = one
+    given["coefficients"]["after"]["cn_r"]["value"] = two
+    assert rows(tables.coefficients_table(given))[1][3] == shown
+
+
+def test_the_run_to_make(given: Document) -> None:
+    run = given["next_run"]
+    keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
+    own = run | {"release_angle": np.degrees(run["release_angle"])}
+    assert_shows(run_words(run), [own[key] for key in keys])
+    calm = run_words(run | {"wind_speed": 0.0})
+    assert_shows(calm, [own[key] for key in keys if key != "wind_speed"])
+    assert len(rival_lines(given)) == 2
+    assert len(rival_lines(given | {"next_run": None})) == 2
+    close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
+    assert close[1].startswith("No run that can be set distinguishes these answers")
+    assert "by 2.9 standard deviations" in close[1]
+    assert rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
+
+
+def test_noise_and_confirmation(given: Document) -> None:
+    first, second = closing_lines(given)
+    assert_shows(first, [np.degrees(given["noise"]["std"]), given["noise"]["std"]])
+    assert_shows(second, [np.degrees(given["confirmation"]["largest_difference_rad"])])
+    given["gap"]["misfit"]["unit"] = "rad/s"
+    assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
+    given["confirmation"]["agrees"] = False
+    assert len(closing_lines(given)) == 1
+
+
+def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_separate_it(
+    given: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "tunnel_lab.report.page.inline_svg", lambda *_: ""
+    )  # drawing takes nearly all of the time
+    names = ["mechanical_damping", "coulomb_friction.friction_moment"]
+    given["trade_off"] = {"parameters": names, "correlation": -0.976, "remedy": "drive it slower"}
+    line = (
+        "What trades off: damping and coulomb friction (friction moment) are poorly separable in these runs "
+        "(correlation −0.98): drive it slower"
+    )
+    assert line in diagnosis_parts(given)
+    assert line in closing_lines(given)
+    assert f"<p>{line}.</p>" in render_report(given, campaign())
+    assert "What trades off" not in render_report(given | {"trade_off": None}, campaign())
+
+
+def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_table(given: Document) -> None:
+    after = given["coefficients"]["after"]
+    after["cn_beta"]["shares"] = {"noise": 0.2, "hidden effects": 0.8}
+    after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
+    line = coefficients_line(given)
+    assert line == (
+        "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
+        "other answers, by their probability. tunnel identify includes the noise, the scatter between runs and "
+        "what its own model misses, so that its ± may be far smaller or larger."
+    )
+    assert line in [part for part in diagnosis_parts(given) if isinstance(part, str)]
+    assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
+
+
+def test_a_unit_of_this_field_is_explained_where_it_is_used(given: Document) -> None:
+    move = {"cn_beta": {"value": 0.1, "std": None, "unit": "1/rad"}}
+    lag = {"effect": "unsteady_aero_lag", "size": {"value": 0.014, "std": None, "unit": "l/V"}, "moves": move}
+    meant = "l/V: the time in which the air passes the reference length"
+    assert f"of up to 0.014 l/V ({meant}), which these runs do not exclude" in hidden_line(
+        given | {"hidden": [lag]}
+    )
+    assert hidden_table(given | {"hidden": [lag]}).title == f"What could hide ({meant})"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.996, "> 99 %"), (0.994, "99 %"), (0.006, "1 %"), (0.004, "< 1 %")],
+)
+def test_probabilities(value: float, text: str) -> None:
+    assert probability(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.0, "100 %"),
+        (0.9996, "> 99.9 %"),
+        (0.982, "98.2 %"),
+        (0.0004, "< 0.1 %"),
+        (0.0, "0 %"),
+        (-0.02, "none"),
+    ],
+)
+def test_shares(value: float, text: str) -> None:
+    assert share(value) == text
+
+
+def quantity(value: float, std: float, unit: str = "1/rad") -> Quantity:
+    return Quantity(value, std, unit)
+
+
+def estimate() -> Estimate:
+    windows = (
+        WindowEstimate(0.25, 1.5, quantity(0.31, 0.0012), quantity(12.5, 0.021), quantity(0.0123, 0.00034)),
+        WindowEstimate(1.75, 1.25, quantity(0.21, 0.0014), quantity(12.7, 0.023), quantity(0.0145, 0.00036)),
+    )
+    runs = tuple(
+        RunEstimate(
+            name,
+            omega_n=quantity(12.34 + i, 0.056),
+            zeta=quantity(0.0123 + 0.001 * i, 0.00045),
+            windows=windows,
+        )
+        for i, name in enumerate(IDS)
+    )
+    return Estimate(
+        campaign="by hand", estimator="own", statuses=(Status.OK,),
+        cn_beta=quantity(0.4513, 0.0024), cn_r=quantity(-0.3132, 0.0225), yaw_inertia=quantity(0.1014, 0.0013),
+        mechanical_damping=quantity(0.0125, 0.00037), wind_off_inertia=quantity(0.1027, 0.0021), runs=runs,
+    )  # fmt: skip
+
+
+def test_coefficients_of_an_estimate() -> None:
+    found = estimate()
+    named = (found.cn_beta, found.cn_r, found.yaw_inertia, found.mechanical_damping, found.wind_off_inertia)
+    for cells, value in zip(rows(coefficients_table(found.to_json_dict())), named, strict=True):
+        assert value is not None
+        assert_shows(cells[1], [value.value, value.std])
+
+
+def test_errors_against_the_truth() -> None:
+    found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
+    head, *cells = rows(outputs.truth_table([found], truth))
+    assert head[0] == "own"
+    for row, (name, value) in zip(cells, truth.items(), strict=True):
+        own = getattr(found, name)
+        error = own.value - value
+        assert_shows(row[1], [value])
+        assert_shows(row[2], [own.value, own.std])
+        assert float(row[3].replace(" %", "")) == pytest.approx(100 * error / abs(value), rel=0.5)
+        assert float(row[3].replace(" %", "")) * error > 0
+        assert_shows(row[4].replace("+", ""), [error / own.std])
+
+
+def test_runs_of_an_estimate() -> None:
+    found = estimate()
+    for cells, run, (spring, speed, *_) in zip(
+        rows(outputs.runs_table(campaign(), found)), found.runs, CONDITIONS, strict=True
+    ):
+        assert cells[0] == run.id
+        assert_shows(cells[1], [] if spring is None else [spring])
+        assert float(cells[2]) == speed
+        for cell, value in zip(cells[3:5], (run.omega_n, run.zeta), strict=True):
+            assert value is not None
+            assert short(cell) == pytest.approx((value.value, value.std), rel=0.03)
+
+
+def test_windows_of_a_run() -> None:
+    run = estimate().runs[0]
+    table = outputs.windows_table(run)
+    assert "3 cycles" in str(table.title)
+    for cells, window in zip(rows(table), run.windows, strict=True):
+        assert_shows(cells[0], [window.start_s])
+        assert_shows(cells[1], [window.start_s + window.duration_s])
+        for cell, value in zip(cells[2:], (window.amplitude, window.zeta, window.omega_n), strict=True):
+            assert short(cell) == pytest.approx((value.value, value.std), rel=0.03)
+
+
+def test_notes_name_the_runs_they_concern() -> None:
+    calm = estimate()
+    assert status_lines(calm.to_json_dict()) == []
+    first = dataclasses.replace(calm.runs[0], statuses=(Status.NO_OSCILLATION,))
+    (line,) = status_lines(dataclasses.replace(calm, runs=(first, *calm.runs[1:])).to_json_dict())
+    assert line == f"{Status.NO_OSCILLATION.value} (alpha)"
+    every = tuple(dataclasses.replace(run, statuses=(Status.NO_OSCILLATION,)) for run in calm.runs)
+    found = status_lines(dataclasses.replace(calm, runs=every).to_json_dict())
+    assert found == [Status.NO_OSCILLATION.value]
+
+
+def test_the_gravest_note_comes_first() -> None:
+    calm = estimate()
+    swings = (Status.FREQUENCY_CHANGES, Status.MODEL_DEPARTS)
+    every = tuple(dataclasses.replace(run, statuses=swings) for run in calm.runs)
+    found = dataclasses.replace(calm, runs=every, statuses=(Status.MODEL_DEPARTS, Status.NO_STIFFNESS))
+    assert status_lines(found.to_json_dict()) == [one.value for one in (*swings, Status.NO_STIFFNESS)]

@@ -1,0 +1,494 @@
+"""What the answer says of itself: the same words in verdict, JSON, terminal and page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from diagnosis.answer.judgements import immaterial, nearly
+from diagnosis.answer.reported import held_out_totals
+from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Step, Waterfall
+from diagnosis.facts.decision import decision
+from diagnosis.facts.found import Nearly
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.result import GapSummary, ParameterEstimate, RunGap
+from diagnosis.settings import Settings
+from diagnosis.words.causes import said_size
+from diagnosis.words.tables import candidates_table, diagnosis_brief, gap_table, parameters_table
+from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
+from tests.support.diagnosis_document import campaign, document
+from tests.support.gap_campaigns import answer, nominal, studied
+from tests.support.gap_campaigns import campaign as campaign_with
+from tunnel_lab.report import view
+from tunnel_lab.report.page import render_report
+from tunnel_sim.effects import effect_class, effect_from
+
+
+def gap(*held_out: bool) -> GapSummary:
+    runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
+    misfit = Misfit(0.002, 0.1, "rad")
+    return GapSummary(
+        True, 2.0, 0.1, 0.95, ON_RUNS if any(held_out) else FITTED, runs, 0.01, 1e-9, misfit=misfit
+    )
+
+
+def answer_of(
+    *causes: str,
+    size: GapSummary | None = None,
+    both_winds: bool = True,
+    material: bool = False,
+    answers: tuple[tuple[str, float], ...] = (),
+    **found: object,
+) -> dict[str, Any]:
+    """The document of an answer, with what is found beside its numbers."""
+    answers = answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))
+    one = document()
+    one["rest"]["material"] = material
+    one["found"] |= {"both_winds": both_winds, **found}
+    summary = gap(True) if size is None else size
+    decided = decision(answers, Settings().answer).to_json_dict()
+    return one | {
+        "causes": list(causes),
+        "ambiguous_with": [],
+        "gap": summary.to_json_dict(),
+        **decided,
+    }
+
+
+def said(*causes: str, **changes: Any) -> str:
+    return verdict(answer_of(*causes, **changes), "What remains is small.")
+
+
+@pytest.mark.parametrize(
+    ("held_out", "closed_on"),
+    [
+        ((True, True), "on runs held out of the fit"),
+        ((False,), "in the fitted runs (none could be held out)"),
+    ],
+)
+def test_the_runs_of_the_closure_are_named(held_out, closed_on):
+    found = gap(*held_out)
+    assert found.closed_on == closed_on
+    assert f"closes {closed_on}. What remains is small." in said("coulomb_friction", size=found)
+
+
+def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
+    # 0.002 rad · √2 = 0.16206°, over 0.1 rad 2.8 %
+    words = "(0.162° root mean square, 2.8 % of the swing)"
+    assert f"The gap {words} is explained by" in said("coulomb_friction")
+    assert f"There is a gap {words}" in said("unknown")
+    found = gap(True).to_json_dict()["misfit"]
+    assert found["before"] == pytest.approx(0.002 * 2.0**0.5)
+    assert found["after"] == pytest.approx(0.002 * 0.1**0.5)
+    rates = replace(gap(True), misfit=Misfit(0.01, 0.5, "rad/s"))
+    assert "(0.810 °/s root mean square, 2.8 % of the swing" in said("coulomb_friction", size=rates)
+
+
+@pytest.mark.parametrize("excess", [0.15, 2.754, 9.994, 22.401, 1.91e6])
+def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
+    found = replace(gap(True), excess_before=excess, closed=0.9998)
+    given = document()
+    given["gap"] |= found.to_json_dict()
+    given["verdict"] = said("quadratic_damping", size=found)
+    words = view.typeset(given["verdict"])
+    before, _, closed, probability = view.facts(given | {"candidates": [{"probability": 0.9}]})
+    assert f"{before.value} root mean square, " in words
+    assert before.note.split("; ")[1] in words
+    assert "times the noise power" not in words
+    assert f"{closed.value} of the gap closes" in words
+    assert f"(probability {probability.value})" in words
+
+
+@pytest.mark.parametrize("held_out", [(True, True), (True, False), (False, False)])
+def test_the_totals_are_those_of_the_waterfall(held_out):
+    steps = Waterfall((Step(None, 4.0), Step("coulomb_friction", 0.2)), {}, "on stretches of time")
+    found = held_out_totals(gap(*held_out), steps)
+    assert (found.excess_before, found.excess_after) == (4.0, 0.2)
+    assert found.closed == pytest.approx(0.95)
+    assert found.closed_on == "on stretches of time"
+    unnamed = held_out_totals(gap(*held_out), Waterfall((Step(None, 4.0),), {}, "on stretches of time"))
+    assert (unnamed.excess_before, unnamed.excess_after, unnamed.closed) == (4.0, 4.0, 0.0)
+    calm = replace(gap(*held_out), detected=False)
+    assert held_out_totals(calm, steps) is calm
+
+
+@pytest.mark.slow
+def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
+    found = gap(False, False, False)
+    given = document()
+    given["verdict"] = said("quadratic_damping", size=found)
+    given["waterfall_on"] = "on stretches of time held out of the fit"
+    given["gap"] |= {"closed_on": found.closed_on}
+    for run in given["gap"]["runs"]:
+        run["held_out"] = False
+    notes = [fact.note for fact in view.facts(given)]
+    assert notes.count(found.closed_on) == 1
+    assert not any("on runs held out" in note for note in notes)
+    page = render_report(given, campaign())
+    assert "on runs held out" not in page
+    assert "run held out" not in page
+    table = gap_table(given)
+    assert table.columns == ("run", "before", "after")
+
+
+def test_every_cause_of_several_is_named_with_what_it_acts_on():
+    text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
+    assert "by coulomb friction, cubic stiffness and mains hum (probability 90 %)" in text
+    for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
+        assert words in text
+    assert "With them added" in text
+    assert "With it added" in said("coulomb_friction")
+
+
+@pytest.mark.parametrize("cause", ["coulomb_friction", "nonlinear_yaw_moment"])
+def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
+    assert "wind" not in said(cause, both_winds=False)
+    assert "with the wind on" in said(cause)
+    assert ("with the wind on and off" in said(cause)) == (cause == "coulomb_friction")
+
+
+def test_what_remains_and_is_material_is_said_in_the_first_sentence():
+    first = said("coulomb_friction", material=True).partition(". ")[0]
+    assert "only in part by coulomb friction" in first
+    assert "in part" not in said("coulomb_friction")
+    given = document()
+    given["ambiguous_with"] = []
+    assert headline(given) == ("quadratic damping", "found")
+    given["rest"]["material"] = True
+    assert headline(given) == ("quadratic damping, in part", "open")
+
+
+UNDECIDED = (
+    ("coulomb_friction + gravity_stiffness", 0.35),
+    ("coulomb_friction + cubic_stiffness", 0.33),
+    ("coulomb_friction + quadratic_damping", 0.25),
+    ("unknown", 0.07),
+)
+
+
+def test_below_one_half_no_set_is_named_as_the_cause():
+    causes = ("coulomb_friction", "gravity_stiffness")
+    text = said(*causes, answers=UNDECIDED)
+    assert "its cause is undecided" in text
+    assert "is explained" not in text
+    assert "The likely answers contain coulomb friction (93 %)." in text
+    assert "coulomb friction and gravity stiffness (35 %), " in text
+    assert "with probability 93 % together" in text
+    assert "is explained by" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
+
+
+def test_of_many_likely_answers_five_are_said_and_the_others_counted():
+    names = (
+        "free_play",
+        "cubic_stiffness",
+        "sensor_drift",
+        "mains_hum",
+        "coulomb_friction",
+        "gravity_stiffness",
+    )
+    text = said(*names[:1], answers=tuple((name, 1.0 / 6.0) for name in names))
+    assert "mains hum (17 %), coulomb friction (17 %) or 1 more." in text
+    assert "gravity" not in text
+
+
+def test_where_no_effect_is_common_the_channel_may_be():
+    answers = (("coulomb_friction", 0.45), ("quadratic_damping", 0.46), ("unknown", 0.09))
+    found = decision(answers, Settings().answer)
+    assert not found.effects
+    assert found.channels == pytest.approx({"damping": 0.91})
+    assert "act on the damping (91 %)" in said("coulomb_friction", answers=answers)
+    apart = said(
+        "coulomb_friction", answers=(("coulomb_friction", 0.4), ("free_play", 0.4), ("unknown", 0.2))
+    )
+    assert "The likely answers" not in apart
+    assert "The answer is one of these" in apart
+
+
+def test_the_credible_set_is_the_smallest_with_nine_tenths():
+    assert [name for name, _ in decision(UNDECIDED, Settings().answer).credible] == [
+        name for name, _ in UNDECIDED[:3]
+    ]
+    assert decision((("none", 0.999), ("unknown", 0.001)), Settings().answer).credible == (("none", 0.999),)
+
+
+@pytest.mark.parametrize(("closed", "decided"), [(0.0, False), (0.09, False), (0.2, True), (None, True)])
+def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
+    answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
+    found = decision(answers, Settings().answer, closed)
+    assert found.decided is decided
+    said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
+        found.to_json_dict()
+    )
+    assert said_so is not decided
+    assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, 0.0).decided
+
+
+def test_an_undecided_answer_is_undecided_on_every_page():
+    given = document()
+    given["candidates"][0]["probability"] = 0.41
+    answers = [(one["effect"], one["probability"]) for one in given["candidates"]]
+    given |= decision(answers, Settings().answer).to_json_dict()
+    assert headline(given) == ("Undecided", "open")
+    given["common"]["channels"] = {"damping": 0.95}
+    assert headline(given)[0] == "Undecided: the damping, and more"
+    given["common"]["effects"] = {"quadratic_damping": 0.93}
+    assert headline(given)[0] == "Undecided: quadratic damping, and more"
+    labels = [fact.label for fact in view.facts(given)]
+    assert "With the most probable answer added" in labels
+    assert "Probability of the most probable answer" in labels
+    assert any("Do not repair" in step for step in next_steps(given))
+    assert parameters_table(given).title.startswith("Parameters of the most probable answer")
+
+
+def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is_more_probable(monkeypatch):
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # pictures are not read
+    given = document()
+    for one, value in zip(given["candidates"], (0.33, 0.12, 0.48, 0.07), strict=False):
+        one["probability"] = value
+    first, most = given["candidates"][0], given["candidates"][2]
+    given |= decision(
+        [(one["effect"], one["probability"]) for one in given["candidates"]], Settings().answer
+    ).to_json_dict()
+    listed = [row[:2] for row in candidates_table(given).rows[:2]]
+    assert listed == [(most["effect"], "48 %"), (first["effect"], "33 %")]
+    assert [row["probability"] for row in view.candidate_rows(given)[:2]] == ["48 %", "33 %"]
+    called = "most probable set of effects"
+    assert parameters_table(given).title.startswith(f"Parameters of the {called}")
+    assert {f"With the {called} added", f"Probability of the {called}"} <= {
+        fact.label for fact in view.facts(given)
+    }
+    page = render_report(given, campaign())
+    assert f"of the {called}</h2>" in page
+    assert "most probable answer" not in page + diagnosis_brief(given)
+
+
+def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
+    found = {"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003}
+    assert said("coulomb_friction", immaterial=found).endswith(
+        "What remains is small. The gap is immaterial: its causes change Cnβ by less than 0.08 % and Cnr by less "
+        "than 0.3 %."
+    )
+    assert "immaterial" not in said("coulomb_friction")
+    tiny = said("coulomb_friction", immaterial={"cn_beta": 3.6e-9})
+    assert "its causes change Cnβ by less than 0.01 %." in tiny
+
+
+NEARLY = {
+    "effects": ["quadratic_damping"], "closes": 0.996, "probability": 0.3, "noisy": False, "rival": [],
+    "rival_probability": 0.0, "misfit": [],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, " (probability 30 %): too little to name it."),
+        ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (20 %)."),
+        ({"noisy": True}, " of it, but the noise misbehaves and may explain so small a gap."),
+        (
+            {"misfit": ["zero", "harmonics"]},
+            ", but leaves a significant misfit of the zero and the harmonics.",
+        ),
+    ],
+)
+def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(changes, words):
+    text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
+    assert "no effect is named as its cause. Quadratic damping would explain 99.6 % of it" in text
+    assert words in text
+    assert "no effect of the vocabulary explains it (tunnel effects lists them)" in said("unknown")
+
+
+OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
+
+
+def test_springs_that_may_be_off_are_said_with_what_would_tell():
+    text = said("spring_miscalibration", choices=[OFF, OFF | {"stiffness": 44.84, "error": 0.02}])
+    assert (
+        "16.12 N m/rad is 1.961 ± 0.010 % softer than stated (50 %), or 44.84 N m/rad is 2.000 ± 0.010 % stiffer "
+        "than stated (50 %)"
+    ) in text
+    both = {
+        "kind": "two springs off",
+        "springs": [OFF, OFF | {"stiffness": 21.0}],
+        "beside": ["coulomb_friction"],
+    }
+    text = said("unknown", rivals=[both])
+    assert (
+        "would explain the gap beside coulomb friction: for example, 16.12 N m/rad is 1.961 ± 0.010 % softer than "
+        "stated and 21 N m/rad"
+    ) in text
+    assert text.endswith(". Measure their stiffness again.")
+
+
+def test_a_second_mode_of_every_run_is_said_before_the_gap():
+    main = {"amplitude_rad": 0.3, "frequency_hz": 2.2, "decay_per_s": 0.1}
+    second = {"amplitude_rad": 0.02, "frequency_hz": 2.9, "decay_per_s": 0.2}
+    mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
+    said_of_it = "contains a second mode: 1.1° at 2.9 Hz, which decays at 0.2 1/s, beside 17° at 2.2 Hz"
+    alone = said("unknown", second_modes=[mode])
+    assert alone.startswith("There is a gap")
+    assert f"swing {said_of_it}" in alone
+    runs = [run["id"] for run in answer_of("unknown")["gap"]["runs"]]
+    text = said("unknown", second_modes=[mode | {"run": run} for run in runs])
+    assert text.startswith(f"{runs[0]} {said_of_it}")
+    assert "falls by 98 %" in text
+
+
+def test_runs_in_limit_cycles_have_a_verdict_of_their_own():
+    remark = {"outcome": "noted", "runs": ["r1"], "what": "it settles at 0.1 rad", "remedy": "none"}
+    text = said("unknown", limit_cycles=[remark])
+    assert text == "No run is a free decay, so no cause is named. r1: it settles at 0.1 rad."
+
+
+def nearly_found(*weighed, noisy=False):
+    """What nearly explains a gap of quadratic damping, `unknown` being the answer."""
+    data = campaign_with(effect_from("quadratic_damping", {"coefficient": 2e-4}))
+    base = nominal(data)
+    lead = starting_points(base, effect_class("quadratic_damping"))[0]
+    study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
+    answers = (answer(("unknown",), 1.0, 0.6), *weighed)
+    gap = replace(study.gap, test=replace(study.gap.test, noisy=noisy))
+    return nearly(replace(study, answers=answers, gap=gap))
+
+
+def test_what_nearly_explains_a_gap_is_found_with_the_reason_why_it_is_not_named():
+    first = answer(("quadratic_damping",), 0.004, 0.3)
+    found = nearly_found(first)
+    assert found == Nearly(("quadratic_damping",), 1.0 - 0.004, 0.3)
+    rival = answer(("coulomb_friction",), 0.01, 0.2)
+    assert nearly_found(first, rival) == replace(found, rival=("coulomb_friction",), rival_probability=0.2)
+    assert nearly_found(replace(first, probability=0.0), noisy=True).noisy
+    assert nearly_found(replace(first, share=0.4)) is None
+
+
+def estimates(**values):
+    return {name: ParameterEstimate(value, 0.01, "1/rad") for name, value in values.items()}
+
+
+def test_a_change_of_two_per_cent_is_not_immaterial():
+    before, after = estimates(cn_beta=0.5, cn_r=-0.1), estimates(cn_beta=0.5004, cn_r=-0.1003)
+    found = immaterial(before, after, Settings().words)
+    assert found == pytest.approx({"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003})
+    assert immaterial(before, after | estimates(cn_r=-0.102), Settings().words) == {}
+
+
+def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
+    one = document() | {
+        "causes": ["coulomb_friction", "spring_miscalibration"],
+        "ambiguous_with": ["gravity_stiffness"],
+        "inclusion": {"coulomb_friction": 0.98, "spring_miscalibration": 0.59, "gravity_stiffness": 0.40},
+    }
+    sizes = {"error": (-0.0196076, 1.7e-6, "1"), "spring_stiffness": (16.12, None, "N m/rad")}
+    parameters = {
+        f"spring_miscalibration.{name}": {"value": value, "std": std, "unit": unit}
+        for name, (value, std, unit) in sizes.items()
+    }
+    one["candidates"] = [
+        {
+            "effect": "coulomb_friction + spring_miscalibration",
+            "probability": 0.584,
+            "parameters": parameters,
+        },
+        {"effect": "coulomb_friction + gravity_stiffness", "probability": 0.396, "parameters": {}},
+        {"effect": "coulomb_friction", "probability": 0.02, "parameters": {}},
+    ]
+    words = (
+        "coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than stated (58 %) "
+        "or gravity stiffness (40 %)"
+    )
+    assert headline(one) == (words, "open")
+    assert f" of the swing) is explained by {words}. They act on the damping" in verdict(one, "")
+    assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
+    one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
+    springs = (
+        "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by "
+        "2.000 ± 0.010 %"
+    )
+    assert (
+        headline(one)[0]
+        == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
+    )
+    said_once = (
+        "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). They act on the"
+    )
+    assert said_once in verdict(one, "")
+    one["candidates"][2:] = [
+        {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},
+        {"effect": "coulomb_friction", "probability": 0.1, "parameters": {}},
+    ]
+    one["ambiguous_with"] = ["cubic_stiffness", "gravity_stiffness"]
+    others = "gravity stiffness (40 %), cubic stiffness (20 %) or nothing else (10 %)"
+    assert headline(one)[0].endswith(f"and one of these: {springs} (58 %), {others}")
+
+
+def test_what_the_causes_change_is_said_in_per_cent():
+    one = answer_of("coulomb_friction")
+    values = {"cn_beta": (0.590, 0.537), "cn_r": (-0.2, -0.204)}
+    for place, when in enumerate(("before", "after")):
+        for name, pair in values.items():
+            one["coefficients"][when][name]["value"] = pair[place]
+    words = "Cnβ falls by 9 % (0.590 → 0.537) and the size of Cnr rises by 2 % (−0.200 → −0.204)."
+    assert words in verdict(one, "")
+    one["found"]["immaterial"] = {"cn_beta": 0.001}
+    assert "Cnβ falls by" not in verdict(one, "")
+
+
+def test_effects_say_their_sizes_as_a_person_would():
+    given = {"value": 0.0039991, "std": 4.1e-6, "unit": "N m"}
+    one = {"effect": "coulomb_friction", "probability": 0.9, "parameters": {"friction_moment": given}}
+    assert said_size(document(), one, "coulomb_friction") == "dry friction of 0.00400 N m"
+    given |= {"value": 0.0123, "std": 0.0012, "unit": "rad"}
+    one = {"effect": "free_play", "probability": 0.9, "parameters": {"half_width": given}}
+    assert (
+        said_size(document(), one, "free_play")
+        == "play of 0.705 ± 0.069° to each side between spring and rod"
+    )
+    assert said_size(document(), one, "cubic_stiffness") == ""
+
+
+def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str, Any]:
+    """A document without a cause of a joint of 0.08 kg m² whose model's file has an armature of 0.01 kg m²."""
+    written = [
+        {"name": "joint armature", "before": [0.01], "after": [armature], "unit": "kg m2"},
+        {"name": "joint frictionloss", "before": [0.0], "after": [0.2], "unit": "N m"},
+    ]
+    inertia = {"value": 0.08, "std": std, "unit": "kg m2"}
+    coefficients = {"before": {}, "after": {"yaw_inertia": inertia}}
+    model = {"file": "arm.xml", "free": list(free), "written": written}
+    return answer_of() | {"model": model, "coefficients": coefficients}
+
+
+def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
+    given = of_model(0.03, "inertia", "damping")
+    assert verdict(given, "").endswith(
+        "arm.xml as given does not fit: joint armature is 0.0100 kg m² there, and the runs say 0.03000 ± 0.00020 "
+        "kg m²."
+    )
+    assert next_steps(given)[0] == ("Correct these values in arm.xml; --patch FILE writes a model with them.")
+    for fits in (
+        of_model(0.0107, "inertia"),  # less than 1 % of the inertia
+        of_model(0.03, "damping"),
+        of_model(0.03, "inertia", std=0.015),  # these runs do not tell
+        of_model(0.03, "inertia", std=None),
+        answer_of(),
+    ):
+        assert "as given" not in verdict(fits, "")
+        assert not any("Correct these" in step for step in next_steps(fits))
+
+
+def test_what_to_do_about_runs_is_said_once() -> None:
+    given = document()
+    left = {"outcome": "left out", "what": "it stands still", "remedy": "record it again"}
+    cut = {
+        "outcome": "cut",
+        "runs": ["c"],
+        "what": "begins at 1 s",
+        "remedy": "cut it by hand if that is wrong",
+    }
+    given["remarks"] = [left | {"runs": ["a"]}, left | {"runs": ["b"]}, cut]
+    steps = next_steps(given)
+    assert steps.count("a, b: record it again.") == 1
+    assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut

@@ -1,0 +1,166 @@
+"""``tunnel import``, ``tunnel export``, one file in place of a campaign, and the formats of tables."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from tests.support.import_files import csv as record
+from tests.support.import_files import decay, written
+
+Tunnel = Callable[..., tuple[int, str, str]]
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def test_an_import_says_what_it_read_and_writes_the_campaign(tunnel: Tunnel, tmp_path: Path) -> None:
+    out = tmp_path / "rig"
+    status, said, err = tunnel(
+        "import", record(tmp_path), "--out", out, "--yes", "--set", "spring_stiffness=16"
+    )
+    assert (status, err) == (0, "")
+    assert "2 columns separated by commas" in said
+    assert "wind-off is assumed" in said
+    assert sorted(path.name for path in out.iterdir()) == [
+        "campaign.toml",
+        "import.png",
+        "import.toml",
+        "runs",
+    ]
+    assert (out / "import.png").read_bytes().startswith(PNG)
+    assert tunnel("identify", out)[0] == 0
+    status, _, err = tunnel("import", record(tmp_path), "--out", out, "--yes")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "the folder exists" in err
+    again = ("import", record(tmp_path), "--out", out, "--yes", "--overwrite", "--recipe", out)
+    assert tunnel(*again)[0] == 0
+    assert "spring_stiffness = 16.0" in (out / "campaign.toml").read_text()
+
+
+def test_a_preview_writes_the_picture_alone(tunnel: Tunnel, tmp_path: Path) -> None:
+    path = record(tmp_path)
+    status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
+    assert status == 0
+    assert "Written" in said
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["log.csv", "look.png"]
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ([], "--out, --preview: give one of them"),
+        (["--out", "rig"], "add --yes"),
+        (["--out", "rig", "--delimiter", "x"], "'delimiter' = 'x'"),
+        (["--out", "rig", "--unit", "furlong"], "unknown unit 'furlong'"),
+        (["--out", "rig", "--set", "speed=1"], "unknown key 'speed'"),
+        (["--out", "rig", "--recipe", "none.toml"], "no such file"),
+        (["--out", "rig", "--rate", "0"], "'rate' = 0.0"),
+        (["--out", "rig", "--rest", "20"], "run 'log': never passes the stated rest of 20 rad"),
+    ],
+)
+def test_bad_options_leave_nothing(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], what: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, _, err = tunnel("import", record(tmp_path), *options)
+    assert (status, err.count("\n")) == (2, 1)
+    assert what in err
+    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_one_file_is_identified_in_normalised_form(tunnel: Tunnel, tmp_path: Path) -> None:
+    status, out, err = tunnel("identify", record(tmp_path), "--json", "-")
+    assert status == 0
+    (run,) = json.loads(out)["runs"]
+    assert abs(run["omega_n"]["value"] - 4.0 * 3.14159265) < 0.01
+    assert "Note: log.csv: text (ASCII)" in err
+    bad = written(
+        tmp_path, "two.csv", "a,b,c\n" + "".join(f"{i}.5,{i * i % 7},{i * i % 5}\n" for i in range(99))
+    )
+    status, out, err = tunnel("diagnose", bad)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "tunnel import takes options: give --angle" in err
+
+
+def test_tables_as_csv_markdown_and_json(tunnel: Tunnel) -> None:
+    status, out, err = tunnel("springs", "--format", "csv")
+    assert status == 0
+    title, *lines = out.strip().split("\n")
+    assert title == "# Springs of the paper's Table II"
+    rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
+    assert rows[3]["Kr [N m/rad]"] == "6.12"
+    assert "Izz (gradient)" in err
+    _, out, _ = tunnel("springs", "--format", "json")
+    (document,) = map(json.loads, out.strip().split("\n"))
+    assert document["rows"][3]["Kr [N m/rad]"] == 6.12
+    assert document["rows"][3]["spring"] == 4
+    _, out, _ = tunnel("springs", "--format", "md")
+    assert "| 4 | 6.12 | 1.3167 |" in out
+    assert "Izz (gradient)" in tunnel("springs")[1]
+
+
+def test_an_export_is_written(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
+    status, out, _ = tunnel("export", tiny_campaign, "--file-format", "csv", "--out", tmp_path / "all.csv")
+    assert status == 0
+    assert "2 runs" in out
+    assert (tmp_path / "all.csv").read_text().startswith("run,wind_speed,spring_stiffness,")
+    status, _, err = tunnel("export", tiny_campaign, "--file-format", "doc")
+    assert (status, err.count("\n")) == (2, 1)
+
+
+def held_and_released(folder: Path, *, first: float) -> Path:
+    """A record at 200 Hz, whose body is held aside for 4 s and then let go; its clock starts at ``first``, s."""
+    _, free = decay()
+    angle = np.concatenate([np.linspace(0.0, 0.35, 200), np.full(600, 0.35), free])
+    clock = first + np.arange(angle.size) / 200.0
+    rows = "".join(f"{t:.3f},{value:.5f}\n" for t, value in zip(clock, angle, strict=True))
+    return written(folder, "log.csv", f"time_s,yaw_rad\n{rows}")
+
+
+def test_times_of_notes_table_and_picture_are_those_that_start_takes(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[float] = []
+    monkeypatch.setattr(Axes, "axvline", lambda _axes, x, **_style: drawn.append(x))  # where a run begins
+    path = held_and_released(tmp_path, first=100.0)
+    status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
+    assert status == 0
+    assert "times here are the file's, whose first sample is at 100 s" in said
+    (begins,) = re.findall(r"begins at (\S+) s", said)
+    assert float(begins) == pytest.approx(104.0, abs=0.02)  # where the body was let go
+    assert drawn == pytest.approx([float(begins)])
+    (row,) = (line.split() for line in said.splitlines() if line.split()[:1] == ["log"])
+    assert float(row[3]) == pytest.approx(float(begins), abs=0.006)
+    status, again, _ = tunnel("import", path, "--preview", tmp_path / "look.png", "--start", begins)
+    assert status == 0
+    (again_row,) = (line.split() for line in again.splitlines() if line.split()[:1] == ["log"])
+    assert again_row[1] == row[1]  # samples
+    assert [float(cell) for cell in again_row[3:5]] == pytest.approx(
+        [float(cell) for cell in row[3:5]], abs=0.011
+    )
+
+
+@pytest.mark.parametrize("name", ["xGyro", "gyro_z", "YawRate", "Winkelgeschwindigkeit", "theta_dot"])
+def test_a_column_named_as_a_rate_without_a_unit_is_asked_for_its_unit(
+    tunnel: Tunnel, tmp_path: Path, name: str
+) -> None:
+    time, angle = decay(amplitude=30.0)
+    rows = "".join(f"{1e3 * t:.0f},{value:.4f}\n" for t, value in zip(time, angle, strict=True))
+    path = written(tmp_path, "imu.csv", f"Time,{name}\n{rows}")
+    for chosen in ((), ("--angle", name), ("--angle", 2)):
+        status, _, err = tunnel("import", path, *chosen, "--preview", tmp_path / "look.png")
+        assert (status, err.count("\n")) == (2, 1)
+        assert f"'{name}' is a rate by its name, and nothing states its unit" in err
+        assert f'--angle "{name}" and --unit, one of rad/s, deg/s, rpm' in err
+    status, said, _ = tunnel(
+        "import", path, "--angle", name, "--unit", "deg/s", "--preview", tmp_path / "look.png"
+    )
+    assert status == 0
+    assert "[rad/s]" in said

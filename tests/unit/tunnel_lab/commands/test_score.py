@@ -1,0 +1,223 @@
+"""``tunnel score``: what it prints, keeps and refuses; unchanged code passes, planted regressions do not."""
+
+from __future__ import annotations
+
+import io
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from identification.estimators.matrix_pencil import MatrixPencil
+from tunnel_lab.cli import main
+
+Outcome = tuple[int, str, str]
+Tunnel = Callable[..., Outcome]
+
+GRID = """
+schema_version = 1
+name = "quick"
+seed = 4
+trials = 30
+[[decays]]
+zeta = [0.01, 0.05]
+frequency = [1.0, 3.0]
+noise = [0.005]
+duration = [5.0]
+sample_rate = 200.0
+"""
+HERE = ("--jobs", "0", "--estimator", "matrix_pencil")
+
+
+@pytest.fixture
+def grid(tmp_path: Path) -> Path:
+    path = tmp_path / "grid.toml"
+    path.write_text(GRID)
+    return path
+
+
+@pytest.fixture(scope="module")
+def baseline(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("baseline")
+    grid, path = folder / "grid.toml", folder / "base.parquet"
+    grid.write_text(GRID)
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        assert main(["score", str(grid), *HERE, "--write-baseline", str(path)]) == 0
+    assert err.getvalue() == ""
+    assert f"Written: {path}" in out.getvalue()
+    return path
+
+
+def planted(monkeypatch: pytest.MonkeyPatch, change: Callable[..., object]) -> None:
+    """Have every run's ζ passed through ``change(quantity, rng)``."""
+    rng = np.random.default_rng(1)
+    real = MatrixPencil.estimate
+
+    def estimate(self: MatrixPencil, campaign: object) -> object:
+        found = real(self, campaign)  # type: ignore[arg-type]
+        runs = tuple(replace(run, zeta=change(run.zeta, rng)) for run in found.runs)
+        return replace(found, runs=runs)
+
+    monkeypatch.setattr(MatrixPencil, "estimate", estimate)
+
+
+def test_figures_come_with_their_sampling_errors_and_are_kept(
+    tunnel: Tunnel, grid: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "scores"
+    status, out, err = tunnel("score", grid, *HERE, "--trials", "3", "--out", folder, "--cells")
+    assert (status, err) == (0, "")
+    assert "Single decays (4 cells)" in out
+    assert out.count("ζ 0.05, 3 Hz, S/A 0.5 %, 5 s") == 1
+    written = {"trials.parquet", "scores.parquet", "score.png", "score.pdf", "index.html"}
+    assert {path.name for path in folder.iterdir()} == written
+    assert (folder / "score.png").read_bytes()[:4] == b"\x89PNG"
+    frame = pl.read_parquet(folder / "scores.parquet")
+    assert frame.height == 4 * 2
+    assert (frame["rmse_over_bound_std_error"] > 0.0).all()
+    status, _, err = tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)
+    assert status == 2
+    assert "exists already" in err
+    (folder / "score.png").unlink()
+    (folder / "parts").mkdir()  # a full disk stopped it while it wrote the results
+    assert tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)[0] == 0
+    assert {path.name for path in folder.iterdir()} == written
+    for name in ("parts", "mine"):
+        (folder / name).mkdir()
+    assert tunnel("score", grid, *HERE, "--trials", "3", "--out", folder)[0] == 2
+
+
+@pytest.mark.slow
+def test_unchanged_code_is_the_baseline_to_the_last_bit(tunnel: Tunnel, baseline: Path) -> None:
+    status, out, err = tunnel("score", "--check", baseline, *HERE)
+    assert (status, err) == (0, "")
+    assert "to the last bit" in out
+
+
+@pytest.mark.slow
+def test_other_records_pass_within_sampling_error(tunnel: Tunnel, baseline: Path) -> None:
+    status, out, _ = tunnel("score", "--check", baseline, *HERE, "--seed", "5")
+    assert status == 0
+    assert "beyond sampling error" in out
+
+
+PLANTED: dict[str, Callable[..., object]] = {
+    "noise": lambda zeta, rng: replace(zeta, value=zeta.value + 1.5 * zeta.std * rng.standard_normal()),
+    "bias": lambda zeta, _: replace(zeta, value=zeta.value + 0.8 * zeta.std),
+    "overconfidence": lambda zeta, _: replace(zeta, std=0.5 * zeta.std),
+}
+
+
+@pytest.mark.parametrize(
+    "seed", ["4", pytest.param("5", marks=pytest.mark.slow)], ids=["same records", "other records"]
+)
+@pytest.mark.parametrize(
+    "kind", ["noise", *(pytest.param(kind, marks=pytest.mark.slow) for kind in PLANTED if kind != "noise")]
+)
+def test_a_planted_regression_exits_with_one(
+    tunnel: Tunnel, baseline: Path, monkeypatch: pytest.MonkeyPatch, kind: str, seed: str
+) -> None:
+    planted(monkeypatch, PLANTED[kind])
+    status, out, err = tunnel("score", "--check", baseline, *HERE, "--seed", seed)
+    assert (status, err) == (1, "")
+    assert "Worse than the baseline: matrix_pencil" in out
+
+
+@pytest.mark.slow
+def test_an_estimator_that_fails_more_often_exits_with_one(
+    tunnel: Tunnel, baseline: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planted(monkeypatch, lambda zeta, rng: None if rng.random() < 0.2 else zeta)
+    status, out, _ = tunnel("score", "--check", baseline, *HERE)
+    assert status == 1
+    assert "failures" in out
+
+
+def test_a_new_estimator_is_said_to_be_unchecked(tunnel: Tunnel, baseline: Path) -> None:
+    status, out, _ = tunnel("score", "--check", baseline, *HERE, "-e", "conventional", "--trials", "3")
+    assert status == 0
+    assert "not checked: conventional" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--estimator", "matrix_pencl"], ["did you mean 'matrix_pencil'"]),
+        (["--check", "none.parquet"], ["none.parquet", "no such file"]),
+        (["missing.toml"], ["missing.toml", "no such file"]),
+        (["--write-baseline", "no/such/folder.parquet"], ["folder"]),
+        (["--breakdown", "--check", "packaged"], ["--check", "cannot be combined with --breakdown"]),
+        (["--trials", "1"], ["--trials"]),
+        (["--jobs", "-1"], ["--jobs"]),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = tunnel("score", *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    for part in parts:
+        assert part in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
+    tunnel: Tunnel, grid: Path, baseline: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.toml"
+    other.write_text(GRID.replace("0.01, 0.05", "0.02"))
+    status, _, err = tunnel("score", other, "--check", baseline, *HERE, "--trials", "2")
+    assert status == 2
+    assert "is not in the grid" in err
+    frame = pl.read_parquet(baseline).with_columns(pl.lit("gone_one").alias("estimator"))
+    frame.write_parquet(tmp_path / "gone.parquet")
+    status, _, err = tunnel("score", grid, "--check", tmp_path / "gone.parquet", "--jobs", "0")
+    assert status == 2
+    assert "gone_one, which no installed package adds" in err
+
+
+@pytest.mark.slow
+def test_an_interrupted_score_keeps_what_is_done_and_goes_on(
+    tunnel: Tunnel, grid: Path, tmp_path: Path
+) -> None:
+    """A real process with two children, interrupted by a real signal."""
+    out = tmp_path / "scores"
+    command = ["score", str(grid), "--estimator", "matrix_pencil", "--trials", "400", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "tunnel_lab.cli", *command], stderr=subprocess.PIPE, text=True
+    ) as process:
+        until = time.monotonic() + 120.0
+        while len(list(out.glob("parts/results/*.parquet"))) < 4 and time.monotonic() < until:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.startswith("tunnel: interrupted")
+    kept = list(out.glob("parts/results/*.parquet"))
+    assert 4 <= len(kept) < 320
+    times = pl.read_parquet(min(kept))["milliseconds"]
+    assert tunnel(*command)[0] == 0
+    assert not (out / "parts").exists()  # the times show that it was not estimated again
+    assert set(times) <= set(pl.read_parquet(out / "trials.parquet")["milliseconds"])
+
+
+def test_the_parts_of_an_earlier_version_are_refused_in_a_line(
+    tunnel: Tunnel, grid: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "scores" / "parts").mkdir(parents=True)
+    (tmp_path / "scores" / "parts" / "c0000-t00000.json").write_text("{}")
+    command = ("score", grid, *HERE, "--trials", "3", "--out", tmp_path / "scores")
+    status, out, err = tunnel(*command)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "the folder holds something else; name another --out, or add --overwrite" in err
+    assert tunnel(*command, "--overwrite")[0] == 0

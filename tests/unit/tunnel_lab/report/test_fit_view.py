@@ -1,0 +1,130 @@
+"""The fit over the data: figure and charts show the document's numbers, and the document shows the records.
+
+Truth: a document written by hand, and the records of a simulated campaign.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.answer.assemble import localise
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
+from tests.support.diagnosis_document import document
+from tests.support.gap_campaigns import campaign, nominal, studied
+from tunnel_lab.report.where import fit_charts, fit_figure, fit_pages
+from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.errors import TunnelError
+
+Document = dict[str, Any]
+CAUSE = "quadratic_damping"
+
+
+@pytest.fixture
+def given() -> Document:
+    return copy.deepcopy(document())
+
+
+def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:
+    fits, residuals = fit_charts(given)["fit"]
+    assert [one["label"] for one in fits["series"]] == ["measured", "nominal model", "with the causes"]
+    assert [one["label"] for one in residuals["series"]] == ["nominal model", "with the causes"]
+    for over, below, trace in zip(fits["views"], residuals["views"], given["maps"]["traces"], strict=True):
+        assert over["run"] == below["run"] == trace["id"]
+        assert over["label"].startswith(trace["id"])
+        assert over["range"] == below["range"] == trace["differ_s"]
+        reading, before = np.degrees(trace["reading_rad"]), np.degrees(trace["before_rad"])
+        assert over["data"][:3] == [
+            trace["time_s"],
+            pytest.approx(reading, abs=1e-3),
+            pytest.approx(reading - before, abs=1e-3),
+        ]
+        assert below["data"][:2] == [trace["time_s"], pytest.approx(before, rel=1e-4)]
+        if trace["after_rad"] is None:
+            assert over["data"][3] == below["data"][2] == [None] * 3
+        else:
+            after = np.degrees(trace["after_rad"])
+            assert over["data"][3] == pytest.approx(reading - after, abs=1e-3)
+            assert below["data"][2] == pytest.approx(after, rel=1e-4)
+    assert (fits["y"]["label"], residuals["y"]["label"]) == ("reading [°]", "residual [°]")
+    assert fits["x"] == residuals["x"]
+
+
+def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Document) -> None:
+    fig = fit_figure(given)
+    assert fig is not None
+    for column, trace in enumerate(given["maps"]["traces"]):
+        whole, near, left = (fig.axes[2 * row + column] for row in range(3))
+        assert trace["id"] in whole.get_title(loc="left")
+        reading = np.degrees(trace["reading_rad"])
+        assert whole.lines[0].get_ydata() == pytest.approx(reading)
+        box = whole.patches[0].get_extents().transformed(whole.transData.inverted())
+        assert (box.x0, box.x1) == pytest.approx(trace["differ_s"])
+        for axes in (near, left):
+            assert axes.get_xlim() == pytest.approx(trace["differ_s"])
+        inside = [trace["differ_s"][0] <= time <= trace["differ_s"][1] for time in trace["time_s"]]
+        wanted = [np.degrees(trace[key]) for key in ("before_rad", "after_rad") if trace[key] is not None]
+        assert near.lines[0].get_ydata() == pytest.approx(reading[inside])
+        for line, residual in zip(near.lines[1:], wanted, strict=True):
+            assert line.get_ydata() == pytest.approx((reading - residual)[inside])
+        for line, residual in zip(left.lines[:-1], wanted, strict=True):  # the last is the level of zero
+            assert line.get_ydata() == pytest.approx(residual[inside])
+
+
+def test_any_run_can_be_chosen_and_another_is_refused(given: Document) -> None:
+    fig = fit_figure(given, ["gamma"])
+    assert fig is not None
+    assert len(fig.axes) == 3
+    assert "gamma" in fig.axes[0].get_title(loc="left")
+    with pytest.raises(TunnelError, match=r"no run 'delta'.*alpha, gamma"):
+        fit_figure(given, ["delta"])
+    given["maps"]["traces"] *= 2
+    for name, trace in zip("abcd", given["maps"]["traces"], strict=True):
+        given["maps"]["traces"]["abcd".index(name)] = trace | {"id": name}
+    assert [len(page.axes) for page in fit_pages(given)] == [6, 6]
+
+
+@pytest.mark.parametrize(("unit", "shown"), [("rad", "°"), ("rad/s", "°/s"), ("rad/s2", "°/s²")])
+def test_the_unit_is_that_of_the_readings(given: Document, unit: str, shown: str) -> None:
+    given["maps"]["unit"] = unit
+    assert fit_charts(given)["fit"][0]["y"]["label"] == f"reading [{shown}]"
+
+
+def test_no_maps_no_fit(given: Document) -> None:
+    assert fit_figure(given | {"maps": None}) is None
+    assert fit_charts(given | {"maps": None}) == {}
+    for trace in given["maps"]["traces"]:
+        del trace["reading_rad"]  # a document of an earlier version
+    assert fit_charts(given) == {}
+
+
+def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ() -> None:
+    data = campaign(effect_from(CAUSE, {"coefficient": 0.003}))
+    base = nominal(data)
+    lead = starting_points(base, effect_class(CAUSE))[0]
+    best = fit(lead.problem, lead.point, base=base)
+    _, maps, _ = localise(studied(data, base, (CAUSE,), best))
+    assert {trace.id for trace in maps.traces} == {run.id for run in data.runs}
+    records = {run.id: run.record for run in data.runs}
+    for trace in maps.traces:
+        record = records[trace.id]
+        since = record.time_s - record.time_s[0]
+        reading = np.interp(trace.time, since, record.yaw_rad)
+        swing = float(np.ptp(record.yaw_rad))
+        assert float(np.max(np.abs(trace.reading - reading))) < 0.05 * swing  # means over a part of a cycle
+        assert trace.after is not None
+        assert float(np.mean(trace.after**2)) < float(np.mean(trace.before**2))
+        low, high = trace.differ
+        frequency = next(run.frequency for run in maps.runs if run.id == trace.id)
+        assert (high - low) * frequency == pytest.approx(6.0, rel=1e-6)
+        energy = (trace.before - trace.after) ** 2
+        inside = (trace.time >= low) & (trace.time <= high)
+        elsewhere = [
+            float(energy[(trace.time >= start) & (trace.time <= start + high - low)].sum())
+            for start in trace.time[trace.time <= trace.time[-1] - (high - low)]
+        ]
+        assert float(energy[inside].sum()) >= (1.0 - 1e-9) * max(elsewhere)

@@ -1,0 +1,324 @@
+"""The report says what the document says, needs no other file, and is the same every time."""
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+from diagnosis.answer.assemble import localise
+from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary, Step, Waterfall
+from diagnosis.facts.friction import FrictionCurve, FrictionPoint
+from diagnosis.facts.remainder import Ceiling, Closable, Curve
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.result import (
+    Candidate,
+    Coefficients,
+    Diagnosis,
+    GapSummary,
+    ParameterEstimate,
+    RunGap,
+)
+from tests.support.diagnosis_document import scattering_document
+from tests.support.gap_campaigns import campaign, nominal, studied
+from tunnel_lab.report import Byline, render_report, write_report, write_summary
+from tunnel_lab.report.drawing import THEMED, inline_svg
+from tunnel_lab.report.figures import diagnosis_figures, waterfall_figure
+from tunnel_lab.report.page import DESCRIPTIONS
+from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.errors import TunnelError
+
+CAUSE = "quadratic_damping"
+CLOSABLE = Closable(
+    0.37, (Ceiling("angle", 0.417, 0.023, "runs"), Ceiling("time", -3.0, 7.0, "runs")), "angle", "A moment.",
+    curve=Curve(("angle",), ((-0.1, 0.0, 0.1),), (-0.002, 0.0, 0.003), (0.001, 0.001, 0.001), "N m"),
+)  # fmt: skip
+
+FRICTION = FrictionCurve(
+    "coulomb_friction", "N m", (0.1, 1.0, 10.0), (0.004, 0.005, 0.006), (1e-4, 2e-4, 3e-4),
+    (FrictionPoint(0.3, 0.0041, 2e-4, 5), FrictionPoint(3.0, 0.0057, 1e-4, 40)),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def data():
+    return campaign(effect_from(CAUSE, {"coefficient": 0.003}))
+
+
+@pytest.fixture(scope="module")
+def document(data):
+    base = nominal(data)
+    lead = starting_points(base, effect_class(CAUSE))[0]
+    best = fit(lead.problem, lead.point, base=base)
+    where, maps, _ = localise(studied(data, base, (CAUSE,), best))
+    ids = [run.id for run in data.runs]
+    excess = [
+        (float(a @ a) / a.size - 1.0, float(b @ b) / b.size - 1.0)
+        for a, b in zip(base.residuals, best.residuals, strict=True)
+    ]
+    after = ParameterEstimate(best.value("cn_r"), best.std("cn_r"), "1/rad")
+    answer = Diagnosis(
+        campaign="<script>alert(1)</script>",
+        causes=(CAUSE,),
+        verdict="The gap is explained by quadratic damping & nothing else.",
+        gap=GapSummary(
+            True, base.excess, best.excess, 0.987, ON_RUNS,
+            tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},
+        ),
+        where=replace(where, words="The damping of all runs shows it."),
+        candidates=(
+            Candidate(CAUSE, 0.912, best.excess, 0.987, {"coefficient": ParameterEstimate(0.003, 1e-5, "N m")}),
+            Candidate("coulomb_friction", 0.08, 1.5, 0.5),
+            Candidate("unknown", 0.007, base.excess, 0.0),
+            Candidate("none", 0.001, base.excess, 0.0),
+        ),
+        ambiguous_with=("coulomb_friction",),
+        next_run={
+            "spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0, "separation": 9.0,
+        },
+        coefficients=Coefficients({"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, "A note."),
+        confirmation=Confirmation(True, 1.2e-5, "r2", 6e-6, 4e-5),
+        noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
+        blind_spots=("an error of the clock",),
+        cautions=("There is one run only.",),
+        closable=CLOSABLE,
+        waterfall=Waterfall((Step(None, base.excess), Step(CAUSE, 0.01)), {CAUSE: base.excess}, "somewhere"),
+        seconds={"nominal fit": 0.5},
+    )  # fmt: skip
+    drawn = {
+        "maps": maps.to_json_dict() | {"friction": FRICTION.to_json_dict()},
+        "repeatability": scattering_document()["repeatability"],
+    }
+    return json.loads(json.dumps(answer.to_json_dict() | drawn, allow_nan=False))
+
+
+@pytest.fixture(scope="module")
+def page(document, data):
+    return render_report(document, data)
+
+
+@pytest.fixture
+def written(monkeypatch, data):
+    """Renders a page whose figures are built but not drawn: drawing takes nearly all of the time."""
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
+    return lambda document, *byline: render_report(document, data, *byline)
+
+
+class Page(HTMLParser):
+    """Collects ids, outside references and text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.references, self.words, self.tags = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("src", "href", "xlink:href", "srcset", "data", "action"):
+                self.references.append(value)
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def test_the_verdict_comes_first(page, document):
+    text = Page(page.split("</style>", 1)[1]).text
+    places = [
+        text.index(words)
+        for words in (
+            document["verdict"],
+            "Coefficients before",
+            "What to do next",
+            document["where"]["words"],
+        )
+    ]
+    assert places == sorted(places)
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    found = Page(page)
+    assert all(value.startswith(("#", "data:image/png;base64,")) for value in found.references)
+    assert "@import" not in page
+    assert not re.search(r"url\((?!#|data:font/woff;base64,)", page)
+    assert not [tag for tag, _ in found.tags if tag in ("link", "iframe", "img", "object")]
+    assert not re.search(r"\b(fetch|XMLHttpRequest|WebSocket|import)\s*\(", page)
+    policy = next(attrs["content"] for _, attrs in found.tags if "http-equiv" in attrs)
+    assert policy.startswith("default-src 'none'")
+
+
+def test_ids_are_unique_and_references_lead_somewhere(page):
+    found = Page(page)
+    assert len(found.ids) == len(set(found.ids))
+    inside = {value[1:] for value in found.references if value.startswith("#")}
+    inside |= set(re.findall(r"url\(#([^)]+)\)", page))
+    assert inside <= set(found.ids)
+
+
+def test_text_of_the_campaign_cannot_become_markup(page, document, written):
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(1)" in page
+    runs = [run | {"id": "</script><b>"} for run in document["maps"]["runs"]]
+    maps = document["maps"] | {"runs": runs, "backbones": []}
+    assert "</script><b>" not in written(document | {"maps": maps})
+
+
+def test_figures_have_words_for_those_who_cannot_see_them(page):
+    pictures = [attrs for tag, attrs in Page(page).tags if tag == "svg"]
+    assert [attrs["aria-label"] for attrs in pictures] == list(DESCRIPTIONS.values())
+    assert all(attrs["role"] == "img" for attrs in pictures)
+    assert page.count("<figcaption>") == len(pictures)
+
+
+def test_numbers_are_those_of_the_document(page):
+    text = Page(page).text.replace("\u00a0", " ")
+    assert "0.91" in text
+    assert "91.2" not in text
+    assert "98.7 %" in text
+    assert "0.003000 ± 0.000010 N m" in text
+    assert "−0.310 ± 0.020" in text
+    assert "an error of the clock" in text
+    assert "Spring stiffness 80.0 N m/rad" in text
+    assert effect_class(CAUSE).signature in text
+
+
+def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
+    text = Page(page).text
+    assert "What could be closed: A moment." in text
+    assert "a moment of the angle alone 41.7 ± 2.3 %" in text
+    assert "not determined" in text  # worse than nothing, and beyond any meaning
+    explained = document | {"closable": None, "maps": None}
+    assert "What could be closed" not in written(explained)
+    page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
+    assert "What could be closed: nothing beyond chance (p = 0.43)." in Page(page).text
+    assert 'id="closable"' not in page
+
+
+MODEL = {
+    "file": "rig.xml", "joint": "yaw", "free": ["inertia", "damping"], "rest_rad": 0.0, "zero_rad": 0.0123,
+    "written": [{"name": "joint frictionloss", "before": [0.0], "after": [0.00456], "unit": "N m"}],
+    "notes": ["frictionloss is a soft constraint."],
+    "closed": 0.947, "closed_by_fit": 0.968, "closed_on": "on runs held out of the fit",
+}  # fmt: skip
+
+
+def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
+    given = document | {"model": MODEL, "maps": None}
+    text = Page(written(given, Byline(patch="out.xml"))).text
+    assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
+    assert "yaw + 0.705°. Written to out.xml ." in text
+    assert "Changes to rig.xml" in text
+    assert "joint frictionloss 0 0.004560 N m" in text
+    assert "frictionloss is a soft constraint." in text
+    assert "Written to" not in written(given)
+    unnamed = written(given | {"causes": ["unknown"]})
+    assert "No cause is written into the patched model, only what was free: inertia, damping." in unnamed
+    assert "94.7 %" not in unnamed
+
+
+def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, document, written):
+    assert "There is one run only." in page
+    assert "the MuJoCo model" in page
+    assert "0.00069° at most" in page
+    assert "within 0.0023°" in page
+    changed = {"maps": None, "cautions": [], "confirmation": document["confirmation"] | {"agrees": False}}
+    other = written(document | changed)
+    assert "beyond 0.0023°" in other
+    assert 'id="cautions"' not in other
+
+
+@pytest.mark.slow
+def test_the_same_document_gives_the_same_page(page, document, data):
+    assert render_report(document, data) == page
+
+
+def test_the_same_document_gives_the_same_text_and_the_same_figure_the_same_drawing(document, written):
+    assert written(document) == written(document)
+    drawings = [inline_svg(waterfall_figure(document), "steps", "The steps.") for _ in range(2)]
+    assert drawings[0] == drawings[1]
+
+
+def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
+    bare = {key: value for key, value in document.items() if key != "maps"}
+    path = write_report(bare, data, tmp_path / "report.html")
+    text = path.read_text("utf-8")
+    assert document["where"]["words"] in Page(text).text
+    assert text.count("<svg") == 6
+
+
+def test_no_gap_is_said_so(document, written):
+    calm = document | {
+        "causes": [], "verdict": "No gap: all is noise.", "ambiguous_with": [], "next_run": None, "maps": None,
+        "where": document["where"] | {"channel": None, "condition": None, "runs": [], "time_s": None},
+    }  # fmt: skip
+    text = Page(written(calm)).text
+    assert "No gap: all is noise." in text
+    assert "Share closed" not in text
+
+
+@pytest.mark.usefixtures("written")
+def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
+    with pytest.raises(TunnelError, match="cannot be written"):
+        write_report(document | {"maps": None}, data, tmp_path / "nowhere" / "report.html")
+
+
+def test_every_figure_is_described(document):
+    without_maps = diagnosis_figures(document | {"maps": None, "repeatability": None})
+    assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
+    assert list(diagnosis_figures(document)) == list(DESCRIPTIONS)
+
+
+def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
+    page = written(document)
+    assert "<summary><h2>How the runs repeat</h2></summary>" in page
+    assert 'data-figure="repeatability"' in page
+    assert "deviates far beyond the others" in page
+    found = document["repeatability"]
+    page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
+    assert "<p>Repeatability: the runs repeat; no scatter of their frequency or damping shows.</p>" in page
+    assert 'data-figure="repeatability"' not in page
+    assert "How the runs repeat" not in page
+    assert "Repeatability" not in written(document | {"repeatability": None})
+
+
+def test_figures_take_the_colours_of_the_theme(page):
+    used = set(re.findall(r"var\(--([a-z]+)\)", page))
+    assert set(THEMED.values()) <= used
+    assert used <= set(re.findall(r"--([a-z]+): light-dark", page))
+    assert 'font-family: "DejaVu Sans"; src: url(data:font/woff' in page
+
+
+def test_date_and_author_are_of_the_page_and_not_of_the_document(document, written, page):
+    text = Page(written(document | {"maps": None}, Byline("2026-05-31", "A. Smith <b>"))).text
+    assert "2026-05-31 · A. Smith <b>" in text
+    assert "A. Smith" not in page
+
+
+def test_hashes_and_versions_are_on_the_page(document, written):
+    provenance = {"versions": {"numpy": "9.8.7"}, "sha256": {"runs/a.csv": "ab" * 32}}
+    text = Page(written(document | {"provenance": provenance, "maps": None})).text
+    for part in ("9.8.7", "runs/a.csv", "ab" * 32):
+        assert part in text
+
+
+def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("tunnel_lab.report.page.shutil.which", lambda _: None)
+    with pytest.raises(TunnelError, match=r"no Chromium to print with.*--report"):
+        write_summary(document, data, tmp_path / "summary.pdf")
+    assert not (tmp_path / "summary.pdf").exists()
+
+
+def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
+    monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
+    with pytest.raises(TunnelError, match="Chromium could not print"):
+        write_summary(document | {"maps": None}, data, tmp_path / "summary.pdf")
+    assert not (tmp_path / "summary.pdf").exists()

@@ -1,0 +1,244 @@
+"""``tunnel view`` and ``tunnel render``: what they refuse, what they write, and what moves."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.skips import PLATFORM
+from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
+from tunnel_lab.show.live import Controls, History, LiveRun, missing_display, window_loop
+from tunnel_sim.engine.model import build_model
+from tunnel_sim.engine.simulate import simulate_motion
+from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.errors import TunnelError
+
+Tunnel = Callable[..., tuple[int, str, str]]
+PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
+SMALL = ("--size", "240x160", "--duration", "0.6")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--spring", "99"), "there is no spring 99"),
+        (("--wind", "-1"), "--wind"),
+        (("--wind", "nan"), "--wind"),
+        (("--angle", "90"), "--angle"),
+        (("--duration", "0"), "--duration"),
+        (("--run", "x"), "there is no plan"),
+        ((PLAN, "--run", "nonsense"), "has no run 'nonsense'"),
+        (("nowhere.toml",), "nowhere.toml"),
+        (("--effect", "coulomb_frictoin:friction_moment=1"), "did you mean 'coulomb_friction'"),
+        (("--effect", "coulomb_friction"), "friction_moment is missing"),
+        (("--camera", "behind"), "there is no camera 'behind'"),
+    ],
+)
+@pytest.mark.parametrize("command", ["view", "render"])
+def test_bad_input_is_one_clear_line(
+    command: str, arguments: tuple[str, ...], said: str, tunnel: Tunnel, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = ("--out", "film.mp4") if command == "render" else ()
+    status, _, error = tunnel(command, *arguments, *out)
+    assert status == 2
+    assert said in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--out", "film.gif"), "neither .mp4 nor .png"),
+        (("--out", "nowhere/film.mp4"), "its folder does not exist"),
+        (("--out", "a.png", "--size", "100x100"), "--size"),
+        (("--out", "a.png", "--size", "big"), "--size"),
+        (("--out", "a.png", "--size", "321x240"), "--size"),
+        (("--out", "a.png", "--at", "99"), "99 s is not in the run"),
+        (("--out", "a.png", "--fps", "0"), "fps"),
+    ],
+)
+def test_render_refuses(arguments, said, tunnel: Tunnel, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, _, error = tunnel("render", *arguments)
+    assert status == 2
+    assert said in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_machine_that_cannot_draw_is_told_what_to_install(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    assert backends() == ("nonsense",)
+    status, out, error = tunnel("render", "--out", tmp_path / "film.mp4", *SMALL)
+    assert (status, out) == (2, "")
+    assert "libosmesa6" in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, tmp_path: Path) -> None:
+    film, still = tmp_path / "film.mp4", tmp_path / "still.png"
+    status, out, error = tunnel(
+        "render", PLAN, "--out", film, "--out", still, "--at", "0.3", "--fps", "10", *SMALL
+    )
+    # a fault of the program is not one of the machine
+    assert not any(fault in error for fault in ("NameError", "TypeError")), error
+    if "off-screen rendering does not work here" in error:
+        pytest.skip(error)
+    assert status == 0, error
+    assert out.count("Written: ") == 2
+    assert {path.name for path in tmp_path.iterdir()} == {"film.mp4", "still.png"}
+    import imageio.v2 as imageio
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # the reader leaves its pipes to the collector
+        with imageio.get_reader(film) as reader:
+            frames = [np.asarray(frame) for frame in reader]
+        del reader
+        gc.collect()
+    assert len(frames) == 6
+    assert frames[0].shape == (160, 240, 3)
+    assert np.asarray(imageio.imread(still)).shape[:2] == (160, 240)
+    body, trace = slice(0, 120), slice(130, 240)  # left the body, right the trace: both move
+    for part in (body, trace):
+        assert np.abs(frames[0][:, part].astype(int) - frames[3][:, part]).max() > 60
+
+
+def test_an_interrupted_film_leaves_nothing(tmp_path: Path) -> None:
+    def interrupt(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises((KeyboardInterrupt, TunnelError)):  # the latter where the machine cannot draw
+        write_film(Request(duration=0.6), Look(240, 160, fps=10), tmp_path / "film.mp4", interrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_trace_grows_to_where_the_run_is() -> None:
+    run = shown_run(Request(duration=2.0))
+    record = run.record()
+    trace = draw_trace(record, 400, 300, run.title)
+    blue = lambda picture: (picture[..., 2].astype(int) - picture[..., 0] > 80).sum()  # noqa: E731
+    grown = [blue(trace.at(time)) for time in (0.0, 1.0, 2.0)]
+    assert grown[0] < grown[1] < grown[2]
+    orange = np.argwhere((trace.at(1.0) == (213, 94, 0)).all(axis=-1)).mean(axis=0)
+    assert orange[1] == pytest.approx(np.interp(1.0, trace.time, trace.columns), abs=1.0)
+    assert orange[0] == pytest.approx(np.interp(1.0, trace.time, trace.rows), abs=1.0)
+    assert trace.rows[np.argmax(record.yaw_rad)] == trace.rows.min()  # nose-right is up
+
+
+def test_what_is_shown_is_the_plans_run() -> None:
+    run = shown_run(Request(plan=str(PLAN)))
+    assert run.record().yaw_rad.tobytes() == run.record().yaw_rad.tobytes()
+    changed = shown_run(Request(plan=str(PLAN), wind_speed=20.0, spring=8, release_angle_deg=-5.0))
+    assert (changed.settings.wind_speed, changed.settings.spring_stiffness) == (20.0, 44.84)
+    assert changed.settings.release_angle == pytest.approx(np.radians(-5.0))
+    with_effect = shown_run(Request(effects=("coulomb_friction:friction_moment=0.01",)))
+    assert with_effect.settings.parameters["friction_moment"] == 0.01
+    assert "coulomb friction" in with_effect.title
+    request = Request(plan="p", effects=("a:b=1",), seed=3)
+    assert Request.from_json_dict(as_json(request)) == request
+
+
+def test_the_live_run_is_the_simulated_one_and_begins_again() -> None:
+    run = shown_run(Request(duration=1.0))
+    motion = simulate_motion(build_model(run.rig, run.settings), 1000.0)
+    live = LiveRun(run)
+    for _ in range(5):
+        live.advance(0.1)
+    assert live.data.time == pytest.approx(0.5)
+    assert live.angle == pytest.approx(motion.angle[500], abs=1e-12)
+    time_, angle = live.history.points.T
+    assert np.diff([0.0, *time_, 0.5]).max() < 0.03  # s: also within an advance of a tenth of a second
+    np.testing.assert_allclose(angle, motion.angle[np.round(1000.0 * time_).astype(int)], atol=1e-12)
+    live.advance(0.6)
+    live.advance(0.0)
+    assert live.history.points.tolist() == [[0.0, run.settings.release_angle]]
+    assert live.data.time == 0.0
+    assert live.angle == pytest.approx(run.settings.release_angle)
+
+
+def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
+    history = History(span=1.0, points=10)
+    for time_ in np.arange(0.0, 3.0, 0.01):
+        history.add(float(time_), 2.0 * float(time_))
+    points = history.points
+    assert len(points) == 10
+    assert points[-1, 0] > 2.85
+    np.testing.assert_allclose(points[:, 1], 2.0 * points[:, 0])
+    history.add(0.0, 1.0)
+    assert history.points.tolist() == [[0.0, 1.0]]
+
+
+class Window:
+    """Stands in for MuJoCo's passive viewer: closed after so many frames."""
+
+    def __init__(self, frames: int) -> None:
+        self.frames, self.viewport, self.seen = frames, None, []
+
+    def is_running(self) -> bool:
+        self.frames -= 1
+        return self.frames >= 0
+
+    def lock(self):
+        return contextlib.nullcontext()
+
+    def set_figures(self, figures) -> None:
+        corner, figure = figures
+        self.seen.append(int(figure.linepnt[0]))
+        self.corner = (corner.left, corner.bottom, corner.width, corner.height)
+        self.trace = np.array(figure.linedata[0]).reshape(-1, 2)
+
+    def set_texts(self, texts) -> None:
+        assert "pause" in texts[3]
+
+    def sync(self) -> None:
+        pass
+
+
+def test_the_window_follows_the_clock_and_the_keys() -> None:
+    live = LiveRun(shown_run(Request(duration=5.0)))
+    controls = Controls(live)
+    clock = SimpleNamespace(now=0.0)
+
+    def sleep(seconds: float) -> None:
+        clock.now += max(seconds, 1.0 / 60.0)
+
+    window = Window(61)
+    window_loop(window, live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
+    assert live.data.time == pytest.approx(1.0, abs=0.05)
+    assert window.seen[-1] > 20
+    last = window.trace[window.seen[-1] - 1]
+    np.testing.assert_allclose(last, [live.data.time, live.angle], atol=1e-6)  # drawn in single precision
+    assert not window.trace[window.seen[-1] :].any()
+    assert window.corner == (800, 0, 400, 225)  # lower right of a window whose size is not yet known
+    controls.key(32)
+    before = live.data.time
+    window_loop(Window(10), live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
+    assert live.data.time == before
+    controls.key(82)
+    window_loop(Window(1), live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
+    assert live.data.time == 0.0
+
+
+def test_no_display_is_one_clear_line(tunnel: Tunnel, monkeypatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    if not missing_display():
+        pytest.skip(f"{PLATFORM}: there is always one")
+    status, out, error = tunnel("view")
+    assert (status, out) == (2, "")
+    assert "there is no display" in error
+    assert "tunnel render" in error
+    assert error.count("\n") == 1

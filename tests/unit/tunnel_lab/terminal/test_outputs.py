@@ -1,0 +1,116 @@
+"""Where output goes: files first, then words; links, devices and readers that go away."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from tests.skips import PLATFORM
+from tests.support.gone_reader import unheard
+
+Tunnel = Callable[..., tuple[int, str, str]]
+ROOT = Path(__file__).parents[4]
+
+
+@pytest.mark.slow
+def test_diagnose_writes_before_it_prints(tiny_campaign: Path, tmp_path: Path) -> None:
+    page, answer = tmp_path / "a.html", tmp_path / "a.json"
+    words = ("diagnose", tiny_campaign, "--effects", "mains_hum", "--report", page)
+    assert unheard(*words, "--json", answer) == 0
+    assert page.exists()
+    assert answer.exists()
+    assert unheard("identify", tiny_campaign, "--json", "-") == 0
+
+
+def test_identify_plot_and_effects_write_before_they_print(
+    tiny_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Figure, "savefig", lambda _, stream, **_form: stream.write(b"drawn"))
+    assert unheard("identify", tiny_campaign, "--json", tmp_path / "e.json") == 0
+    assert (tmp_path / "e.json").exists()
+    assert unheard("plot", tiny_campaign, "--out", tmp_path) == 0
+    assert len(list((tmp_path / "tiny").glob("*.png"))) == 3
+    page = tmp_path / "e.md"
+    assert unheard("effects", "--markdown", page, "--json", tmp_path / "effects.json") == 0
+    assert page.exists()
+
+
+@pytest.mark.parametrize("words", [("--help",), ("identify", "--help"), ("effects",)])
+def test_a_reader_that_goes_away_is_not_an_error(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert unheard(*words) == 0  # tunnel --help | head -1
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.slow
+def test_score_writes_before_it_prints(tmp_path: Path) -> None:
+    words = ("score", "--estimator", "hilbert", "--jobs", "0", "--trials", "2")
+    status = unheard(*words, "--out", tmp_path / "s", "--write-baseline", tmp_path / "b.parquet")
+    assert status == 0
+    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == [
+        "score.pdf",
+        "score.png",
+        "scores.parquet",
+        "trials.parquet",
+    ]
+    assert (tmp_path / "b.parquet").exists()
+
+
+def started(*words: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "tunnel_lab.cli", *map(str, words)],
+        cwd=ROOT, text=True, stderr=subprocess.PIPE, check=False, **options,
+    )  # fmt: skip
+
+
+def test_a_real_pipe_that_is_closed_at_once() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = started("effects", stdout=writing)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_without_standard_output(tmp_path: Path) -> None:
+    done = started("effects", "--json", tmp_path / "e.json", preexec_fn=lambda: os.close(1))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "e.json").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason=f"{PLATFORM}: there is no /dev/full")
+def test_a_full_disk_below_standard_output_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = started("effects", stdout=full)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "no space left" in done.stderr
+
+
+def test_json_through_a_link(tunnel: Tunnel, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "real.json")
+    (tmp_path / "real.json").write_text("old")
+    assert tunnel("effects", "--json", tmp_path / "link")[0] == 0
+    assert (tmp_path / "link").is_symlink()
+    assert json.loads((tmp_path / "real.json").read_text(encoding="utf-8"))
+
+
+def test_json_to_a_device(tunnel: Tunnel) -> None:
+    status, _, err = tunnel("effects", "--json", "/dev/null")
+    assert (status, err) == (0, "")
+    assert Path("/dev/null").is_char_device()
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose", "effects"])
+def test_a_folder_is_refused_before_the_work(tunnel: Tunnel, tmp_path: Path, command: str) -> None:
+    words = [command] if command == "effects" else [command, tmp_path / "no campaign"]
+    status, out, err = tunnel(*words, "--json", tmp_path)
+    assert (status, out) == (2, "")
+    assert err == f"tunnel: {tmp_path}: is a folder, not a file; name a file\n"

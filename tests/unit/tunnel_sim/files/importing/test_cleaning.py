@@ -1,0 +1,238 @@
+"""Clean-up and cutting of records: nothing is changed silently, and nothing is cut from a free decay.
+
+Truth: closed-form decays, and what a hand or a logger was made to do to them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.import_files import RATE, decay, written
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts
+from tunnel_sim.files.importing.column_numbers import without_overflow
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.releases import find_runs, find_runs_of_rate
+from tunnel_sim.files.importing.tables import Channel
+
+
+def held(angle: float, seconds: float) -> np.ndarray:
+    return np.full(round(seconds * RATE), angle)
+
+
+def pulled(to: float, seconds: float) -> np.ndarray:
+    return np.linspace(0.0, to, round(seconds * RATE))
+
+
+def uniform(reading: np.ndarray) -> np.ndarray:
+    return np.arange(reading.size) / RATE
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_free_decay_is_not_cut(seed: int) -> None:
+    rng = np.random.default_rng([7, seed])
+    time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
+    phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
+    omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
+    angle = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
+    angle += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
+    (piece,) = find_runs(time, angle)
+    assert piece.first == 0
+    assert piece.last == time.size or zeta * omega * time[-1] > 5.0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_free_decay_of_rates_is_not_cut(seed: int) -> None:
+    rng = np.random.default_rng([8, seed])
+    time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
+    phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
+    omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
+    rate = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
+    rate += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
+    (piece,) = find_runs_of_rate(time, rate)
+    assert piece.first == 0
+    assert piece.last == time.size or zeta * omega * time[-1] > 4.0
+
+
+@pytest.mark.parametrize("hold", [0.0, 2.0])
+@pytest.mark.parametrize("bias", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_hand_before_a_release_is_cut_off_a_record_of_rates(hold: float, bias: float, seed: int) -> None:
+    rng = np.random.default_rng([9, seed])
+    time = np.arange(round(40.0 * RATE)) / RATE
+    free = -0.35 * 4.0 * np.pi * np.exp(-0.15 * time) * np.sin(4.0 * np.pi * time)
+    pull, steady = np.full(round(RATE), 0.35), 0.02 * rng.standard_normal(round(hold * RATE))
+    shaking = 0.3 * np.sin(2.0 * np.pi * 3.0 * np.arange(pull.size) / RATE) * np.hanning(pull.size)
+    before = np.concatenate([held(0.0, 1.0), pull + shaking, steady])
+    rate = np.concatenate([before, free]) + bias
+    rate += 2e-3 * rng.standard_normal(rate.size)
+    (piece,) = find_runs_of_rate(uniform(rate), rate)
+    # A quarter of a cycle of 0.5 s after the release, and never before it.
+    assert (piece.first - before.size) / RATE == pytest.approx(0.125, abs=0.03)
+    assert piece.last > before.size + 18.0 * RATE
+
+
+def test_an_imported_record_of_rates_begins_after_the_hand(tmp_path: Path) -> None:
+    time = np.arange(round(30.0 * RATE)) / RATE
+    free = -0.35 * 4.0 * np.pi * np.exp(-0.15 * time) * np.sin(4.0 * np.pi * time)
+    before = np.concatenate([held(0.0, 1.0), np.full(round(2.0 * RATE), 0.175), held(0.0, 1.0)])
+    rate = np.concatenate([before, free]) + 1e-3 * np.random.default_rng(1).standard_normal(
+        before.size + free.size
+    )
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(uniform(rate), rate, strict=True))
+    imported = read_records([written(tmp_path, "imu.csv", "time_s,yaw_rate_rad_s\n" + rows)])
+    (run,) = imported.campaign.runs
+    assert run.record.time_s[-1] == pytest.approx(29.87, abs=0.1)
+    assert any("at the largest rate after the release" in line for line in imported.remarks())
+
+
+def test_growing_motion_is_left_whole() -> None:
+    time = np.arange(4000) / RATE
+    angle = 0.3 * np.tanh(1e-3 * np.exp(0.5 * time)) * np.cos(12.0 * time)
+    (piece,) = find_runs(time, angle)
+    assert (piece.first, piece.last) == (0, time.size)
+
+
+@pytest.mark.parametrize("hold", [0.0, 2.0])
+def test_the_pull_of_a_hand_is_cut_off(hold: float) -> None:
+    _, free = decay()
+    before = np.concatenate([held(0.0, 1.0), pulled(0.35, 1.0), held(0.35, hold)])
+    reading = np.concatenate([before, free])
+    (piece,) = find_runs(uniform(reading), reading)
+    assert abs(piece.first - before.size) <= 4
+    assert piece.last == reading.size
+
+
+def test_runs_one_after_another_are_separated(tmp_path: Path) -> None:
+    parts, begins = [], []
+    for seed, amplitude in ((1, 0.35), (2, 0.3), (3, -0.35)):
+        parts += [held(0.0, 1.5), pulled(amplitude, 1.2), held(amplitude, 0.8)]
+        begins.append(sum(part.size for part in parts))
+        parts.append(decay(seed, duration=20.0, amplitude=amplitude)[1])
+    reading = np.concatenate(parts)
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(uniform(reading), reading, strict=True))
+    path = written(tmp_path, "day.csv", "time_s,yaw_rad\n" + rows)
+    imported = read_records([path])
+    assert [run.id for run in imported.campaign.runs] == ["day-1", "day-2", "day-3"]
+    assert [part.piece.first for part in imported.parts] == pytest.approx(begins, abs=6)
+    for part, following in zip(imported.parts, [*begins[1:], reading.size + 700], strict=True):
+        assert part.piece.last <= following - 2.0 * RATE  # the hand's pull belongs to no run
+        assert part.piece.last - part.piece.first > 18.0 * RATE
+    (whole,) = read_records([path], ImportChoices(cut=False)).campaign.runs
+    assert whole.record.time_s.size == reading.size
+
+
+def test_a_rest_longer_than_the_motion_is_shortened() -> None:
+    _, free = decay(duration=20.0)
+    reading = np.concatenate([free, held(0.0, 200.0)])
+    (piece,) = find_runs(uniform(reading), reading)
+    assert 30.0 * RATE < piece.last < 60.0 * RATE
+
+
+def test_missing_rows_disorder_and_repeats_are_said() -> None:
+    time, angle = decay()
+    reading = angle.copy()
+    reading[700] = np.nan
+    order = np.concatenate([np.arange(100, 800), np.arange(100), np.arange(790, time.size)])
+    found = cleaned(time[order] + 5.0, reading[order])
+    assert found.time_s.size == time.size - 1
+    np.testing.assert_allclose(found.time_s, np.delete(time, 700), atol=1e-12)
+    np.testing.assert_array_equal(found.reading, np.delete(angle, 700))
+    said = "; ".join(found.said)
+    for part in (
+        "1 sample without a number",
+        "sorted by time",
+        "10 repeated samples",
+        "at 5 s",
+        "1 sample missing in 1 gap, ",
+    ):
+        assert part in said
+
+
+def test_stamps_coarser_than_the_sampling_are_spread() -> None:
+    time, angle = decay()
+    found = cleaned(np.floor(time * 50.0) / 50.0, angle)
+    assert found.time_s.size == time.size
+    assert "coarser than the sampling" in "; ".join(found.said)
+    assert np.abs(found.time_s - time).max() <= 0.02
+
+
+def test_uneven_stamps_are_kept_and_said() -> None:
+    time, angle = decay()
+    uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
+    assert "differ from an even clock by up to" in "; ".join(uneven.said)
+    np.testing.assert_allclose(uneven.time_s, time + 4e-4 * np.sin(np.arange(time.size)), atol=1e-8)
+
+
+def test_times_count_from_the_first_sample_to_a_millionth_of_a_step() -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(4e-3, 6e-3, 50))
+    time -= time[0]
+    assert np.array_equal(from_zero(time), time)
+    for start in (-3.0, 1.7e9 / 1024.0):
+        moved = from_zero(time + start)
+        assert moved[0] == 0.0
+        assert np.abs(moved - time).max() < 1e-6 * 5e-3
+    even = 0.005 * np.arange(50)
+    assert np.array_equal(from_zero(even + 0.3), np.round(even, 9))  # no digits of the subtraction
+    assert np.array_equal(from_zero(np.array([4.0])), [4.0])
+
+
+@pytest.mark.parametrize("full", [2.0 * np.pi, 360.0, 65536.0])
+def test_overflow_is_taken_out(full: float) -> None:
+    angle = 0.4 * full * np.cos(np.arange(2000) / 40.0) + 0.9 * full
+    if full == 65536.0:
+        angle = np.round(angle)
+    said: list[str] = []
+    found = without_overflow(np.mod(angle, full), said)
+    np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-9 * full)
+    assert "overflow" in said[0]
+
+
+def test_what_does_not_overflow_is_not_touched() -> None:
+    said: list[str] = []
+    reading = 3.0 * np.cos(np.arange(2000) / 40.0)
+    assert without_overflow(reading, said) is reading
+    square = np.where(np.arange(2000) // 10 % 2, 300.0, 0.0)
+    assert without_overflow(square, said) is square
+    assert said == []
+
+
+def test_a_clock_that_starts_anew_begins_another_run(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for seed in (1, 2) for t, y in zip(*decay(seed), strict=True))
+    runs = read_records([written(tmp_path, "two.csv", "time_s,yaw_rad\n" + rows)]).campaign.runs
+    assert [run.id for run in runs] == ["two-1", "two-2"]
+    np.testing.assert_allclose(runs[0].record.yaw_rad, angle, atol=1e-8)
+    shuffled = np.random.default_rng(1).permutation(time)
+    assert restarts(shuffled) == []
+
+
+def test_the_step_of_a_sensor_is_found() -> None:
+    _, angle = decay(duration=20.0)
+    step = 2.0 * np.pi / 4000.0
+    levels = step * np.round(angle / step)
+    assert resolution([levels]) == pytest.approx(step, rel=1e-6)
+    assert resolution([np.round(levels, 5)]) == pytest.approx(step, rel=1e-3)
+    assert resolution([angle]) is None
+
+
+def test_samples_outside_start_and_end_are_left_out(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(time + 10.0, angle, strict=True))
+    path = written(tmp_path, "a.csv", "time_s,yaw_rad\n" + rows)
+    (run,) = read_records([path], ImportChoices(start=10.5, end=15.0)).campaign.runs
+    inside = (time >= 0.4999) & (time <= 5.0001)
+    np.testing.assert_allclose(run.record.yaw_rad, angle[inside], atol=1e-8)
+    assert run.record.time_s[0] == 0.0
+
+
+def test_a_signalling_nan_of_a_damaged_file_does_not_hide_the_numbers_beside_it():
+    values = np.full(172, np.nan)
+    values[::3] = np.linspace(-1.0, 2.0, values[::3].size)
+    values.view(np.uint64)[1::3] = 0x7FF0000000000001  # signalling
+    quiet = Channel("angle", values).values
+    assert (np.nanmin(quiet), np.nanmax(quiet)) == (-1.0, 2.0)
+    assert set(quiet.view(np.uint64)[1::3].tolist()) == {int(np.array(np.nan).view(np.uint64))}

@@ -1,0 +1,226 @@
+"""Conditions that a file only seems to state: said with the option that uses them. Truth: what was written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from tests.support.import_files import csv, decay, written
+from tunnel_sim import TunnelError
+from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
+from tunnel_sim.files.importing.conditions import Unstated
+from tunnel_sim.files.importing.records import read_records
+
+TIME, ANGLE = decay()
+
+
+def with_head(folder: Path, head: str, name: str = "log.csv") -> Path:
+    rows = "\n".join(f"{t:.3f};{y:.8f}" for t, y in zip(TIME, ANGLE, strict=True))
+    return written(folder, name, f"{head}\ntime_s;yaw_rad\n{rows}\n")
+
+
+def with_column(folder: Path, heading: str, values: np.ndarray | float) -> Path:
+    column = np.broadcast_to(values, TIME.shape)
+    rows = "\n".join(f"{t:.3f};{y:.8f};{v:.8f}" for t, y, v in zip(TIME, ANGLE, column, strict=True))
+    return written(folder, "log.csv", f"time_s;yaw_rad;{heading}\n{rows}\n")
+
+
+def setting(text: str) -> ImportChoices:
+    numbers, names = parse_setting(text, "--set")
+    return ImportChoices(conditions=numbers, stated_by=names)
+
+
+@pytest.mark.parametrize(
+    ("head", "density"),
+    [
+        ("Luftdichte [kg/m3];1,196", 1.196),
+        ('"Luftdichte [kg/m3]";"1,196"', 1.196),
+        ("Luftdichte [kg/m^3] = 1.196", 1.196),
+        ("Luftdichte;[kg/m3];1,196", 1.196),
+        ("Luftdichte;1,196;kg/m3", 1.196),
+        ("Luftdichte (g/cm3): 0.001196", 1.196),
+        ("# rho kg/m3: 1.196", 1.196),
+        ("Messung 3;Luftdichte;1,196", 1.196),
+    ],
+)
+def test_a_density_above_the_table_is_read(tmp_path: Path, head: str, density: float) -> None:
+    (run,) = read_records([with_head(tmp_path, f"Wind speed: 12 m/s\n{head}")]).campaign.runs
+    assert (run.wind_speed, run.air_density) == (12.0, pytest.approx(density))
+
+
+@pytest.mark.parametrize(
+    ("head", "key", "value"),
+    [
+        ("theta0 [deg]; 20", "release_angle", np.deg2rad(20.0)),
+        ("V0 = 54 km/h\nrho = 1.2", "wind_speed", 15.0),
+        ("Federsteifigkeit (N mm/rad);16120", "spring_stiffness", 16.12),
+    ],
+)
+def test_names_and_units_with_digits_above_the_table(
+    tmp_path: Path, head: str, key: str, value: float
+) -> None:
+    (run,) = read_records([with_head(tmp_path, head)]).campaign.runs
+    assert getattr(run, key) == pytest.approx(value)
+
+
+def test_sizes_of_the_rig_have_units(tmp_path: Path) -> None:
+    head = "frontal_area [cm2]; 360\nReference length: 62,5 cm\nyaw_inertia [kg m2] = 0.11\nwidth [mm]: 225"
+    rig = read_records([with_head(tmp_path, head)]).campaign.rig
+    assert (rig.frontal_area, rig.reference_length, rig.yaw_inertia) == pytest.approx((0.036, 0.625, 0.11))
+    assert rig.width is None
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("V: 15", "'V' = 15 is left out: it may be wind_speed, but has no unit"),
+        ("U = 15", "'U' = 15 is left out"),
+        ("Geschwindigkeit: 54 km/h", "'Geschwindigkeit' = 15 in m/s is left out: its name is not that"),
+        ("Wind speed: 12 furlong", "its unit is not one of m/s, km/h"),
+    ],
+)
+def test_wind_off_is_not_assumed_beside_a_number(tmp_path: Path, head: str, said: str) -> None:
+    path = with_head(tmp_path, head)
+    with pytest.raises(Unstated, match="wind-off is not assumed beside it") as caught:
+        read_records([path])
+    assert said in caught.value.what
+    assert "--set wind_speed=" in caught.value.remedy
+    assert "--set wind_speed=0 states wind-off" in caught.value.remedy
+    assert read_records([path], setting("wind_speed=0")).campaign.runs[0].wind_speed == 0.0
+
+
+@pytest.mark.parametrize(("name", "speed"), [("V", 15.0), ("v", 15.0), ("Geschwindigkeit", 4.0)])
+def test_the_option_that_is_named_uses_the_number(tmp_path: Path, name: str, speed: float) -> None:
+    path = with_head(tmp_path, "V: 15\nGeschwindigkeit: 14,4 km/h")
+    found = read_records([path], setting(f"wind_speed={name}"))
+    assert found.campaign.runs[0].wind_speed == pytest.approx(speed)
+    assert any(f"wind_speed = {speed:g} from the file" in line for line in found.remarks())
+
+
+def test_a_name_that_no_file_has_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        TunnelError, match=r"no column or number 'Vv' that states wind_speed.*did you mean 'V'"
+    ):
+        read_records([with_head(tmp_path, "V: 15")], setting("wind_speed=Vv"))
+    with pytest.raises(TunnelError, match="is not in a unit of wind_speed"):
+        read_records([with_head(tmp_path, "V: 15 furlong")], setting("wind_speed=V [furlong]"))
+
+
+def test_a_column_that_may_be_the_wind_is_said_and_used_on_request(tmp_path: Path) -> None:
+    noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
+    path = with_column(tmp_path, "V", 12.0 + noise)
+    with pytest.raises(Unstated, match=r"'V' is left out.*--set wind_speed=V uses it"):
+        read_records([path])
+    (run,) = read_records([path], setting("wind_speed=V")).campaign.runs
+    assert run.wind_speed == pytest.approx(12.0, abs=0.02)
+    # About zero it is no wind, as an angular speed is not.
+    slope = np.gradient(ANGLE, TIME)
+    assert read_records([with_column(tmp_path, "speed", slope)]).campaign.runs[0].wind_speed == 0.0
+    # What has another unit is another quantity.
+    assert read_records([with_column(tmp_path, "V [mV]", 24.0)]).campaign.runs[0].wind_speed == 0.0
+
+
+def test_a_stiffness_that_is_not_used_is_said_and_stops_nothing(tmp_path: Path) -> None:
+    found = read_records([with_head(tmp_path, "K = 16.12\nKr = 3 N/m")])
+    assert found.campaign.runs[0].spring_stiffness is None
+    said = "\n".join(found.remarks())
+    assert (
+        "'K' = 16.12 is left out: it may be spring_stiffness, but has no unit; --set spring_stiffness=K"
+        in said
+    )
+    assert "'Kr (N/m)' = 3 is left out: its unit is not one of N m/rad" in said
+    (run,) = read_records([with_head(tmp_path, "K = 16.12")], setting("spring_stiffness=K")).campaign.runs
+    assert run.spring_stiffness == 16.12
+
+
+def test_members_of_a_mat_file(tmp_path: Path) -> None:
+    arrays = {"time": TIME, "yaw_rad": ANGLE}
+    path = tmp_path / "rig.mat"
+    scipy.io.savemat(path, arrays | {"V": 15.0, "Kr": 16.12, "rho": 1.2})
+    found = read_records([path])
+    run = found.campaign.runs[0]
+    assert (run.wind_speed, run.spring_stiffness, run.air_density) == (15.0, 16.12, 1.2)
+    assert any("wind_speed = 15 from the file ('V' = 15, in m/s)" in line for line in found.remarks())
+    scipy.io.savemat(path, arrays | {"V": 15.0, "Kr": 16.12})  # a voltage is as likely
+    with pytest.raises(Unstated, match="--set wind_speed=V uses it"):
+        read_records([path])
+    scipy.io.savemat(path, arrays | {"meta": {"wind_speed": "54 km/h", "rho": 1.2, "Kr": 16.12}})
+    run = read_records([path]).campaign.runs[0]
+    assert (run.wind_speed, run.spring_stiffness, run.air_density) == (pytest.approx(15.0), 16.12, 1.2)
+    scipy.io.savemat(path, arrays | {"V": [0.0, 10.0, 15.0]})
+    with pytest.raises(Unstated, match=r"'V' of 3 values.*but not of which run.*--conditions RUNS.csv"):
+        read_records([path])
+
+
+def test_a_speed_in_a_file_name_is_proposed(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, f"S16_V{speed}_r{n}.csv") for n, speed in enumerate((0, 10, "12.5"), 1)]
+    with pytest.raises(Unstated, match=r'--name "S\{spring\}_V\{wind_speed\}\*" uses it') as caught:
+        read_records(paths)
+    assert "'V10' in the file's name is left out: it may state wind_speed = 10" in caught.value.what
+    choices = ImportChoices(name="S{spring}_V{wind_speed}*", conditions=setting("air_density=1.2").conditions)
+    runs = read_records(paths, choices).campaign.runs
+    assert [(run.spring_stiffness, run.wind_speed) for run in runs] == [
+        (16.0, 0.0),
+        (16.0, 10.0),
+        (16.0, 12.5),
+    ]
+    # A spring alone is said, and stops nothing.
+    found = read_records(paths, setting("wind_speed=0"))
+    assert any("'S16' in the file's name" in line for line in found.remarks())
+
+
+@pytest.mark.parametrize(
+    ("name", "speed", "use"),
+    [
+        ("V10.csv", 10.0, '--name "V{wind_speed}"'),
+        ("rig_v=8_a.csv", 8.0, '--name "*_v={wind_speed}*"'),
+        ("run3_10mps.csv", 10.0, '--name "*_{wind_speed}mps"'),
+        ("u_inf-12p5.csv", 12.5, '--name "u_inf-{wind_speed}"'),
+        ("V54kmh.csv", 15.0, "--set wind_speed=15"),
+        ("S16V10.csv", 10.0, '--name "S{spring}V{wind_speed}"'),
+    ],
+)
+def test_names_that_state_a_speed(tmp_path: Path, name: str, speed: float, use: str) -> None:
+    path = csv(tmp_path, name)
+    with pytest.raises(Unstated, match="wind-off is not assumed") as caught:
+        read_records([path])
+    assert caught.value.remedy.startswith(f"{use} uses it")
+    option, _, text = use.partition(" ")
+    dense = setting("air_density=1.2").conditions
+    if option == "--name":
+        choices = ImportChoices(name=text.strip('"'), conditions=dense)
+    else:
+        choices = setting(f"{text}, air_density=1.2")
+    assert read_records([path], choices).campaign.runs[0].wind_speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize(
+    "name", ["v0.csv", "V_0_run2.csv", "run3.csv", "have10.csv", "10ms.csv", "Messung2.csv", "rev12.csv"]
+)
+def test_other_names_state_no_speed(tmp_path: Path, name: str) -> None:
+    assert read_records([csv(tmp_path, name)]).campaign.runs[0].wind_speed == 0.0
+
+
+def test_names_of_which_not_all_have_the_part_ask_for_a_table(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, "S16_off.csv"), csv(tmp_path, "S16_V10.csv")]
+    with pytest.raises(Unstated, match=r"--conditions RUNS\.csv"):
+        read_records(paths)
+
+
+def test_a_table_of_conditions_has_the_names_and_units_of_files(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, "a.csv"), csv(tmp_path, "b.csv")]
+    for head in ("Datei;V [km/h];Federsteifigkeit;Luftdichte [kg/m3]", "Lauf;V (km/h);Kr;rho"):
+        text = f"{head}\na;54;16,12;1,2\nb;0;16,12;\n"
+        found = read_records(paths, conditions=written(tmp_path, "runs.csv", text))
+        runs = found.campaign.runs
+        assert [(r.wind_speed, r.spring_stiffness, r.air_density) for r in runs] == [
+            (pytest.approx(15.0), 16.12, 1.2),
+            (0.0, 16.12, None),
+        ]
+        assert any("runs.csv: wind_speed from 'V" in line for line in found.remarks())
+    text = "file;Wind speed [furlong]\na;1\nb;2\n"
+    with pytest.raises(TunnelError, match=r"'Wind speed \[furlong\]' is not in a unit of wind_speed"):
+        read_records(paths, conditions=written(tmp_path, "runs.csv", text))

@@ -1,0 +1,162 @@
+"""Where a heading states a unit, and that a written unit is taken or asked for. Truth: headings by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import nptdms
+import numpy as np
+import polars as pl
+import pytest
+
+from tests.support.import_files import decay, written
+from tunnel_sim import TunnelError
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.units import UNITS, known_unit, split_unit
+
+HEADINGS = {
+    "Zeit/s": ("Zeit", "s"),
+    "Winkel/Grad": ("Winkel", "deg"),
+    "WINKEL/GRAD": ("WINKEL", "deg"),
+    "Winkel/°": ("Winkel", "deg"),
+    "Winkel°": ("Winkel", "deg"),
+    "φ / rad": ("φ", "rad"),
+    "φ in (°)": ("φ", "deg"),
+    "t in ms": ("t", "ms"),
+    "t (in s)": ("t", "s"),
+    "Zeit in min": ("Zeit", "min"),
+    "time in min": ("time", "min"),
+    "elapsed time s": ("elapsed time", "s"),
+    "Zeit in Sekunden seit Start": ("Zeit", "s"),
+    "Drehwinkel (Grad)": ("Drehwinkel", "deg"),
+    "Winkel [grad]": ("Winkel", "deg"),
+    "Winkel/gon": ("Winkel", "gon"),
+    "Angle - deg": ("Angle", "deg"),
+    "Angle:deg": ("Angle", "deg"),
+    "U/V": ("U", "V"),
+    "V/km/h": ("V", "km/h"),
+    "v / (km/h)": ("v", "km/h"),
+    "ω / rad/s": ("ω", "rad/s"),
+    "ω in rad s⁻¹": ("ω", "rad/s"),
+    "n / U/min": ("n", "rpm"),
+    "Winkelgeschwindigkeit / (Grad/s)": ("Winkelgeschwindigkeit", "deg/s"),
+    "Kr / (Nm/Grad)": ("Kr", "N m/deg"),
+    "rad/s": ("rad/s", "rad/s"),
+    "m/s": ("m/s", "m/s"),
+    "s": ("s", "s"),
+    "°": ("°", "deg"),
+    "time_min": ("time", "min"),
+    "Winkel/Grad Run 1": ("Winkel Run 1", "deg"),
+    # Units that are not known are kept as they are written.
+    "angle [grad]": ("angle [grad]", "grad"),
+    "angle/grad": ("angle", "grad"),
+    "angle in arcmin": ("angle", "arcmin"),
+    "Weg mm/s": ("Weg", "mm/s"),
+    "Temperatur in Grad": ("Temperatur", "°C"),
+    # Words that are not units.
+    "min": ("min", ""),
+    "V": ("V", ""),
+    "h": ("h", ""),
+    "yaw_min": ("yaw_min", ""),
+    "temp_h": ("temp_h", ""),
+    "yaw_grad": ("yaw_grad", ""),
+    "Zeit/Run": ("Zeit/Run", ""),
+    "Zeit/Run 1": ("Zeit/Run 1", ""),
+    "Dev1/ai0": ("Dev1/ai0", ""),
+    "Position in tunnel axis": ("Position in tunnel axis", ""),
+    "flow_kg_s": ("flow_kg_s", ""),
+}
+
+
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_a_heading_states_its_unit(heading: str) -> None:
+    assert split_unit(heading) == HEADINGS[heading]
+
+
+def test_the_german_degree_is_a_degree_and_the_gon_is_not() -> None:
+    assert [known_unit(text) for text in ("Grad", "[Grad]", "Grad/s", "grad", "gon", "Neugrad")] == [
+        "deg", "deg", "deg/s", None, "gon", "gon",
+    ]  # fmt: skip
+    assert UNITS["angle"]["gon"] == pytest.approx(2.0 * np.pi / 400.0)
+
+
+IMPORTS = {
+    "Zeit/s;Winkel/Grad": (1.0, np.pi / 180.0),
+    "Zeit/min;Winkel/°": (60.0, np.pi / 180.0),
+    "time in min;angle in deg": (60.0, np.pi / 180.0),
+    "t in ms;φ / mrad": (1e-3, 1e-3),
+    "s;°": (1.0, np.pi / 180.0),
+    "Zeit;Winkel\ns;Grad": (1.0, np.pi / 180.0),
+    "Zeit;Winkel\n[s];[grad]": (1.0, np.pi / 180.0),
+    "t in h;Winkel in gon": (3600.0, np.pi / 200.0),
+}
+
+
+def log(folder: Path, heading: str, time: np.ndarray, angle: np.ndarray) -> Path:
+    rows = "\n".join(f"{t:.9g};{y:.12g}" for t, y in zip(time, angle, strict=True))
+    return written(folder, "log.csv", f"{heading}\n{rows}\n")
+
+
+@pytest.mark.parametrize("heading", IMPORTS)
+def test_the_unit_of_a_heading_is_the_one_that_is_read(heading: str, tmp_path: Path) -> None:
+    second, radian = IMPORTS[heading]
+    time, angle = decay(1)
+    imported = read_records([log(tmp_path, heading, time / second, angle / radian)])
+    (run,) = imported.campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-4 * second)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-9)
+    assert not any("no unit" in line for line in imported.remarks())
+
+
+@pytest.mark.parametrize(
+    ("heading", "option"),
+    [
+        ("time in s;angle in arcmin", "--unit"),
+        ("t/s;angle [grad]", "--unit"),
+        ("t/s;yaw_grad", "--unit"),
+        ("t/s;yaw_deg_filtered", "--unit"),
+        ("t/Foo;yaw/rad", "--time-unit"),
+        ("time in fortnights;yaw/rad", "--time"),
+        ("time_ms_raw;yaw/rad", "--time-unit"),
+    ],
+)
+def test_a_unit_that_is_written_but_not_known_is_asked_for(heading: str, option: str, tmp_path: Path) -> None:
+    time, angle = decay(1)
+    with pytest.raises(TunnelError, match=option):
+        read_records([log(tmp_path, heading, time, angle)])
+
+
+def test_a_temperature_in_degrees_is_not_an_angle(tmp_path: Path) -> None:
+    time, angle = decay(1)
+    rows = "\n".join(f"{t:.3f};{20.0 + t};{np.rad2deg(y):.9f}" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"Zeit/s;Temperatur/Grad;Winkel/Grad\n{rows}\n")
+    np.testing.assert_allclose(read_records([path]).campaign.runs[0].record.yaw_rad, angle, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["h5", "mat", "mat 7.3", "tdms", "csv", "parquet", "xlsx"])
+@pytest.mark.parametrize("name", ["run", "Lauf", "drive_hold"])
+def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
+    kind: str, name: str, tmp_path: Path
+) -> None:
+    numbers = np.repeat([1.0, 2.0], 50)
+    path = tmp_path / f"log.{kind.partition(' ')[0]}"
+    if kind in ("h5", "mat 7.3"):
+        with h5py.File(path, "w") as file:
+            file[name] = numbers
+    elif kind == "mat":
+        from scipy.io import savemat
+
+        savemat(path, {name: numbers})
+    elif kind == "tdms":
+        with nptdms.TdmsWriter(path) as writer:
+            writer.write_segment([nptdms.ChannelObject("g", name, numbers)])
+    elif kind == "csv":
+        pl.DataFrame({name: numbers}).write_csv(path)
+    elif kind == "parquet":
+        pl.DataFrame({name: numbers}).write_parquet(path)
+    else:
+        pl.DataFrame({name: numbers}).write_excel(path)
+    with pytest.raises(TunnelError, match="no column") as caught:
+        read_records([path])
+    assert str(path) in str(caught.value)
