@@ -10,7 +10,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.patch.native_friction import native_friction
 from diagnosis.search.hypothesis import _choices
-from tests.unit.gap_campaigns import campaign, nominal
+from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
