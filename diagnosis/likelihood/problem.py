@@ -15,6 +15,7 @@ from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
+from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
@@ -99,8 +100,8 @@ class Problem:
     @property
     def carries_load(self) -> bool:
         """Whether the joint carries a moment that varies: gravity's, or that of an actuator."""
-        hangs = "load_stiffness" in self.data.model.law_parameters
-        hangs |= any("gravity_stiffness" in kind.law_terms for kind in self.effects)
+        terms = {*self.data.model.law_parameters, *(term for kind in self.effects for term in kind.law_terms)}
+        hangs = any(stiffness in terms for stiffness, _ in WEIGHTS)
         return hangs or any(run.drive is not None and run.drive.through_actuator for run in self.data.runs)
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:

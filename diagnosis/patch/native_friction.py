@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.facts.found import Fact
 from tunnel_sim.effects.friction import AGAINST_RATE, friction_of
 from tunnel_sim.physics.expression import parse
+from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
 
@@ -94,8 +95,8 @@ def _with_load(parameters: Mapping[str, float], plain: NativeFriction, law: Join
     At rest that part does not hold the joint: gravity exceeds it, and ``frictionloss`` holds what remains. A part
     that grows with an actuator's moment is left out.
     """
-    names = {"K": "gravity_stiffness", "k": "gravity_angle", "L": "load_stiffness", "l": "load_angle"}
-    values = {symbol: parameters.get(name, 0.0) for symbol, name in names.items()}
+    names = [name for weight in WEIGHTS for name in weight]
+    values = {symbol: parameters.get(name, 0.0) for symbol, name in zip("KkLl", names, strict=True)}
     if law.slide or plain.program or plain.contact or not (values["K"] or values["L"]):
         return replace(plain, differences=(*plain.differences, Fact("friction against load")))
     values["mu"] = parameters["friction_load"]

@@ -13,6 +13,9 @@ import pytest
 
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting
+from tests.reference.rigs import rig
+from tunnel_reference import moments
+from tunnel_reference.integrator import Phase, Term, integrate
 from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -77,3 +80,22 @@ def test_the_plugin_and_the_integrator_agree_under_gravity_and_a_drive():
     run = loaded(0.1, 0.01, drive=drive)
     engine = simulate_motion(build_model(RIG, run), 1000.0).angle
     assert np.max(np.abs(engine - forward_motion(RIG, run, 1000.0).angle)) < 1e-5
+
+
+def test_the_reference_simulator_agrees():
+    c = rig(duration=1.5)
+    given = ({"stiffness": 3.0, "angle": 0.1, "second": 0.0}, {"moment": 0.004, "share": 0.05})
+    gravity, friction = ({name: np.full(c.runs, value) for name, value in one.items()} for one in given)
+    terms = [
+        Term(moments.gravity, Phase.MOMENT, gravity),
+        Term(moments.loaded_level, Phase.FRICTION, friction),
+    ]
+    (found,) = integrate([c], [terms], substeps=4)
+    (run,) = np.flatnonzero(c.wind_speed == 0.0)[:1]
+    law = {"gravity_stiffness": 3.0, "gravity_angle": 0.1, "friction_moment": 0.004, "friction_load": 0.05}
+    same = dataclasses.replace(
+        FREE, spring_stiffness=float(c.true_stiffness[run]), mechanical_damping=c.mechanical_damping,
+        yaw_inertia=c.yaw_inertia, release_angle=float(c.start_angle[run]), duration=1.5, parameters=law,
+    )  # fmt: skip
+    angle = forward_motion(RIG, same, c.sample_rate).angle
+    assert found.angle[:, run] == pytest.approx(angle, abs=1e-6)

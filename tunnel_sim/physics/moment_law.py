@@ -16,6 +16,9 @@ import numpy as np
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
+#: Parameters of the moments of gravity, which load a joint: greatest moment and angle of rest.
+WEIGHTS = (("gravity_stiffness", "gravity_angle"), ("load_stiffness", "load_angle"))
+
 
 def native_library(stem: str) -> Path:
     """The path of a compiled library in the installed package, even when the sources run from a checkout."""
