@@ -127,7 +127,11 @@ def from_zero(time: Times) -> Times:
 
 
 def from_rest(reading: PerSample, rest: float, unit: str, said: list[str], where: str) -> PerSample:
-    """A reading without its value at rest as stated, both in the unit."""
+    """A reading without its value at rest.
+
+    Args:
+        rest: as stated, in the unit of the reading.
+    """
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
         raise TunnelError(
