@@ -16,10 +16,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.blind.sets import KEY
 from diagnosis.remainder.explain import closable
 from diagnosis.search.investigate import investigate
 from identification.statistics import Proportion
+from tunnel_lab.experiments.blind.sets import KEY
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.writing import as_json
 

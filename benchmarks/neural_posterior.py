@@ -25,7 +25,7 @@ from identification.estimators.neural_posterior import NeuralPosterior
 from identification.neural.posterior import distribution, forward, variances
 from identification.neural.rivals import CAMPAIGN_NAMES, RECORD_NAMES
 from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
-from tunnel_lab.experiments.training_samples import read_shards
+from tunnel_lab.experiments.training_samples import read_samples
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 
@@ -105,7 +105,7 @@ def calibration_rows(folder: Path) -> Iterator[Row]:
     """The place of the truth in the posterior of every tuning sample, from 0 to 1: uniform if calibrated."""
     networks = NeuralPosterior().networks
     for kind, names in (("record", RECORD_NAMES), ("campaign", CAMPAIGN_NAMES)):
-        samples = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), kind[0])
+        samples = usable(read_samples(folder, f"{kind}s", "tuning"))
         output = forward(np, networks[kind].weights, *(samples[name] for name in INPUTS))
         stds = np.sqrt(variances(output, samples["widths"]))
         target = samples["target"][:, None].astype(np.float64)
@@ -117,18 +117,18 @@ def calibration_rows(folder: Path) -> Iterator[Row]:
 
 def curve_rows(folder: Path, steps: int) -> Iterator[Row]:
     """The loss on tuning samples of campaign networks fitted to increasing numbers of shards."""
-    shards = len(list(folder.glob("training-*")))
-    apart = usable(read_shards(folder, "tuning", len(list(folder.glob("tuning-*")))), "c")
+    shards = len(list(folder.glob("campaigns/training-*")))
+    apart = usable(read_samples(folder, "campaigns", "tuning"))
     spec = FitSpec(steps=steps)
     counts = sorted({max(1, shards // 4), max(1, shards // 2)})
     for count in counts:
-        samples = usable(read_shards(folder, "training", count), "c")
+        samples = usable(read_samples(folder, "campaigns", "training", count))
         start = start_state(samples, spec)
         if count == counts[0]:
             yield {"curve": 0, "loss": float(losses(np, start.weights, apart)[0])}
         found = fit(samples, spec, start)
         yield {"curve": len(samples["target"]), "loss": float(losses(np, found.weights, apart)[0])}
-    whole = len(usable(read_shards(folder, "training", shards), "c")["target"])
+    whole = len(usable(read_samples(folder, "campaigns", "training", shards))["target"])
     final = NeuralPosterior().networks["campaign"].weights
     yield {"curve": whole, "loss": float(losses(np, final, apart)[0])}
 

@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -59,7 +61,7 @@ def bare(file: Path, threads: int) -> dict[str, float]:
     import numpy as np
     from mujoco import batch as mujoco_batch
 
-    from tunnel_lab.experiments.sweep_cases import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep
     from tunnel_sim.effects import EffectChain
     from tunnel_sim.engine.model import build_model
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
@@ -94,16 +96,16 @@ def bare(file: Path, threads: int) -> dict[str, float]:
 def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]:
     """Seconds per run and peak memory of a sweep, with several processes or with simulation threads in one."""
     wall, cpu = time.perf_counter(), time.process_time()
+    from tunnel_lab.experiments.experiment import run_in
     from tunnel_lab.experiments.runner import processes
-    from tunnel_lab.experiments.sweep import run_sweep
-    from tunnel_lab.experiments.sweep_cases import read_sweep
-
-    def by_threads(work, shards):
-        for index in shards:
-            yield index, work(index, nthread=threads)
+    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep_work import run_shard
 
     plan = read_sweep(file)
-    run_sweep(plan, out, by_threads if threads > 1 else processes(workers, print))
+    experiment = plan.experiment
+    if threads > 1:
+        experiment = replace(experiment, work=partial(run_shard, plan, nthread=threads))
+    run_in(experiment, out, processes(0 if threads > 1 else workers, print))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = time.process_time() - cpu + children.ru_utime + children.ru_stime
     return {

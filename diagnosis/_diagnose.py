@@ -34,7 +34,7 @@ from diagnosis.settings import Settings
 from identification.status import left_out_as_asked
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
-from tunnel_sim.files.campaign_folder import as_campaign
+from tunnel_sim.files.as_campaign import as_campaign
 from tunnel_sim.processes import one_blas_thread
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -23,7 +23,7 @@ from identification.signal.known_gain import refuse_other_gain
 from identification.statistics import widened_by_contradictions
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
-from tunnel_sim.files.campaign_folder import as_campaign
+from tunnel_sim.files.as_campaign import as_campaign
 from tunnel_sim.processes import one_blas_thread
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive, refuse_several_gains, refuse_untreated

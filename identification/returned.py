@@ -15,6 +15,7 @@ from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEs
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, raised_line
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import PerParameter, Square
 
 RUN_UNITS: Mapping[str, str] = {
     "omega_n": "rad/s",
@@ -177,13 +178,8 @@ def _fault_of_variances(matrix: Array, stds: Array, names: tuple[str, ...], of: 
     return None
 
 
-def _fault_of_correlations(matrix: Array, stds: Array, of: str) -> Fault | None:
-    """Whether a covariance with right variances is invalid: not symmetric, or not positive semidefinite.
-
-    Args:
-        matrix: shape (p, p).
-        stds: shape (p,).
-    """
+def _fault_of_correlations(matrix: Square, stds: PerParameter, of: str) -> Fault | None:
+    """Whether a covariance with right variances is invalid: not symmetric, or not positive semidefinite."""
     scale = np.where(stds > 0.0, stds, 1.0)  # an exact value has no correlation
     correlations = matrix / scale[:, None] / scale
     if not np.allclose(correlations, correlations.T, rtol=0.0, atol=_ROUNDING):

@@ -21,6 +21,7 @@ from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import PerParameter, PerUnknown, Square, Vector
 
 _WORST_CONDITION = 1e13
 # Greatest variance or information whose square root and inverse still have full precision.
@@ -39,30 +40,24 @@ def inner(left: Array, right: Array) -> Array:
     return np.asarray(np.sum(left * right, axis=-1))
 
 
-def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
-    """The information and score of the first unknowns with the others eliminated (Schur complement).
-
-    Args:
-        information: shape (m, m).
-        score: shape (m,).
-    """
+def eliminate(information: Square, score: PerUnknown, keep: int) -> tuple[Array, Array]:
+    """The information and score of the first unknowns with the others eliminated (Schur complement)."""
     cross = information[keep:, :keep]
     solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
     return information[:keep, :keep] - cross.T @ solved[:, :keep], score[:keep] - cross.T @ solved[:, keep]
 
 
-def scaled_solve(matrix: Array, right: Array) -> Array:
+def scaled_solve(matrix: Square, right: Array) -> Array:
     """Solve a symmetric positive system after scaling its diagonal to one (units differ by decades).
 
     Args:
-        matrix: shape (m, m).
         right: shape (m,) or (m, n).
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
     """
     diagonal = matrix.diagonal()
-    if not diagonal.min() > 0.0:
+    if not diagonal.min(initial=1.0) > 0.0:
         raise np.linalg.LinAlgError("an unknown does not influence the reading")
     scale = np.sqrt(diagonal)
     unit = scale if right.ndim == 1 else scale[:, None]
@@ -77,11 +72,8 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
     return np.array((right[0] - correlation * second, second)) / unit
 
 
-def inverse(information: Array) -> Array:
+def inverse(information: Square) -> Array:
     """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
-
-    Args:
-        information: shape (m, m).
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
@@ -90,14 +82,11 @@ def inverse(information: Array) -> Array:
     return np.asarray(0.5 * (result + result.T))
 
 
-def determined(matrix: Array) -> bool:
+def determined(matrix: Square) -> bool:
     """Whether a symmetric matrix is positive definite to working precision, whatever its units.
 
     An information matrix is checked before it is inverted, and a covariance before it is used. With a condition
     number above 1e13, after scaling to a unit diagonal, the inverse has fewer than three correct digits.
-
-    Args:
-        matrix: shape (m, m).
     """
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):
@@ -122,12 +111,11 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     return extended
 
 
-def weighted_fit(columns: Array, target: Array, variance: Array) -> tuple[Array, Array]:
+def weighted_fit(columns: Array, target: Vector, variance: Array) -> tuple[Array, Array]:
     """Linear least squares with known variances, which are raised where the scatter exceeds them beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.
-        target: shape (n,).
         variance: of the target's points, shape (n,).
 
     Returns:
@@ -205,23 +193,14 @@ class Proportion:
         return {"count": self.count, "total": self.total, "share": share, "wilson_95": list(self.interval)}
 
 
-def widened_covariance(covariance: Array, least_std: Array) -> Array:
-    """Raise standard deviations to a lower limit, keeping the correlations.
-
-    Args:
-        covariance: shape (p, p).
-        least_std: shape (p,).
-    """
+def widened_covariance(covariance: Square, least_std: PerParameter) -> Array:
+    """Raise standard deviations to a lower limit, keeping the correlations."""
     factor = np.maximum(1.0, least_std / np.sqrt(np.diag(covariance)))
     return np.asarray(covariance * np.outer(factor, factor))
 
 
-def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
-    """Inverse information times the noise variance, widened by the slow ratio, shape (p, p).
-
-    Args:
-        normal: JᵀJ, shape (p, p).
-    """
+def fisher_covariance(normal: Square, noise: NoiseLevel) -> Array:
+    """Inverse information times the noise variance, widened by the slow ratio, shape (p, p)."""
     return inverse(normal) * (noise.std**2 * noise.slow_ratio)
 
 

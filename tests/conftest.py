@@ -40,7 +40,7 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     from tunnel_sim.engine import joint_model
 
     joint_model.prepare()
-    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
+    monkeypatch.setattr(joint_model, "in_sandbox", lambda work, given, parts, **_: work(given, parts))
 
 
 @pytest.fixture

@@ -248,8 +248,8 @@ def draw_families(
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
     """The common or the rare forms, as drawn from the mixture; not empty unless there are none at all."""
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
-    other = Group.COMMON
-    return [f for f in forms if f.group is group] or [f for f in forms if f.group is other]
+    other, known = Group.COMMON, [f for f in forms if mixture.driven or not f.driven]
+    return [f for f in known if f.group is group] or [f for f in known if f.group is other]
 
 
 def _draw_effect(

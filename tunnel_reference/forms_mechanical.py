@@ -48,6 +48,9 @@ _FRICTION = (
          moving(m.dahl_friction, Phase.MOMENT, lambda p, e, _c: {"moment": p, "slide": e["slide"]},
                 states=1, at_release=False),
          draw=lambda g, _c: {"slide": g.uniform(0.005, 0.012)}),
+    Form("coulomb_friction", "loaded", R, "Tc, N m", 0.003,
+         moving(m.loaded_level, Phase.FRICTION, lambda p, e, _c: {"moment": p, "share": e["share"]}),
+         draw=lambda g, _c: {"share": g.uniform(0.02, 0.2)}, driven=True),
 )  # fmt: skip
 
 _DAMPING = (

@@ -54,6 +54,8 @@ class Stage:
         top: moment on the upper end, N m; changed by laws.
         body: moment on the body, N m; changed by laws.
         level: friction level at the upper end, N m; changed by laws.
+        hung: moment of gravity, N m; changed by laws.
+        driven: moment of the input on the body, N m.
     """
 
     time: float
@@ -71,6 +73,8 @@ class Stage:
     top: Array
     body: Array
     level: Array
+    hung: Array
+    driven: Array
 
 
 Law = Callable[[Stage, Rows, Params, Array, Array], None]
@@ -213,6 +217,7 @@ class _Batch:
         return Stage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
             self.ones.copy(), beta.copy(), deflection.copy(), deflection, self.ones, self.ones, np.zeros(n),
+            np.zeros(n), np.zeros(n),
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
@@ -226,7 +231,8 @@ class _Batch:
             stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
         )
         if self.inputs is not None:
-            stage.body = stage.body + self.inputs.moment(time, self.middle)
+            stage.driven = self.inputs.moment(time, self.middle)
+            stage.body = stage.body + stage.driven
         if self.flexible:
             twist = stage.theta - stage.beta
             rod = self.rod_stiffness * twist * (1.0 + self.rod_hardening * twist * twist)

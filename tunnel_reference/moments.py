@@ -30,6 +30,11 @@ def sublinear_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> N
     s.level[rows] += p["moment"] * np.abs(s.omega[rows]) ** p["exponent"]
 
 
+def loaded_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Tc + μ times the greater of the moments of gravity and of the input."""
+    s.level[rows] += p["moment"] + p["share"] * np.maximum(np.abs(s.hung[rows]), np.abs(s.driven[rows]))
+
+
 def reid_level(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """(π/2) η Kr |θ|: Reid's loss, πηKrA² per cycle at any frequency."""
     s.level[rows] += (np.pi / 2) * p["loss"] * s.stiffness[rows] * np.abs(s.deflection[rows])
@@ -137,7 +142,9 @@ def tanh_dead_zone(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> No
 def gravity(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−Kg (sin(β − βg) + q sin 2(β − βg)/2)."""
     t = s.beta[rows] - p["angle"]
-    s.body[rows] -= p["stiffness"] * (np.sin(t) + 0.5 * p["second"] * np.sin(2.0 * t))
+    moment = -p["stiffness"] * (np.sin(t) + 0.5 * p["second"] * np.sin(2.0 * t))
+    s.body[rows] += moment
+    s.hung[rows] += moment
 
 
 def detent(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:

@@ -1,4 +1,4 @@
-"""Independent work side by side in processes of this machine, and untrusted input in a process with limits.
+"""Independent work side by side in processes of this machine.
 
 Every process has one thread: most of the work is Python, which threads cannot share, and the last bit of a sum must
 not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep.py.
@@ -6,24 +6,16 @@ not depend on the number of threads of a linear algebra library. Measured in ben
 
 from __future__ import annotations
 
-import json
-import math
 import multiprocessing
 import os
 import signal
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
-from importlib import import_module
+from contextlib import contextmanager
 from itertools import islice
 from multiprocessing.connection import Connection
-from multiprocessing.spawn import get_executable
-from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -36,16 +28,6 @@ ONE_THREAD = (
     "POLARS_MAX_THREADS",
 )
 """Variables of the environment that say to the libraries how many threads they may start."""
-_FEW_ARENAS = {"MALLOC_ARENA_MAX": "2"}  # each reserves 64 MiB of the address space, which is limited
-_LIMITED = """
-import json, sys
-header = json.loads(sys.stdin.buffer.readline())
-sys.path[:] = header["path"]
-from tunnel_sim.processes import _serve
-_serve(header)
-"""
-_OUT_OF_MEMORY = 77  # exit status
-_START_S = 30.0  # a busy machine may need this long to start a process and to import
 
 
 @contextmanager
@@ -62,10 +44,6 @@ def one_blas_thread() -> Iterator[None]:
         yield
 
 
-class LimitReached(Exception):
-    """Work in a limited process did not finish; the text gives the reason, such as ``takes more than 30 s``."""
-
-
 def in_processes(
     work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
 ) -> Iterator[tuple[ItemT, ResultT]]:
@@ -74,7 +52,8 @@ def in_processes(
     Items are returned with results as they finish; BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
-        yield from ((item, work(item)) for item in items)
+        with _one_thread_each(), one_blas_thread():
+            yield from ((item, work(item)) for item in items)
         return
     context = multiprocessing.get_context("spawn")
     line, end = context.Pipe(duplex=False)
@@ -116,79 +95,6 @@ class Worker:
         """End the process at once."""
         self._end.close()
         self._pool.shutdown(wait=False, cancel_futures=True)
-
-
-def in_limited_process(
-    work: Callable[[bytes], bytes], given: bytes, *, prepare: Callable[[], None], seconds: float, memory: int
-) -> bytes:
-    """Do work on untrusted input in a process of its own, which can open no file. Bytes go in and out, no pickles.
-
-    Args:
-        prepare: a function of a module, like the work, called before the limits apply: it loads all that is needed.
-        seconds: processor time of the work, s; the clock allows four times as long.
-        memory: memory of the work, bytes.
-
-    Raises:
-        LimitReached: when the work takes too long or too much memory, or its process dies.
-    """
-    header = {
-        "path": sys.path,
-        "calls": [(call.__module__, call.__qualname__) for call in (prepare, work)],
-        "limits": (seconds, memory),
-    }
-    try:
-        process = subprocess.run(  # ends it on Ctrl-C, too
-            [get_executable(), "-W", "ignore", "-c", _LIMITED],
-            input=json.dumps(header).encode() + b"\n" + given,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=_START_S + 4.0 * seconds,
-            env=os.environ | dict.fromkeys(ONE_THREAD, "1") | _FEW_ARENAS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise LimitReached(f"takes more than {seconds:g} s") from None
-    status = process.returncode
-    if status == 0:
-        return process.stdout
-    if status == -getattr(signal, "SIGXCPU", 0):
-        raise LimitReached(f"takes more than {seconds:g} s")
-    if status == _OUT_OF_MEMORY:
-        raise LimitReached(f"takes more than {memory / 2**20:.0f} MiB of memory")
-    raise LimitReached(f"ended its process with {status}")
-
-
-def _serve(header: dict[str, Any]) -> None:
-    """The limited process: do the given work, and answer on standard output."""
-    answer = os.dup(1)
-    os.dup2(2, 1)  # the output of a library is not the answer
-    prepare, work = (getattr(import_module(module), name) for module, name in header["calls"])
-    prepare()
-    given = sys.stdin.buffer.read()
-    _limit(*header["limits"])
-    try:
-        found = work(given)
-    except MemoryError:
-        os._exit(_OUT_OF_MEMORY)
-    with os.fdopen(answer, "wb") as stream:
-        stream.write(found)
-    os._exit(0)
-
-
-def _limit(seconds: float, memory: int) -> None:
-    """Limit this process from now on; where the system has no such limits, only the clock applies."""
-    try:
-        import resource
-    except ImportError:
-        return
-    with suppress(OSError, ValueError):  # a lower limit already applies
-        used = int(Path("/proc/self/statm").read_bytes().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
-    with suppress(OSError, ValueError):
-        limit = math.ceil(time.process_time() + seconds)
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from diagnosis.blind.sets import campaign_folders, write_document
+from tunnel_lab.experiments.blind.sets import campaign_folders, write_document
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError

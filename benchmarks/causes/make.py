@@ -20,7 +20,7 @@ import numpy as np
 import polars as pl
 
 from benchmarks.causes.tracks import EDITIONS, REAL, VERSION, draw_all
-from diagnosis.blind.sets import file_hash, write_document
+from tunnel_lab.experiments.blind.sets import file_hash, write_document
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -91,7 +91,7 @@ def make(
 
 def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
     """Simulate and write some campaigns; their number."""
-    from diagnosis.blind.sets import written  # refused campaigns are redrawn, as in blind sets
+    from tunnel_lab.experiments.blind.sets import written  # refused campaigns are redrawn, as in blind sets
     from tunnel_reference.make import simulate_set, truth_of
 
     first, seed, counts = task

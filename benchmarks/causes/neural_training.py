@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from benchmarks.causes.moments import Array
 from benchmarks.causes.neural_network import LABELS, LAYERS, WEIGHTS, Classifier, scaled
 from benchmarks.causes.tracks import SEED, TRACKS, draw_all
-from diagnosis.blind.sets import write_document
+from tunnel_lab.experiments.blind.sets import write_document
 from tunnel_sim.vocabulary.errors import TunnelError
 
 TRAINING_SEED = 20290417

@@ -1,6 +1,6 @@
 """Scores an entry by the statistics of the project's blind checks.
 
-Only this file converts answers to the cases of `diagnosis.blind`.
+Only this file converts answers to the cases of `tunnel_lab.experiments.blind`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
-from diagnosis.blind.cases import NAMES as COEFFICIENTS
-from diagnosis.blind.cases import SCATTERING, Case, case, found_by_group, inclusions
-from diagnosis.blind.scatter import scatter_score
-from diagnosis.blind.score import calibration, smooth_calibration
 from identification.statistics import Proportion
+from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
+from tunnel_lab.experiments.blind.cases import SCATTERING, Case, case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.scatter import scatter_score
+from tunnel_lab.experiments.blind.score import calibration, smooth_calibration
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from diagnosis.answer.candidates import meant_coefficient
@@ -31,7 +32,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _REACH = 8.5  # standard deviations beyond which a normal distribution has no probability in 64 bits
-_HALVINGS = 60
+_MOST_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +72,14 @@ class Mixture:
         """
         stds = np.sqrt(self.variances)
         low, high = float(np.min(self.means - _REACH * stds)), float(np.max(self.means + _REACH * stds))
+        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)  # a value may be certain
         widths = np.maximum(stds, 1e-300)
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            below = float(self.weights @ ndtr((middle - self.means) / widths))
-            low, high = (middle, high) if below < share else (low, middle)
-        return 0.5 * (low + high)
+        precision = max(1e-16 * (high - low), 1e-300)
+
+        def excess(value: float) -> float:
+            return float(self.weights @ ndtr((value - self.means) / widths)) - share
+
+        return float(brentq(excess, low, high, xtol=precision, maxiter=_MOST_STEPS))
 
 
 _SOURCES = (

@@ -16,6 +16,7 @@ from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles, Rates
 
 _PLACES = 80  # of the curve
 _BELOW = 0.5  # of the least rate among the points: where the curve begins
@@ -58,6 +59,7 @@ def friction_curve(fit: Fit, own: Similarity) -> FrictionCurve | None:
             )
             for one in _binned(passed, effects[place])
         ),
+        sum(getattr(effects[place], info.name) for info in effects[place].parameters() if info.of_load),
     )
 
 
@@ -66,12 +68,11 @@ def _own(values: Array, own: Similarity, unit: str) -> tuple[float, ...]:
     return tuple(float(f"{value:.6g}") for value in (factor * values).tolist())
 
 
-def _law(fit: Fit, place: int, rates: Array) -> tuple[Array, Array]:
+def _law(fit: Fit, place: int, rates: Rates) -> tuple[Array, Array]:
     """The law of an effect at some rates with its standard deviation, by the covariance of its parameters.
 
     Args:
         place: index of the effect among those of the fit.
-        rates: rad/s, shape (n,).
 
     Returns:
         Both in N m, shape (n,).
@@ -103,13 +104,12 @@ class _Passed:
 
     Args:
         rate: mean over the distance, rad/s, shape (n,).
-        travel: rad, shape (n,).
         missed: their energy loss beyond the fitted model, J, shape (n,).
         error: standard deviation of the energy at every reversal by the noise, J, shape (n + 1,).
     """
 
     rate: Array
-    travel: Array
+    travel: Angles
     missed: Array
     error: Array
 

@@ -14,6 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, project_release
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Seconds
 
 _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
@@ -58,7 +59,7 @@ def _best_run(first: Fit, second: Fit, springs: Sequence[float]) -> dict[str, An
 
 
 def planned_run(
-    fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: float
+    fit: Fit, *, spring_stiffness: float, wind_speed: float, air_density: float, duration: Seconds
 ) -> RunData:
     """A future run, with the sampling and the noise of the existing runs.
 
@@ -66,7 +67,6 @@ def planned_run(
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s.
         air_density: ρ, kg/m³; not used where the wind is off.
-        duration: s.
     """
     template = fit.problem.data.runs[0].undriven()
     blocks = round(duration / template.interval)

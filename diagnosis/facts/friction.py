@@ -36,6 +36,7 @@ class FrictionCurve:
         moment: of the fitted law, at these rates, in the unit.
         std: its standard deviation by the covariance of the fit, in the unit.
         points: by the energy balance, of ascending rates; none where the records give none.
+        per_load: further friction per moment carried by the joint, dimensionless; law and points are without it.
     """
 
     effect: str
@@ -44,6 +45,7 @@ class FrictionCurve:
     moment: tuple[float, ...]
     std: tuple[float, ...]
     points: tuple[FrictionPoint, ...] = ()
+    per_load: float = 0.0
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, in JSON's types."""

@@ -26,6 +26,7 @@ from identification.campaign.between_runs import (
     marginal,
 )
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import PerKind
 
 #: Share of a column's power that deviations of the runs must fail to explain. Smaller differences are
 #: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may
@@ -121,7 +122,7 @@ class RunColumns:
         order = np.linspace(-0.5, 0.5, len(self.seen))
         return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
 
-    def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
+    def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
         """The likeliest widths, and the runs with them."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
         # a further parameter may act like a width: there are then several maxima
@@ -132,21 +133,13 @@ class RunColumns:
         ends = (likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts))
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 
-    def wider(self, prior: WidthPrior, widths: Array) -> float:
-        """P-value of the observed differences if the given widths are true, by the likelihood ratio.
-
-        Args:
-            widths: relative, shape (kinds,).
-        """
+    def wider(self, prior: WidthPrior, widths: PerKind) -> float:
+        """P-value of the observed differences if the given widths are true, by the likelihood ratio."""
         gain = self.at(widths, prior).found.restricted - self.likeliest(prior, widths).found.restricted
         return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
-    def at(self, widths: Array, prior: WidthPrior) -> Between:
-        """The runs with given widths.
-
-        Args:
-            widths: relative, shape (kinds,).
-        """
+    def at(self, widths: PerKind, prior: WidthPrior) -> Between:
+        """The runs with given widths."""
         most = marginal(self.products, prior.most)
         return Between(widths, marginal(self.products, widths), prior.cost(widths), most)
 
@@ -156,14 +149,13 @@ class Between:
     """The runs with given widths of chance differences.
 
     Args:
-        widths: relative, shape (kinds,).
         found: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
         most: the deviations integrated out with the greatest widths, so that all knowledge comes from within
             runs.
     """
 
-    widths: Array
+    widths: PerKind
     found: Marginal
     prior_cost: float
     most: Marginal
@@ -209,6 +201,10 @@ class Between:
         away = self.found.deviations / self.widths
         seen = np.einsum("rk,rkl,rl->", away, one - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
+        if given is None:
+            given = np.zeros(self.found.common.size, bool)
+        for one in (self.found, self.most):  # a parameter that the runs do not determine has no variance
+            given = given & (np.diag(one.covariance) > 0.0)
         information = self.found.log_information_given(given) - self.most.log_information_given(given)
         return width + self.prior_cost + information
 

@@ -16,6 +16,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +132,11 @@ def damped_step(
     return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
 
 
-def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> Array:
+def bounded_step(matrix: Array, gradient: Vector, lower: Array, upper: Array) -> Array:
     """The solution of the normal equations; parameters that would leave their range are fixed at its end.
 
     Args:
         matrix: symmetric, shape (n, n).
-        gradient: shape (n,).
         lower: least steps, at most 0, shape (n,).
         upper: greatest steps, at least 0, shape (n,).
     """
@@ -152,11 +152,10 @@ def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> 
     return step
 
 
-def project_release(change: Array, slopes: Array) -> Array:
+def project_release(change: Vector, slopes: Array) -> Array:
     """The part of a change of one run's prediction that its release cannot absorb.
 
     Args:
-        change: shape (n,).
         slopes: derivatives to the release, shape (n, own).
     """
     left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]

@@ -20,6 +20,7 @@ from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.run_data import RunData
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles, Rates, Times
 
 _WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
 _LARGE = 30.0  # noise variances of a block mean: larger residuals must not be smoothed away
@@ -208,16 +209,13 @@ class Places:
     """Points at which a basis is evaluated, in place of a `Path`.
 
     Args:
-        angle: rad, shape (n,).
-        rate: rad/s, shape (n,).
-        time: s, shape (n,).
         stiffness: of the spring, N m/rad.
         speed: of the wind, m/s.
     """
 
-    angle: Array
-    rate: Array
-    time: Array
+    angle: Angles
+    rate: Rates
+    time: Times
     stiffness: float
     speed: float
 

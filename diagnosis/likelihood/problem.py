@@ -96,6 +96,13 @@ class Problem:
         fitted = dict(zip(names, common.tolist(), strict=True))
         return {**self.data.model.held, **fitted, **dict(zip(own_names, own.tolist(), strict=False))}
 
+    @property
+    def carries_load(self) -> bool:
+        """Whether the joint carries a moment that varies: gravity's, or that of an actuator."""
+        hangs = "load_stiffness" in self.data.model.law_parameters
+        hangs |= any("gravity_stiffness" in kind.law_terms for kind in self.effects)
+        return hangs or any(run.drive is not None and run.drive.through_actuator for run in self.data.runs)
+
     def effects_at(self, common: Array) -> tuple[Effect, ...]:
         """The effects with their parameters.
 

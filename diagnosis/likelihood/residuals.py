@@ -19,6 +19,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Frequencies, Hertz, Seconds
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
 
@@ -28,15 +29,13 @@ class ResidualSpectrum:
     """A run's residual spectrum.
 
     Args:
-        frequency: Hz, shape (n,).
         transform: complex amplitude of a sine at that frequency, in noise standard deviations, shape (n,).
-        duration: s.
         count: residuals in the record.
     """
 
-    frequency: Array
+    frequency: Frequencies
     transform: np.ndarray
-    duration: float
+    duration: Seconds
     count: int
 
     def at(self, frequency: float | Array) -> np.ndarray:
@@ -93,12 +92,8 @@ def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:
     return found
 
 
-def block_gain(frequency: float, run: RunData) -> float:
-    """Gain of a run's block mean at a frequency, dimensionless; 1 where a block is one sample.
-
-    Args:
-        frequency: Hz.
-    """
+def block_gain(frequency: Hertz, run: RunData) -> float:
+    """Gain of a run's block mean at a frequency, dimensionless; 1 where a block is one sample."""
     x = np.pi * frequency * run.interval / run.block
     return float(np.sin(run.block * x) / (run.block * np.sin(x))) if run.block > 1 else 1.0
 

@@ -81,8 +81,10 @@ class _OfLaw(NominalModel):
 
     @property
     def law_parameters(self) -> Mapping[str, float]:
-        """Its dry friction."""
-        return {"friction_moment": self.law.friction}
+        """Its dry friction, and gravity as a load of it: gravity's moment itself is in the spring and the terms."""
+        stiffness, angle = self.law.weight
+        hung = {"load_stiffness": stiffness, "load_angle": angle} if stiffness else {}
+        return {"friction_moment": self.law.friction, **hung}
 
     @property
     def moment(self) -> str:

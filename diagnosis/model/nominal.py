@@ -24,6 +24,7 @@ from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import AnglePerRun, KgM2
 
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
@@ -286,12 +287,8 @@ class NominalModel:
         del change
         return ()
 
-    def springs_at(self, data: Data, amplitude: Array) -> Array:
-        """Stiffness of every run's spring at an amplitude, by harmonic balance, N m/rad, shape (runs,).
-
-        Args:
-            amplitude: rad, shape (runs,).
-        """
+    def springs_at(self, data: Data, amplitude: AnglePerRun) -> Array:
+        """Stiffness of every run's spring at an amplitude, by harmonic balance, N m/rad, shape (runs,)."""
         spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
         if not self.moment:
             return spring
@@ -313,11 +310,10 @@ class NominalModel:
 
     # ---- what it says of a motion ----
 
-    def frequency(self, inertia: float, stiffness: float) -> float:
+    def frequency(self, inertia: KgM2, stiffness: float) -> float:
         """Frequency of the free motion, Hz; of a body that nothing restores that of the reference rig.
 
         Args:
-            inertia: kg m².
             stiffness: of the restoring moment, N m/rad.
         """
         return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))

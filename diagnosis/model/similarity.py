@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.signal.driven import driven_start
+from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record, evenly_spaced

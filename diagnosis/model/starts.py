@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.model.parameters import GAIN
 from identification.signal.decay_fit import Reading, fit_run
-from identification.signal.driven import driven_start
+from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
 

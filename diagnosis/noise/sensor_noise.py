@@ -21,6 +21,7 @@ from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+from tunnel_sim.vocabulary.shapes import Hertz
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
@@ -54,12 +55,11 @@ def estimate_variance(record: Record, fastest: float | None = None) -> tuple[flo
     return float(np.median(floor) / _LN2 * rate / 2.0), float(np.sqrt(1.57 / floor.size) / _LN2)
 
 
-def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
+def floor_periodogram(values: Array, rate: Hertz) -> tuple[Array, Array]:
     """One-sided periodogram with a window whose leakage stays below the noise: frequencies, Hz, and unit²/Hz.
 
     Args:
         values: samples, shape (n,).
-        rate: Hz.
     """
     window = np.hanning(values.size)
     spectrum = np.fft.rfft((values - np.mean(values)) * window)

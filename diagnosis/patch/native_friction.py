@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
 
 _AGAINST_RATE = "friction's dependence on the rate"
+_AGAINST_LOAD = "friction's dependence on gravity's moment"
+_LOAD = "-sign(r)*mu*abs(K*sin(b-k)+L*sin(b-l))"
 _FACTORS = {  # on the friction, by the term of the moment law
     "friction_exponent": "(abs(r)/2)^n",
     "friction_saturation": "tanh(abs(r)/v0)",
@@ -58,6 +60,9 @@ def native_friction(
         may_miss: greatest error of a polynomial, as a share of the greatest friction.
     """
     friction = friction_of(parameters)
+    if friction.load:
+        rest = {name: value for name, value in parameters.items() if name != "friction_load"}
+        return _with_load(parameters, native_friction(rest, rates, law, damping, may_miss), law)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
     if moment == 0.0 or not (terms or friction.presliding):
         return NativeFriction(moment)
@@ -81,6 +86,24 @@ def native_friction(
     text = f"-sign(r)*(F*{'*'.join(_FACTORS[term] for term in terms)}-F0)"
     program = parse(text, frozenset({"r", *values})).program(values, {"r": "rate"})
     return NativeFriction(friction.at_rest, program=program, differences=(_by_plugin(_AGAINST_RATE),))
+
+
+def _with_load(parameters: Mapping[str, float], plain: NativeFriction, law: JointLaw) -> NativeFriction:
+    """Friction with the part that grows with gravity's moment, which the plugin adds.
+
+    At rest that part does not hold the joint: gravity exceeds it, and ``frictionloss`` holds what remains. A part
+    that grows with an actuator's moment is left out.
+    """
+    names = {"K": "gravity_stiffness", "k": "gravity_angle", "L": "load_stiffness", "l": "load_angle"}
+    values = {symbol: parameters.get(name, 0.0) for symbol, name in names.items()}
+    if law.slide or plain.program or plain.contact or not (values["K"] or values["L"]):
+        return replace(plain, differences=(*plain.differences, Fact("friction against load")))
+    values["mu"] = parameters["friction_load"]
+    program = parse(_LOAD, frozenset({"r", "b", *values})).program(values, {"r": "rate", "b": "angle"})
+    found = [_by_plugin(_AGAINST_LOAD)]
+    if law.actuator is not None:
+        found.append(Fact("friction against load"))
+    return replace(plain, program=program, differences=(*plain.differences, *found))
 
 
 def _by_plugin(moment: str) -> Fact:

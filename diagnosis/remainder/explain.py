@@ -23,6 +23,7 @@ from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Hertz
 
 Events = tuple[Mapping[str, Any], ...]
 """By run, the largest part first: ``run``, its ``share`` of the explained part, and ``from_s`` and ``to_s`` since
@@ -260,14 +261,13 @@ class SteadyLine:
     """A prominent line in the residuals of all runs together, in the units of the fit.
 
     Args:
-        frequency: Hz.
         frequency_std: its standard deviation, Hz.
         amplitude: in the unit of the reading, root mean square over the runs.
         amplitude_std: its standard deviation, in the same unit.
         events: the runs that show it, over their whole duration.
     """
 
-    frequency: float
+    frequency: Hertz
     frequency_std: float
     amplitude: float
     amplitude_std: float

@@ -293,10 +293,16 @@ def with_forms(
 
 
 def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
-    """All combinations of one form of every effect that has any; a form that is free already is kept."""
+    """All combinations of one form of every effect that the runs can show; a form that is free already is kept."""
     free = fitted.problem.free_forms
+    loaded = fitted.problem.carries_load
+    of_load = {(kind, i.name) for kind in fitted.problem.effects for i in kind.parameters() if i.of_load}
     by_effect = [
-        [tuple(f"{kind.name}.{name}" for name in form) for form in kind.forms()]
+        [
+            tuple(f"{kind.name}.{name}" for name in form)
+            for form in kind.forms()
+            if loaded or not any((kind, name) in of_load for name in form)
+        ]
         for kind in fitted.problem.effects
     ]
     by_effect = [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]

@@ -22,6 +22,7 @@ from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Hertz
 
 #: Bands by their upper edges in multiples of the run's own frequency.
 BANDS: tuple[tuple[str, float], ...] = (
@@ -243,13 +244,12 @@ class ResidualLine:
     """A line in one run.
 
     Args:
-        frequency: Hz.
         share: of the run's excess squared residual, a fraction.
         amplitude: of the reading, rad.
     """
 
     run: str
-    frequency: float
+    frequency: Hertz
     share: float
     amplitude: float
 

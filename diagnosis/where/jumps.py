@@ -17,6 +17,7 @@ from numpy.polynomial import chebyshev
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles, Vector
 
 _ROWS = 24  # per cycle, to which readings are averaged: nothing above the third harmonic is fitted
 _HALF = 2.0  # cycles on either side of an instant that are fitted; nearer to an end no jump is sought
@@ -52,14 +53,12 @@ class _Oscillation:
 
     Args:
         time: of every row, shape (n,), s.
-        reading: shape (n,).
-        phase: shape (n,), rad.
         size: logarithm of the amplitude, shape (n,).
     """
 
     time: Array
-    reading: Array
-    phase: Array
+    reading: Vector
+    phase: Angles
     size: Array
 
     @property

@@ -171,6 +171,8 @@ PATCH: Mapping[str, Sentence] = {
     "left out.",
     "friction against rate": "The friction's dependence on the rate has no native element, the plugin acts on "
     "hinges only, and it is left out.",
+    "friction against load": "The friction's dependence on the moment that the joint carries has no native "
+    "element, and is left out where this moment is not gravity's on a hinge.",
     "rod": "The twist of the rod is left out: it needs a further body and joint.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",

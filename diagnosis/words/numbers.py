@@ -10,6 +10,7 @@ from typing import Any
 from diagnosis.facts.closure import Misfit
 from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.shapes import Share
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -66,11 +67,10 @@ def share(value: float) -> str:
     return f"{100.0 * value:.1f} %"
 
 
-def percent(share: float, std: float | None = None) -> str:
+def percent(share: Share, std: float | None = None) -> str:
     """A share in per cent, such as ``94.2 ± 0.6 %``.
 
     Args:
-        share: a fraction.
         std: its standard deviation, a fraction.
     """
     beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"

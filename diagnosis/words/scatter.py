@@ -10,6 +10,7 @@ from diagnosis.words.numbers import Document, listed, plain, probability
 from identification.blocks import Table
 from identification.printing import concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.vocabulary.shapes import Share
 
 SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
 """The quantity that differs between runs, by the name of the scatter."""
@@ -52,11 +53,10 @@ def repeats(document: Document) -> bool:
     return not any(one["width"] for one in spreads_of(document))
 
 
-def percent_of(value: float, digits: int = 2, *, sign: bool = False) -> str:
+def percent_of(value: Share, digits: int = 2, *, sign: bool = False) -> str:
     """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
 
     Args:
-        value: a fraction.
         digits: significant ones (a count).
         sign: whether a plus sign is written.
     """

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -113,11 +114,11 @@ def score(agent: Agent, name: str = "trained") -> list[Row]:
     Args:
         name: of the policy in the rows.
     """
+    return play_all("identification", name, partial(_action, agent))
 
-    def use(known: Knowledge) -> Action:
-        return agent.action(known.observation(), known.conditions.menu)
 
-    return play_all("identification", name, use)
+def _action(agent: Agent, known: Knowledge) -> Action:
+    return agent.action(known.observation(), known.conditions.menu)
 
 
 def write_score(docs: Path, rows: Sequence[Row]) -> None:

@@ -13,10 +13,12 @@ import io
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import polars as pl
 from scipy.stats import binom
 
 from identification.estimate import PARAMETERS
@@ -24,7 +26,10 @@ from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, Policy, run_campaign
 from tunnel_lab.envs.session import answers, probabilities
+from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
+from tunnel_lab.experiments.runner import crew
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
+from tunnel_lab.terminal.outputs import bar
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 
@@ -107,13 +112,21 @@ def play(preset: str, policy: str, seed: int, use: Policy | None = None) -> Row:
 
 
 def play_all(preset: str, policy: str, use: Policy | None = None) -> list[Row]:
-    """Play all seeds of a preset; arguments as in `play`."""
-    rows = []
-    for seed in range(SEEDS[preset]):
-        rows.append(play(preset, policy, seed, use))
-        print(f"\r{preset} {policy} {seed + 1}/{SEEDS[preset]}  ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return rows
+    """Play all seeds of a preset, each in a process; arguments as in `play`."""
+    episodes = Experiment(
+        "episodes",
+        range(SEEDS[preset]),
+        partial(_played, preset, policy, use),
+        str,
+        {"preset": preset, "policy": policy},
+    )
+    with bar(f"{preset} {policy}") as progress:
+        results, _ = results_of(episodes, None, crew(None, None, SEEDS[preset]), progress)
+    return [Row(**row) for row in results.iter_rows(named=True)]
+
+
+def _played(preset: str, policy: str, use: Policy | None, seed: int) -> Done:
+    return Done({RESULTS: parquet(pl.DataFrame([asdict(play(preset, policy, seed, use))]))})
 
 
 def to_csv(rows: Sequence[Row]) -> str:

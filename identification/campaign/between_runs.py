@@ -91,16 +91,18 @@ class Marginal:
         """−2 ln L at the likeliest common parameters, up to a constant: compares sets of common parameters."""
         return self.log_determinant + self.quadratic
 
-    def log_information_given(self, given: NDArray[np.bool_] | None) -> float:
+    def log_information_given(self, given: NDArray[np.bool_]) -> float:
         """ln|H| of the other common parameters, where some are given.
 
         Args:
-            given: the given parameters, shape (common,); None: there are none.
+            given: the given parameters, shape (common,); each has a variance above 0.
         """
-        if given is None or not given.any():
-            return self.log_information
         covariance = self.covariance[np.ix_(given, given)]
-        return self.log_information + float(np.linalg.slogdet(covariance)[1])
+        size = np.sqrt(np.diag(covariance))
+        correlation = np.linalg.eigvalsh(covariance / np.outer(size, size))
+        return self.log_information + float(
+            2.0 * np.log(size).sum() + np.log(np.maximum(correlation, _NULL)).sum()
+        )
 
     @property
     def restricted(self) -> float:

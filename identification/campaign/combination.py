@@ -1,4 +1,4 @@
-"""From the runs to the campaign's coefficients: runs identified one by one, and driven with free runs together."""
+"""From runs identified one by one to the campaign's coefficients."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ from identification.estimate import Estimate, Quantity, RunEstimate, Status, Win
 from identification.policy import MISFIT_RATE
 from identification.printing import with_std
 from identification.progress import counted
-from identification.signal.decay_fit import Reading, RunFit, project_run
-from identification.signal.driven_fit import DrivenRun, Gained, constant_gain, fit_with_inputs
+from identification.signal.decay_fit import Reading, project_run
+from identification.signal.forcing import forcing_of
 from identification.signal.free_decay import Decay
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import (
     FittedRun,
-    decay_covariance_of,
+    Gained,
     describe_run,
     noise_and_failure,
     residual_check,
     residuals_of,
 )
-from identification.statistics import determined, eliminate, fisher_covariance, inverse
+from identification.statistics import determined
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _RUN_UNKNOWNS = 5  # of a run's own fit: decay, stiffness, initial state, zero
@@ -53,20 +54,17 @@ class RunDecay:
     """The result of a method for one run alone.
 
     Args:
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
-        gained: of a driven run, (a, k, g) with the gain g of its input per unit inertia, and its information.
+        gained: decay rate, stiffness and gain of its input; None where they were not found.
     """
 
     estimate: RunEstimate
-    decay: Decay | None = None
-    covariance: Array | None = None
     gained: Gained | None = None
 
 
 def combined_estimate(
     campaign: Campaign, name: str, found: Sequence[RunDecay], *, together: Combination | None = None
 ) -> Estimate:
-    """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
+    """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k, g).
 
     Scatter between the runs is in the covariance (`identification.campaign.repeatability`). Where they contradict
     each other beyond it, the covariance is widened by the ratio of Birge, Phys. Rev. 40 (1932) 207–227, doi
@@ -85,7 +83,7 @@ def combined_estimate(
     pairs = [
         (place, run, item)
         for place, (run, item) in enumerate(zip(campaign.runs, found, strict=True))
-        if item.decay is not None and item.covariance is not None and run.id in joined
+        if item.gained is not None and run.id in joined
     ]
     statuses |= noise_statuses([run.noise for run in estimate.runs])
     remarks = tuple(
@@ -98,21 +96,9 @@ def combined_estimate(
         return replace(estimate, statuses=by_severity(statuses))
     runs = [run for _, run, _ in pairs]
     design = build_design(runs, campaign.rig)
-    linked = with_gains(design, runs) if campaign.driven else design
-    # (a, k) of the runs; with driven runs (a, k, g), zeros for the gain of a free one.
-    decays, informations = [], []
-    for _, run, item in pairs:
-        assert item.decay is not None
-        assert item.covariance is not None
-        if item.gained is not None:
-            decays.append(item.gained.coefficients - constant_gain(run))
-            informations.append(item.gained.weight)
-            continue
-        size = 3 if campaign.driven else 2
-        decays.append(np.array([item.decay.rate, item.decay.stiffness, 0.0][:size]))
-        information = np.zeros((size, size))
-        information[:2, :2] = inverse(item.covariance)
-        informations.append(information)
+    linked = with_gains(design, runs)
+    decays = [seen_by(run, item.gained) for _, run, item in pairs if item.gained is not None]
+    informations = [item.gained.weight for *_, item in pairs if item.gained is not None]
     combined = combine(linked, np.array(decays), informations)
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
@@ -143,14 +129,9 @@ def combined_estimate(
     return filled_estimate(campaign, estimate, runs, design, values, own, statuses, repeatability)
 
 
-def fitted_decay(item: FittedRun) -> RunDecay:
-    """The least-squares fit of a run, in the form of the combination."""
-    if item.fit is None or item.noise is None:
-        return RunDecay(item.estimate)
-    covariance = decay_covariance_of(item.fit) * (item.noise.std**2 * item.noise.slow_ratio)
-    return RunDecay(
-        item.estimate, item.fit.decay, covariance, item.gained if isinstance(item, DrivenRun) else None
-    )
+def seen_by(run: Run, gained: Gained) -> Array:
+    """(a, k, g) of a run without the part of the gain that depends on no unknown, shape (3,), SI."""
+    return gained.coefficients - forcing_of(run, 0).fixed
 
 
 def scattering_estimate(campaign: Campaign, name: str, fitted: Sequence[FittedRun]) -> Estimate | None:
@@ -159,7 +140,8 @@ def scattering_estimate(campaign: Campaign, name: str, fitted: Sequence[FittedRu
     A joint fit assumes that all runs repeat exactly, and would mistake the scatter for a misfit of the model.
     The sensor's zero is the mean of the runs' zeros, weighted by their variances.
     """
-    found = combined_estimate(campaign, name, [fitted_decay(item) for item in fitted])
+    of_runs = [RunDecay(item.estimate, item.gained) for item in fitted]
+    found = combined_estimate(campaign, name, of_runs)
     if found.repeatability is None:
         return None
     shown = [item for item in fitted if item.fit is not None and item.estimate.sensor_zero is not None]
@@ -170,7 +152,8 @@ def scattering_estimate(campaign: Campaign, name: str, fitted: Sequence[FittedRu
     residuals = [
         one
         for item, zero in zip(shown, zeros, strict=True)
-        for one in residuals_of([item.reading], [_fit_of(item)], zero.value, _RUN_UNKNOWNS)
+        if item.fit is not None
+        for one in residuals_of([item.reading], [item.fit], zero.value, _RUN_UNKNOWNS)
     ]
     noise = noise_level(residuals, campaign.sensor)
     zero = Quantity(mean, float(weights.sum() ** -0.5), "rad") if common else None
@@ -191,15 +174,24 @@ class RunByRun(ABC):
         """Identify every run, then the campaign from those that could be identified.
 
         Raises:
-            TunnelError: a wind-on run states no air density; raised before any run is analysed.
+            TunnelError: a wind-on run states no air density, or the method does not take a run; raised before any
+                run is analysed.
         """
         for run in campaign.runs:
             loads(run, campaign.rig)
+            if why := self._refusal(run):
+                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
+                raise TunnelError(f"the run {why}", where=where, remedy=remedy)
         pairs = [(run, self._run(run, campaign.sensor)) for run in counted(campaign.runs)]
         found = [
             RunDecay(RunEstimate(run.id, (one,))) if isinstance(one, Status) else one for run, one in pairs
         ]
         return combined_estimate(campaign, self.name, found, together=self._together(found))
+
+    def _refusal(self, run: Run) -> str:
+        """Why the method does not take a run, after "the run"; empty where it does."""
+        del run
+        return ""
 
     @abstractmethod
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
@@ -236,85 +228,7 @@ def run_estimate(
     noise = None if check is None else check.noise
     covariance = covariance if check is None else check.widened(covariance)
     estimate = describe_run(run, reading, *projected, covariance, noise_std**2, noise=noise, windows=windows)
-    return RunDecay(estimate, decay, covariance)
-
-
-_Pairs = Sequence[tuple[Run, FittedRun]]
-
-
-def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[Status]) -> Estimate:
-    """Output error of driven and free runs together: maximum likelihood with the input exact between its samples.
-
-    Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ: with a stated spring, gᵢ is 1/Izz for a known moment,
-    Kr/Izz for the motion of the spring's root, −1 for the rotation of the base, and a parameter common to the
-    campaign for an input of unknown gain. That gain, and the results for a body without a spring, are remarks.
-
-    Args:
-        pairs: every run and its own fit, which starts the joint one.
-    """
-    statuses = statuses | noise_statuses([item.noise for _, item in pairs])
-    fitted = [(run, item) for run, item in pairs if item.fit is not None]
-    joined = joined_runs([run for run, _ in fitted], campaign.rig)
-    pairs = [(run, item) for run, item in fitted if run.id in joined]
-    remarks = tuple(
-        run_remark(run, item.gained)
-        for run, item in fitted
-        if isinstance(item, DrivenRun) and is_remarked(run, joined)
-    )
-    estimate = replace(estimate, remarks=remarks)
-    if not pairs:
-        return replace(estimate, statuses=by_severity(statuses))
-    runs = [run for run, _ in pairs]
-    design = build_design(runs, campaign.rig)
-    linked = with_gains(design, runs)
-    # (a, k, g) of the runs' own fits, and their weights; zeros for the gain of a free run.
-    coefficients, weights = np.zeros((len(pairs), 3)), []
-    for i, (run, item) in enumerate(pairs):
-        if isinstance(item, DrivenRun):
-            coefficients[i] = item.gained.coefficients - constant_gain(run)
-            weights.append(item.gained.weight)
-            continue
-        fit, weight = _fit_of(item), np.zeros((3, 3))
-        assert item.noise is not None
-        coefficients[i, :2] = fit.decay.rate, fit.decay.stiffness
-        weight[:2, :2] = fit.reduced(2)[0] / (item.noise.std**2 * item.noise.slow_ratio)
-        weights.append(weight)
-    start = combine(linked, coefficients, weights)
-    if start is None:
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    own_zeros = campaign.sensor.zero == "per_run" or any(run.unrestrained for run in runs)
-    derivative = campaign.sensor.derivative
-    found = fit_with_inputs(runs, linked.links, start[0], own_zeros=own_zeros, derivative=derivative)
-    if not found.converged:
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_CONVERGED}))
-    information = eliminate(found.normal, np.zeros(len(found.normal)), linked.size)[0]
-    if not determined(information):
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    residuals = [
-        residuals_of(
-            [item.reading],
-            [replace(_fit_of(item), residual=residual)],
-            float(item.reading.yaw.mean() if run.unrestrained else own[0]),
-            2 + own_zeros,
-        )[0]
-        for (run, item), residual, own in zip(pairs, found.residuals, found.own, strict=True)
-    ]
-    noise = noise_level(residuals, campaign.sensor)
-    covariance = fisher_covariance(information, noise)
-    values = derivatives(design, found.parameters[: design.size])
-    inner = covariance[: design.size, : design.size]
-    statuses = statuses | noise_statuses([noise]) | design_statuses(design, found.parameters[: design.size])
-    filled = filled_estimate(
-        campaign, estimate, runs, design, values, values.jacobian @ inner @ values.jacobian.T, statuses
-    )
-    gained = linked.size > design.size
-    gain = (gain_remark(runs, found.parameters, covariance, values.get("yaw_inertia")),) if gained else ()
-    return replace(filled, noise=noise, remarks=(*gain, *estimate.remarks))
-
-
-def _fit_of(item: FittedRun) -> RunFit:
-    assert item.fit is not None
-    return item.fit
+    return RunDecay(estimate, Gained.of(np.array([decay.rate, decay.stiffness, 0.0]), covariance))
 
 
 def with_gains(design: Design, runs: Sequence[Run]) -> Design:
@@ -362,8 +276,8 @@ def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
 
 def is_remarked(run: Run, joined: set[str]) -> bool:
     """Whether a note describes a driven run alone: without a spring, or where it gives no coefficient."""
-    apart = run.id not in joined and run.drive is not None and run.drive.on_body
-    return run.unrestrained or (apart and run.known_gain is None)
+    apart = run.id not in joined and run.known_gain is None
+    return run.drive is not None and (run.unrestrained or (apart and run.drive.on_body))
 
 
 def run_remark(run: Run, gained: Gained) -> Remark:

@@ -32,6 +32,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_d
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import PerParameter
 
 # Smallest singular value of two columns of unit length, for two runs whose springs or speeds are just
 # different.
@@ -178,12 +179,8 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
     return (scaled_solve(normal, right), inverse(normal)) if determined(normal) else None
 
 
-def derivatives(design: Design, parameters: Array) -> Derivatives:
-    """Cnβ, Cnr, Izz and Cr from the shared parameters; none if the design gives no positive Izz.
-
-    Args:
-        parameters: φ, shape (p,).
-    """
+def derivatives(design: Design, parameters: PerParameter) -> Derivatives:
+    """Cnβ, Cnr, Izz and Cr from the shared parameters; none if the design gives no positive Izz."""
     if not positive_inertia(design, parameters):
         return Derivatives((), np.zeros(0), np.zeros((0, design.size)))
     inertia = 1.0 / float(parameters[design.columns["g"]])
@@ -204,12 +201,8 @@ def derivatives(design: Design, parameters: Array) -> Derivatives:
     return Derivatives(tuple(names), np.array(values), np.array(rows))
 
 
-def positive_inertia(design: Design, parameters: Array) -> bool:
-    """Whether the design gives Izz at all, and a positive one.
-
-    Args:
-        parameters: φ, shape (p,).
-    """
+def positive_inertia(design: Design, parameters: PerParameter) -> bool:
+    """Whether the design gives Izz at all, and a positive one."""
     return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)
 
 

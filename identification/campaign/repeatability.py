@@ -37,17 +37,17 @@ from identification.statistics import inverse, student_factor
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Repeatability, Run
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import PerParameter
 
 _STEP = 0.02  # of ln(width), for the finite differences of the curvature
 _ZERO = 1e-9  # width, relative to the usual one, that counts as none
 
 
-def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Array]:
+def moves_of(runs: Sequence[Run], design: Design, parameters: PerParameter) -> list[Array]:
     """Derivative of every run's values to the relative size of each of `SCATTERED`, shape (m, 3).
 
     Args:
-        design: of the runs, with the gains of inputs where there are driven ones.
-        parameters: φ, shape (p,).
+        design: of the runs, with the gains of inputs.
     """
     columns = {name: float(parameters[place]) for name, place in design.columns.items()}
     stiff, aero = columns.get("g", 0.0), columns.get("n", 0.0)
@@ -61,7 +61,7 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
         move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
         move[1, 1] = spring
         move[0, 2] = 0.5 * still
-        if run.known_gain is not None and len(link) > 2:
+        if run.known_gain is not None:
             move[2, 1] = run.known_gain.per_stiffness * spring
         moves.append(move)
     return moves
@@ -72,7 +72,7 @@ class MeasuredRuns:
     """Decay rates and stiffnesses of runs from a method, and their change with deviations of the runs.
 
     Args:
-        links: by run, shape (m, p), from the common parameters φ to (a, k), or to (a, k, g) with driven runs.
+        links: by run, shape (m, p), from the common parameters φ to (a, k, g).
         seen: by run, shape (m,).
         weights: inverse covariance of its noise by run, shape (m, m).
         moves: by run, derivative to the relative size of each of `SCATTERED`, shape (m, 3).
@@ -90,13 +90,12 @@ class MeasuredRuns:
         design: Design,
         seen: Sequence[Array],
         weights: Sequence[Array],
-        start: Array,
+        start: PerParameter,
     ) -> MeasuredRuns:
         """Runs about common parameters.
 
         Args:
-            design: of the runs, with the gains of inputs where there are driven ones.
-            start: φ, shape (p,).
+            design: of the runs, with the gains of inputs.
         """
         return cls(design.links, seen, weights, moves_of(runs, design, start))
 
@@ -121,11 +120,10 @@ class MeasuredRuns:
             weights.append(floored)
         return replace(self, weights=weights)
 
-    def about(self, start: Array, used: Array) -> RunProducts:
+    def about(self, start: PerParameter, used: Array) -> RunProducts:
         """The products of their columns, for corrections of φ and deviations.
 
         Args:
-            start: φ, shape (p,).
             used: places of the deviations in `SCATTERED`, shape (k,).
         """
         rows = zip(self.links, self.seen, self.weights, self.moves, strict=True)
@@ -149,7 +147,6 @@ class Scatter:
         widths: relative standard deviations, shape (k,).
         uncertain: covariance of ln(widths), shape (k, k); zero for a stated width.
         stated: names of the widths that the campaign states.
-        parameters: φ, shape (p,).
         noise: covariance of φ by the noise of the runs alone, shape (p, p).
         quadratic: χ² with the likeliest deviations, dimensionless.
         gains: by run, how φ depends on its values, shape (p, m).
@@ -161,7 +158,7 @@ class Scatter:
     widths: Array
     uncertain: Array
     stated: tuple[str, ...]
-    parameters: Array
+    parameters: PerParameter
     noise: Array
     quadratic: float
     gains: Sequence[Array]

@@ -24,16 +24,13 @@ from scipy.interpolate import RectBivariateSpline
 
 from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
-from identification.estimate import Estimate, NoiseLevel, Quantity, Status
-from identification.signal.decay_fit import Reading, RunFit, block_means, fit_run, mean_of_blocks, project_run
-from identification.signal.driven import driven_rows
-from identification.signal.driven_fit import DrivenRun, Gained, driven_run
+from identification.estimate import Quantity, Status
+from identification.signal.decay_fit import Reading, block_means, mean_of_blocks, project_run
+from identification.signal.forcing import Forced
 from identification.signal.free_decay import Decay, response_rows
-from identification.signal.frequency import starting_decay
-from identification.signal.run_fit import decay_covariance_of, describe_run, noise_and_failure
-from identification.statistics import determined, inner, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from identification.signal.run_fit import NO_WINDOWS, Gained, decay_covariance_of, describe_run, identify_run
+from identification.statistics import determined, inner
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
@@ -117,7 +114,7 @@ class DecayPosterior:
 
 
 @dataclass(frozen=True, eq=False)
-class Forced:
+class InputResponse:
     """The response of a run to its input, over a grid.
 
     Args:
@@ -147,7 +144,11 @@ class Forced:
 
 
 def posterior_of(
-    thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge, forced: Forced | None = None
+    thin: Reading,
+    start: Decay,
+    covariance: Array,
+    knowledge: NoiseKnowledge,
+    forced: InputResponse | None = None,
 ) -> DecayPosterior | None:
     """Compute the posterior on a grid, and move the grid until it covers the posterior.
 
@@ -329,6 +330,7 @@ _LINEAR = 3  # initial angle and rate, zero
 @dataclass(frozen=True, eq=False)
 class _PosteriorDecay(RunDecay):
     posterior: DecayPosterior = field(kw_only=True)
+    driven: bool = field(kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -345,8 +347,8 @@ class Bayesian(RunByRun):
     seed: int = 0
 
     def _together(self, found: Sequence[RunDecay]) -> Combination | None:
-        if any(one.gained is not None for one in found):  # only moments give their gains together with (a, k)
-            return None
+        if any(isinstance(one, _PosteriorDecay) and one.driven for one in found):
+            return None  # only moments give their gains together with (a, k)
 
         def together(
             design: Design, places: list[int], centre: Array, covariance: Array
@@ -357,103 +359,63 @@ class Bayesian(RunByRun):
 
         return together
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Raises:
-            TunnelError: for a driven body without a spring, or a wind-on run without air density.
-        """
-        for run in campaign.runs:
-            if run.drive is not None and run.unrestrained:
-                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
-                raise TunnelError(
-                    "the run has no spring, and so no stiffness to find", where=where, remedy=remedy
-                )
-        return super().estimate(campaign)
+    def _refusal(self, run: Run) -> str:
+        return "has no spring, and so no stiffness to find" if run.drive and run.unrestrained else ""
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
-        drive = run.drive
-        if drive is not None:
-            bare = driven_run(run, sensor)
-            if not isinstance(bare, DrivenRun) or bare.fit is None or bare.noise is None:
-                return RunDecay(bare.estimate)
-            times, held, derivative = bare.reading.time, drive.held, sensor.derivative
-
-            def rows(decay: Decay) -> Array:
-                return driven_rows(
-                    times, drive.values, decay.rate, decay.stiffness, held=held, derivative=derivative
-                )
-
-            found = self._described(run, bare.reading, bare.fit, bare.noise, rows)
-            if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
-                return found
-            # the gain given (a, k), as in least squares
-            weight, information, gain = bare.gained.weight, np.zeros((3, 3)), run.known_gain
-            moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
-            jacobian = np.eye(3)[:, :2]
-            jacobian[2] = -weight[2, :2] / weight[2, 2] if gain is None else [0.0, gain.per_stiffness]
-            information[:2, :2] = inverse(found.covariance)
-            if gain is None:
-                covariance = jacobian @ found.covariance @ jacobian.T
-                covariance[2, 2] += 1.0 / weight[2, 2]
-                information = inverse(covariance)
-            return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, information))
-        start = starting_decay(run.record)
-        if start is None:
-            return Status.NO_OSCILLATION
-        reading = Reading.from_record(run.record)
-        fit = fit_run(reading, start)
-        if not fit.runs or fit.runs[0].decay.stiffness <= 0.0:
-            return Status.NOT_CONVERGED
-        noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)
-        if failure is not None:
-            return failure
-        return self._described(run, reading, fit.runs[0], noise)
-
-    def _described(
-        self,
-        run: Run,
-        reading: Reading,
-        fit: RunFit,
-        noise: NoiseLevel,
-        rows: Callable[[Decay], Array] | None = None,
-    ) -> Found:
-        """The posterior about a fit; ``rows`` are the response of a driven run, as from `driven_rows`."""
+        bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
+        fit, noise, fitted = bare.fit, bare.noise, bare.gained
+        if fit is None or noise is None or fitted is None:
+            return RunDecay(bare.estimate)
+        reading, forcing, time = bare.reading, bare.reading.forcing, bare.reading.time
         variance = noise.std**2 * noise.slow_ratio
         guess = decay_covariance_of(fit) * variance
-        decay, residual, time = fit.decay, fit.residual, reading.time
+        decay, residual = fit.decay, fit.residual
         frequency = decay.omega_n / (2.0 * np.pi)
         thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
         means, _ = block_means(Reading(time, residual), frequency, self.blocks_per_cycle)
         known = variance if noise.source == "stated" or noise.departs else None
         within = float(inner(residual, residual) - factor * inner(means.yaw, means.yaw))
-        of_input = run.known_gain
-        linear = _LINEAR + (rows is not None and of_input is None)
+        linear = _LINEAR + (forcing.known is None)
         knowledge = NoiseKnowledge(known, factor, max(within, 0.0), time.size - linear)
         forced = None
-        if rows is not None:
-            forced = Forced(lambda at: np.array([mean_of_blocks(row, factor) for row in rows(at)]), of_input)
+        if isinstance(forcing, Forced):
+
+            def rows(decay: Decay) -> Array:
+                """The response to the input and its derivatives, in the means of the blocks."""
+                return np.array([mean_of_blocks(row, factor) for row in forcing.responses(time, decay)])
+
+            forced = InputResponse(rows, forcing.known)
         found = posterior_of(thin, decay, guess, knowledge, forced)
         if found is None:
             return Status.NOT_CONVERGED
         mean, covariance = found.moments()
         decay = Decay(float(mean[0]), float(mean[1]))
-        if rows is not None:
-            response = rows(decay)[0]
-            if of_input is not None:
-                gain = of_input.at(decay.stiffness)
-            else:
-                linear_rows = [response, *response_rows(time, decay)[:2], np.ones_like(time)]
-                gain = float(np.linalg.lstsq(np.transpose(linear_rows), reading.yaw, rcond=None)[0][0])
-            reading = Reading(time, reading.yaw - gain * response)
-        projected = project_run(reading, decay)
+        if forcing.known is not None:
+            gain = forcing.known.at(decay.stiffness)
+        else:
+            of_input = forcing.rows(time, decay)[5]
+            linear_rows = [of_input, *response_rows(time, decay)[:2], np.ones_like(time)]
+            gain = float(np.linalg.lstsq(np.transpose(linear_rows), reading.yaw, rcond=None)[0][0])
+        free = reading.freed(decay, gain)
+        projected = project_run(free, decay)
         if projected is None:
             return Status.NOT_CONVERGED
-        described = describe_run(run, reading, *projected, covariance, variance, noise=noise)
+        described = describe_run(run, free, *projected, covariance, variance, noise=noise)
         omega_n, zeta = found.modal()
         estimate = replace(
             described,
             omega_n=Quantity(omega_n[0], omega_n[1], "rad/s", omega_n[2:]),
             zeta=Quantity(zeta[0], zeta[1], "1", zeta[2:]),
         )
-        return _PosteriorDecay(estimate, projected[0].decay, covariance, posterior=found)
+        # the gain given (a, k), as in least squares
+        weight, jacobian = fitted.weight, np.eye(3)[:, :2]
+        jacobian[2] = forcing.link[2] if forcing.known is not None else -weight[2, :2] / weight[2, 2]
+        of_sought = jacobian @ covariance @ jacobian.T
+        if forcing.known is None:
+            of_sought[2, 2] += 1.0 / weight[2, 2]
+        sought = forcing.sought
+        moved = np.array([decay.rate, decay.stiffness]) - fitted.coefficients[:2]
+        coefficients = fitted.coefficients + jacobian @ moved
+        gained = Gained.of(coefficients, of_sought[np.ix_(sought, sought)], sought)
+        return _PosteriorDecay(estimate, gained, posterior=found, driven=forcing.driven)

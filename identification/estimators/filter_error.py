@@ -16,18 +16,18 @@ import numpy as np
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Quantity, Status
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
-from identification.signal.driven_fit import DrivenRun, Gained, driven_run, input_response
 from identification.signal.filter import DrivenFit, KnownInput, fit_driven
+from identification.signal.forcing import Forced
 from identification.signal.free_decay import Decay
 from identification.signal.noise import Residual, noise_level, white_noise
 from identification.signal.run_fit import (
     NO_WINDOWS,
     FittedRun,
+    Gained,
     decay_covariance_of,
     describe_run,
     identify_run,
 )
-from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -52,25 +52,16 @@ class FilterError(RunByRun):
     blocks_per_cycle: int = 24
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
-        bare = (
-            identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
-            if run.drive is None
-            else driven_run(run, sensor)
-        )
+        bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
         if bare.fit is None or bare.noise is None:
             return RunDecay(bare.estimate)
-        driven = self._driven(run, bare, sensor)
+        driven = self._driven(bare, sensor)
         if driven is None:
-            variance = bare.noise.std**2 * bare.noise.slow_ratio
-            of_run = bare.gained if isinstance(bare, DrivenRun) else None
-            return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, of_run)
+            return RunDecay(bare.estimate, bare.gained)
         found, noise_std = driven
-        decay, reading, drive = found.model.decay, bare.reading, run.drive
-        known = run.known_gain
-        gain = found.innovations.gain if known is None else known.at(decay.stiffness)
-        if drive is not None:
-            response = input_response(reading, drive, decay, sensor.derivative)
-            reading = Reading(reading.time, reading.yaw - gain * response)
+        decay, forcing = found.model.decay, bare.reading.forcing
+        gain = found.innovations.gain if forcing.known is None else forcing.known.at(decay.stiffness)
+        reading = bare.reading.freed(decay, gain)
         projected = project_run(reading, decay)
         if projected is None:
             return Status.NOT_CONVERGED
@@ -91,14 +82,11 @@ class FilterError(RunByRun):
         q = found.model.intensity_at_resonance
         process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
         estimate = replace(estimate, process_noise=process_noise)
-        if drive is None:
-            return RunDecay(estimate, decay, covariance[:2, :2])
-        size, weight = 3 if known is None else 2, np.zeros((3, 3))
-        weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
-        gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
-        return RunDecay(estimate, decay, covariance[:2, :2], gained)
+        sought, coefficients = forcing.sought, np.array([decay.rate, decay.stiffness, gain])
+        of_sought = found.gained[np.ix_(sought, sought)] * noise.slow_ratio
+        return RunDecay(estimate, Gained.of(coefficients, of_sought, sought))
 
-    def _driven(self, run: Run, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
+    def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
         # The fit, and its assumed sensor noise of one sample.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
@@ -111,15 +99,14 @@ class FilterError(RunByRun):
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
-        known, drive = None, run.drive
-        if drive is not None:
+        known, forcing, time = None, bare.reading.forcing, bare.reading.time
+        if isinstance(forcing, Forced):
 
             def response(decay: Decay) -> Array:
                 """The response to the input, in the means of the blocks."""
-                driven = input_response(bare.reading, drive, decay, sensor.derivative)
-                motion = Reading(bare.reading.time, driven)
+                motion = Reading(time, forcing.responses(time, decay)[0])
                 return mean_of_blocks(even_reading(motion).yaw, factor)
 
-            known = KnownInput(response, run.known_gain)
+            known = KnownInput(response, forcing.known)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)

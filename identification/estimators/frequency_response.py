@@ -18,22 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.campaign.combination import Found, RunByRun, RunDecay
-from identification.estimate import Estimate, Status
+from identification.estimate import Status
 from identification.signal.decay_fit import Reading, project_run
-from identification.signal.driven import driven_start
-from identification.signal.driven_fit import (
-    Gained,
-    constant_gain,
-    driven_run,
-    input_response,
-    linearised,
-    own_unknowns,
-)
-from identification.signal.free_decay import Decay
-from identification.signal.run_fit import describe_run
-from identification.statistics import inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from identification.signal.forcing import ANGLE, ANGULAR_RATE, Forced, State
+from identification.signal.run_fit import Gained, describe_run, identify_run
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _EXCITED = 1e-3  # of the input's greatest line, in power, from which a line counts as excited on purpose
@@ -58,53 +47,40 @@ class FrequencyResponse(RunByRun):
     segments: int = 4
     least_coherence: float = 0.5
 
-    def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from the runs.
-
-        Raises:
-            TunnelError: for a free decay, a body without a spring, uneven samples, or wind without density.
-        """
-        for run in campaign.runs:
-            why = "is a free decay, which has no frequency response" if run.drive is None else ""
-            why = "has no spring, and so no resonance" if run.unrestrained else why
-            why = why if run.record.uniform else "has uneven samples, which a Fourier transform does not take"
-            if why:
-                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
-                raise TunnelError(f"the run {why}", where=where, remedy=remedy)
-        return super().estimate(campaign)
+    def _refusal(self, run: Run) -> str:
+        if not run.record.uniform:
+            return "has uneven samples, which a Fourier transform does not take"
+        if run.unrestrained:
+            return "has no spring, and so no resonance"
+        return "is a free decay, which has no frequency response" if run.drive is None else ""
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
-        bare, drive = driven_run(run, sensor), run.drive
-        if bare.fit is None or bare.noise is None or drive is None:
+        bare = identify_run(run, sensor)
+        reading, forcing = bare.reading, bare.reading.forcing
+        if bare.fit is None or bare.noise is None or not isinstance(forcing, Forced):
             return RunDecay(bare.estimate)
-        reading = bare.reading
-        derivative = sensor.derivative
-        start = driven_start(reading.time, reading.yaw, drive.values, derivative=derivative)
-        places, link = own_unknowns(run)
-        lines = _Lines.of(drive.values, self.segments)
-        found = None if start is None else _fitted(run, link, np.array(start)[places], lines, derivative)
+        start = forcing.start(run.record)
+        lines = _Lines.of(forcing.values, self.segments)
+        found = None if start is None else _fitted(reading, forcing, start[forcing.sought], lines)
         if found is not None:
             left, seen = (np.sum(np.abs(lines.spectra(y)) ** 2, axis=0) for y in (found[1], reading.yaw))
             kept = left <= (1.0 - self.least_coherence) * seen
             lines = replace(lines, used=lines.used[kept], moved=lines.moved[:, kept], power=lines.power[kept])
-            found = _fitted(run, link, found[0], lines, derivative)
+            found = _fitted(reading, forcing, found[0], lines)
         if found is None:
             return Status.NOT_DETERMINED
-        coefficients, gains = link @ found[0] + constant_gain(run), found[2][: len(places)]
-        decay = Decay(float(coefficients[0]), float(coefficients[1]))
+        decay, gain = forcing.at(forcing.link @ found[0])
         if not decay.stiffness > 0.0:
             return Status.NOT_CONVERGED
-        response = input_response(reading, drive, decay, derivative)
-        free = Reading(reading.time, reading.yaw - coefficients[2] * response)
+        free = reading.freed(decay, gain)
         projected = project_run(free, decay)
         if projected is None:
             return Status.NOT_CONVERGED
-        variance = bare.noise.std**2 * bare.noise.slow_ratio
+        variance, gains = bare.noise.std**2 * bare.noise.slow_ratio, found[2][: len(forcing.sought)]
         covariance = gains @ gains.T * variance
         estimate = describe_run(run, free, *projected, covariance[:2, :2], variance, noise=bare.noise)
-        weight = np.zeros((3, 3))
-        weight[np.ix_(places, places)] = inverse(covariance)
-        return RunDecay(estimate, decay, covariance[:2, :2], Gained(coefficients, weight))
+        coefficients = np.array([decay.rate, decay.stiffness, gain])
+        return RunDecay(estimate, Gained.of(coefficients, covariance, forcing.sought))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,20 +140,24 @@ class _Lines:
 
 
 def _fitted(
-    run: Run, link: Array, start: Array, lines: _Lines, derivative: int
+    reading: Reading, forcing: Forced, start: Array, lines: _Lines
 ) -> tuple[Array, Array, Array] | None:
     """Coefficients, the record's residual (rad), and weights of its samples in them; None where undetermined."""
     if lines.used.size < _FEWEST:
         return None
-    parameters, own, last = start, np.zeros(3), np.inf
+    parameters, own, last = start, np.zeros(2), np.inf  # own: initial angle and rate; no line shows the zero
     step = np.zeros(start.size + 2)
     for _ in range(_STEPS):
         with np.errstate(all="ignore"):  # a distant trial may overflow; it is then rejected
-            residual, jacobian = linearised(run, link, parameters, own, derivative)
+            decay, gain = forcing.at(forcing.link @ parameters)
+            state = State(decay, 0.0, float(own[0]), float(own[1]), gain)
+            rows = forcing.rows(reading.time, decay)
+            residual, local = reading.residual(state, rows), forcing.weights(state) @ rows
             left = lines.weighted(residual)
             cost = float(left @ left)
         if np.isfinite(cost) and cost <= last * (1.0 + _SETTLED):
-            design = lines.weighted(np.delete(jacobian, start.size, axis=1).T).T  # no line shows the zero
+            of_coefficients = forcing.link.T @ local[list(forcing.coefficients)]
+            design = lines.weighted(np.vstack([of_coefficients, local[[ANGLE, ANGULAR_RATE]]])).T
             size = np.linalg.norm(design, axis=0)
             if not (np.isfinite(design).all() and size.min() > 0.0):
                 return None
@@ -188,7 +168,7 @@ def _fitted(
             if small.all() or cost >= before * (1.0 - _SETTLED):
                 return kept
         else:
-            parameters, own = parameters - step[: start.size], own - np.r_[0.0, step[start.size :]]
+            parameters, own = parameters - step[: start.size], own - step[start.size :]
             step = 0.25 * step
-        parameters, own = parameters + step[: start.size], own + np.r_[0.0, step[start.size :]]
+        parameters, own = parameters + step[: start.size], own + step[start.size :]
     return None

@@ -29,6 +29,7 @@ from identification.signal.run_fit import CYCLES, modal_quantities
 from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles
 
 _CARRIED_ON = 6.0  # cycles past either end
 _GROWTH = 3.0  # a fast decay is extended backwards only until it has grown by e³
@@ -40,13 +41,12 @@ class Envelope:
 
     Args:
         time: their middles since the first sample, shape (n,), s.
-        amplitude: shape (n,), rad.
         phase: relative to the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
     """
 
     time: Array
-    amplitude: Array
+    amplitude: Angles
     phase: Array
     carrier: float
     samples: int

@@ -13,7 +13,7 @@ from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Status
 from identification.signal.decay_fit import Reading, block_means, even_reading, project_run
 from identification.signal.frequency import pencil_decay, starting_frequency
-from identification.signal.run_fit import describe_run, noise_and_failure
+from identification.signal.run_fit import Gained, describe_run, noise_and_failure
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
 _DECAY_TIMES = 8.0  # in units of 1/σ: later samples contain e^−16 of the energy, and noise
@@ -53,4 +53,5 @@ class MatrixPencil(RunByRun):
         variance = noise.std**2 * noise.slow_ratio
         covariance = found.weights @ found.weights.T * (variance / factor)
         estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)
-        return RunDecay(estimate, fitted.decay, covariance)
+        coefficients = np.array([fitted.decay.rate, fitted.decay.stiffness, 0.0])
+        return RunDecay(estimate, Gained.of(coefficients, covariance))

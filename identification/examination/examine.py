@@ -21,6 +21,7 @@ from identification.status import Examined, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
+from tunnel_sim.vocabulary.shapes import Seconds
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
 _ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
@@ -171,13 +172,12 @@ class Clock:
     """The uniform clock of a record's samples.
 
     Args:
-        interval: s.
         place: of every sample on the clock, shape (n,); increasing, with jumps where samples are missing.
         time: of every sample by the clock, shape (n,), s.
         away: largest deviation of a time stamp from the clock, s.
     """
 
-    interval: float
+    interval: Seconds
     place: NDArray[np.int64]
     time: Array
     away: float

@@ -21,6 +21,7 @@ from identification.signal.frequency import PencilDecay, pencil_decay, starting_
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+from tunnel_sim.vocabulary.shapes import Frequencies
 
 _UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
 _LEAST_SAMPLES = 30  # in a part of a record whose poles are found separately
@@ -136,12 +137,11 @@ class AmplitudeWindows:
     Args:
         time: mid-window, shape (n,), s.
         amplitude: at mid-window, shape (n,), rad.
-        frequency: shape (n,), Hz.
     """
 
     time: Array
     amplitude: Array
-    frequency: Array
+    frequency: Frequencies
 
     @property
     def growth_rate(self) -> Array:

@@ -17,6 +17,7 @@ from identification.signal.decay_fit import Reading, block_means
 from identification.signal.frequency import starting_frequency
 from identification.status import Status
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.shapes import Times
 
 WINDOWS = 32
 LEAST_WINDOWS = 4
@@ -204,7 +205,6 @@ class RivalWindows:
         run: number of each window's run, shape (w,).
         omega: angular frequency of each run, shape (runs,), rad/s.
         rate: decay rate of each run, shape (runs,), 1/s.
-        time: shape (w,), s.
         powers: of the amplitude, by exponent, shape (w,) each.
         integrals: of these powers over time, by exponent, shape (w,) each.
         drift: integral of the time as a share of the record, shape (w,), s.
@@ -216,7 +216,7 @@ class RivalWindows:
     run: Places
     omega: Array
     rate: Array
-    time: Array
+    time: Times
     powers: dict[float, Array]
     integrals: dict[float, Array]
     drift: Array

@@ -27,6 +27,7 @@ from tunnel_sim.files.reading import as_described, parse_json, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import RadPerS, Seconds, Vector
 
 DAMPING, FREQUENCY = "damping", "frequency"
 SIZES = {DAMPING: (100, 5, 5, 1), FREQUENCY: (2, 2, 5, 1)}
@@ -178,12 +179,8 @@ def parameter_count(sizes: Sequence[int]) -> int:
     return sum((before + 1) * after for before, after in pairwise(sizes))
 
 
-def split_weights(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
-    """Matrix (after, before) and bias (after,) of each layer, as views.
-
-    Args:
-        weights: shape (n,).
-    """
+def split_weights(weights: Vector, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
+    """Matrix (after, before) and bias (after,) of each layer, as views."""
     layers, place = [], 0
     for before, after in pairwise(sizes):
         matrix = weights[place : place + before * after].reshape(after, before)
@@ -232,22 +229,20 @@ class Networks:
         """ζ of normalised shapes, shape (n, 100): shape (n,)."""
         return self.damping.value(inputs)
 
-    def omega_n(self, zeta: Array, t3: Array) -> Array:
+    def omega_n(self, zeta: Vector, t3: Array) -> Array:
         """ωn in rad/s.
 
         Args:
-            zeta: shape (n,).
             t3: time of three damped cycles, s, shape (n,).
         """
         found = self.frequency.value(np.column_stack((zeta, self.spec.to_network(t3))))
         return np.exp(found) if self.spec.frequency_scale == LOGARITHMIC else np.asarray(found)
 
-    def omega_slopes(self, zeta: float, t3: float) -> tuple[float, float]:
+    def omega_slopes(self, zeta: float, t3: Seconds) -> tuple[float, float]:
         """∂ωn/∂ζ [rad/s] and ∂ωn/∂t3 [rad/s²].
 
         Args:
             zeta: damping ratio.
-            t3: s.
         """
         point = np.array([zeta, float(self.spec.to_network(np.array(t3)))])
         by_zeta, by_time = self.frequency.input_gradient(point)
@@ -256,7 +251,7 @@ class Networks:
         omega = float(self.omega_n(np.array([zeta]), np.array([t3]))[0])
         return float(by_zeta) * omega, float(by_time) * omega / t3
 
-    def own_stds(self, zeta: float, t3: float) -> tuple[float, float]:
+    def own_stds(self, zeta: float, t3: Seconds) -> tuple[float, float]:
         """Standard deviations due to the networks, of ζ and, relative, of ωn.
 
         They combine the posterior of the weights, at the noise-free response of this ζ, and the largest error of
@@ -264,7 +259,6 @@ class Networks:
 
         Args:
             zeta: damping ratio.
-            t3: s.
         """
         inside = float(np.clip(zeta, *self.spec.zeta_range))
         of_zeta = self.damping.posterior_std(network_inputs(np.array([inside]))[0])
@@ -275,12 +269,11 @@ class Networks:
         floor, omega_floor = self.errors.zeta / np.sqrt(3.0), self.errors.omega_relative / np.sqrt(3.0)
         return float(np.hypot(of_zeta, floor)), float(np.hypot(of_omega, omega_floor))
 
-    def trained_for(self, zeta: float, omega_n: float) -> bool:
+    def trained_for(self, zeta: float, omega_n: RadPerS) -> bool:
         """Whether ζ and ωn are in the training range.
 
         Args:
             zeta: damping ratio.
-            omega_n: rad/s.
         """
         (low, high), (slow, fast) = self.spec.zeta_range, self.spec.omega_range
         return low <= zeta <= high and slow <= omega_n <= fast

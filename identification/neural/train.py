@@ -40,6 +40,7 @@ from tunnel_sim.files.writing import json_line
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Vector
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -131,11 +132,10 @@ class Progress:
     """The state of a training, sufficient to resume it.
 
     Args:
-        weights: shape (n,).
         damping: μ; dimensionless.
     """
 
-    weights: Array
+    weights: Vector
     held: Hyperparameters = _FIRST
     damping: float = _FIRST_DAMPING
     iteration: int = 0

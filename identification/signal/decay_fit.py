@@ -1,25 +1,43 @@
-"""Least squares of free decays: variable projection, one run or many with shared parameters.
+"""Least squares of motions: variable projection, one run or many with shared parameters, free and driven ones.
 
-Every run i decays with (aᵢ, kᵢ) = Lᵢ φ; its initial angle and rate and the sensor's zero enter linearly, so they
-are eliminated in closed form and only φ is iterated. With white Gaussian noise this is maximum likelihood.
-Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432, doi 10.1137/0710036; Kaufman, BIT 15 (1975)
-49–57, doi 10.1007/BF01932995 (Jacobian).
+Every run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ, with the gain gᵢ of its input (`identification.signal.forcing`). The
+initial angle and rate and the sensor's zero enter linearly, so they are eliminated in closed form and only φ is
+iterated. With white Gaussian noise this is maximum likelihood. Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10
+(1973) 413–432, doi 10.1137/0710036; Kaufman, BIT 15 (1975) 49–57, doi 10.1007/BF01932995 (Jacobian).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from identification.policy import LEAST_SAMPLES
-from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
+from identification.signal.forcing import (
+    ANGLE,
+    ANGULAR_RATE,
+    FREE,
+    GAIN,
+    RATE,
+    STIFFNESS,
+    ZERO,
+    Free,
+    Rows,
+    State,
+    forcing_of,
+)
+from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, embed, inner, scaled_solve
+from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
+from tunnel_sim.vocabulary.shapes import Angles, Gain, PerParameter, Vector
 
-# Local order of one run's unknowns throughout: decay rate, stiffness | zero | initial angle, initial rate.
-RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE = range(5)
+ZeroKind = Literal["shared", "own", "known"]
+"""Whether the sensor's zero is an unknown of all runs together, of every run, or known."""
+
+_ZERO_FIRST = np.ix_([4, 0, 1], [4, 0, 1])  # of the rows: the zero, unit angle, unit rate
 _TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the iteration ends
 _ROUNDING = 1e-9  # a step this small that no longer lowers the cost is limited by rounding
 _MAX_ITERATIONS = 100
@@ -39,6 +57,26 @@ class Reading:
 
     time: Array
     yaw: Array
+    forcing: Free = FREE
+
+    @classmethod
+    def from_run(cls, run: Run, derivative: int) -> Reading:
+        """The whole record of a run, with its input.
+
+        Args:
+            derivative: 0 where the readings are angles, 1 where they are rates.
+        """
+        return replace(cls.from_record(run.record), forcing=forcing_of(run, derivative))
+
+    def residual(self, state: State, rows: Rows) -> Angles:
+        """Reading less model; ``rows`` are those of the forcing at the decay."""
+        free = self.forcing.freed(self.yaw, rows, state.gain)
+        return np.asarray(free - state.zero * rows[4] - state.angle * rows[0] - state.rate * rows[1])
+
+    def freed(self, decay: Decay, gain: Gain) -> Reading:
+        """The reading less the response to the input: a free decay."""
+        rows = self.forcing.rows(self.time, decay)
+        return Reading(self.time, self.forcing.freed(self.yaw, rows, gain))
 
     @classmethod
     def from_record(cls, record: Record) -> Reading:
@@ -47,27 +85,30 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class RunFit:
+class RunFit(State):
     """One run at the optimum.
 
     Args:
-        angle: initial angle from the sensor's zero, rad.
-        rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
-        information: JᵀJ in the local order, shape (5, 5); divide by the noise variance for Fisher's.
-        score: Jᵀ residual, shape (5,).
+        information: JᵀJ in the local order, shape (5, 5), or (6, 6) with a gain; divide by the noise variance for
+            Fisher's.
+        score: Jᵀ residual, shape (5,) or (6,).
     """
 
-    decay: Decay
-    angle: float
-    rate: float
-    residual: Array
-    information: Array
-    score: Array
+    residual: Array = field(kw_only=True)
+    information: Array = field(kw_only=True)
+    score: Array = field(kw_only=True)
 
-    def reduced(self, keep: int = 3) -> tuple[Array, Array]:
-        """Information and score of the first ``keep`` of (a, k, zero), with all other unknowns eliminated."""
-        return eliminate(self.information, self.score, keep)
+    @property
+    def coefficients(self) -> list[int]:
+        """Places of a and k, and of the gain where there is one, in the local order."""
+        return [RATE, STIFFNESS, GAIN][: len(self.score) - 3]
+
+    def reduced(self, zero: ZeroKind) -> tuple[Array, Array]:
+        """Information and score of the coefficients, and of a shared zero last; the other unknowns eliminated."""
+        kept = [*self.coefficients, *([ZERO] if zero == "shared" else [])]
+        order = [*kept, *([ZERO] if zero == "own" else []), ANGLE, ANGULAR_RATE]
+        return eliminate(self.information[np.ix_(order, order)], self.score[order], len(kept))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +116,11 @@ class DecayFit:
     """Runs fitted together.
 
     Args:
-        parameters: φ, shape (p,).
         zero: the sensor's zero, rad; the mean where every run has its own.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
     """
 
-    parameters: Array
+    parameters: PerParameter
     zero: float
     runs: tuple[RunFit, ...]
     normal: Array
@@ -116,13 +156,15 @@ def fit_decays(
     prior: Prior | None = None,
     tolerance: float = _TOLERANCE,
 ) -> DecayFit:
-    """Fit runs whose decay rate and stiffness are linear in shared parameters.
+    """Fit runs whose decay rate, stiffness and gain are linear in shared parameters.
 
     Args:
-        links: one (2, p) matrix Lᵢ per run: (aᵢ, kᵢ) = Lᵢ φ.
+        links: one matrix Lᵢ per run, shape (3, p), or (2, p) for a free decay: (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ, where cᵢ
+            is the part of the gain that depends on no unknown.
         start: φ to start from, shape (p,).
         zero: the sensor's zero where it is known, rad; None: estimated.
-        own_zeros: whether each run has its own estimated zero; otherwise it is common to the runs.
+        own_zeros: whether each run has its own estimated zero; otherwise it is common to the runs. Needed where a
+            run has no spring.
         prior: the fit then maximises the posterior, and ``normal`` includes the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
@@ -130,24 +172,23 @@ def fit_decays(
         The fit. ``converged`` is False where the iteration stalled: the values are then the best found, and
         ``runs`` is empty where even the start was out of range or contained no motion.
     """
-    best = _project(readings, links, np.asarray(start, dtype=np.float64), zero, prior, own_zeros)
+    kind: ZeroKind = "known" if zero is not None else "own" if own_zeros else "shared"
+    best = _project(readings, links, np.asarray(start, dtype=np.float64), kind, zero, prior)
     samples = sum(reading.time.size for reading in readings)
     damping, converged, iteration = 0.0, False, 0
     while best.runs and not converged and iteration < _MAX_ITERATIONS:
         iteration += 1
         try:
-            normal, gradient = _shared_system(best, links, zero is None, prior, own_zeros)
+            normal, gradient = shared_system(best.runs, links, kind, best.parameters, prior)
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:  # no motion in a run: nothing can be identified
             break
-        size = 0.0
-        for link, run in zip(links, best.runs, strict=True):
-            rate, stiffness = np.abs(link @ step[: best.parameters.size])
-            scale = max(abs(run.decay.stiffness), run.decay.rate**2)
-            size = max(size, float(rate / np.sqrt(scale)), float(stiffness / scale))
-        trial = _project(
-            readings, links, best.parameters + step[: best.parameters.size], zero, prior, own_zeros
+        moved = step[: best.parameters.size]
+        size = max(
+            _relative_step(one, link @ moved, run)
+            for one, link, run in zip(readings, links, best.runs, strict=True)
         )
+        trial = _project(readings, links, best.parameters + moved, kind, zero, prior)
         expected_gain = float(step @ (2.0 * gradient - normal @ step))
         gain = (best.cost - trial.cost) / max(expected_gain, 1e-300)
         converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
@@ -165,44 +206,55 @@ def fit_decays(
     if not best.runs:
         return nothing
     try:
-        normal, _ = _shared_system(best, links, zero is None, prior, own_zeros)
+        normal, _ = shared_system(best.runs, links, kind, best.parameters, prior)
     except np.linalg.LinAlgError:
         return nothing
     return DecayFit(best.parameters, best.zero, best.runs, normal, converged)
 
 
+def _relative_step(reading: Reading, step: Array, run: RunFit) -> float:
+    """A step of (a, k) or (a, k, g) as a ratio: of k, of a in units of ωn, of the motion by the input."""
+    rate, stiffness, *gain = np.abs(step)
+    scale = max(abs(run.decay.stiffness), run.decay.rate**2, float(reading.time[-1]) ** -2)
+    size = max(float(rate / np.sqrt(scale)), float(stiffness / scale))
+    if GAIN not in run.coefficients:
+        return size
+    power = float(inner(reading.yaw - run.residual, reading.yaw))
+    return max(size, float(gain[0]) * float(np.sqrt(run.information[GAIN, GAIN] / max(power, 1e-300))))
+
+
 def fit_run(
     reading: Reading, start: Decay, *, zero: float | None = None, tolerance: float = _TOLERANCE
 ) -> DecayFit:
-    """Fit one run by itself, φ = (a, k): arguments as in `fit_decays`."""
+    """Fit one free decay by itself, φ = (a, k): arguments as in `fit_decays`."""
     decay = np.array([start.rate, start.stiffness])
     return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
 
 
 def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
-    """The best initial state and zero of a run for a given decay, such as one from another method.
+    """The best initial state and zero of a free decay for given parameters, such as those of another method.
 
     Returns:
         The run at that decay and its sensor zero in rad; None where the decay overflows.
     """
-    point = _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None)
+    point = _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), "shared")
     return (point.runs[0], point.zero) if point.runs else None
 
 
 def projected_cost(reading: Reading, decay: Decay) -> float:
     """Sum of squared residuals, rad², of a decay at the best initial state and zero; infinite out of range."""
-    return _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None).cost
+    return _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), "shared").cost
 
 
 def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Array:
-    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate): arguments as in `linearised_at`."""
+    """JᵀJ of one free run in the local order (a, k, zero, angle, rate): arguments as in `linearised_at`."""
     return linearised_at(time, decay, angle, rate, np.zeros(time.size))[0]
 
 
 def linearised_at(
     time: Array, decay: Decay, angle: float, rate: float, residual: Array
 ) -> tuple[Array, Array]:
-    """JᵀJ in the local order, shape (5, 5), and the score Jᵀ residual, shape (5,).
+    """JᵀJ of one free run in the local order, shape (5, 5), and the score Jᵀ residual, shape (5,).
 
     Args:
         time: since the initial state, shape (n,), s.
@@ -210,9 +262,29 @@ def linearised_at(
         rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
     """
-    rows = response_rows(time, decay, constant=True)
-    weights = _local_weights(decay, angle, rate)
-    return weights @ (rows @ rows.T) @ weights.T, weights @ inner(rows, residual)
+    found = run_at(FREE, State(decay, 0.0, angle, rate), FREE.rows(time, decay), residual)
+    return found.information, found.score
+
+
+def run_at(forcing: Free, state: State, rows: Array, residual: Array, gram: Array | None = None) -> RunFit:
+    """A run linearised about a state.
+
+    Args:
+        rows: of its forcing, whitened where the noise is not white, shape (m, n).
+        residual: reading less model, shape (n,), rad.
+        gram: products of the rows where they are known, shape (m, m).
+    """
+    weights = forcing.weights(state)
+    return RunFit(
+        state.decay,
+        state.zero,
+        state.angle,
+        state.rate,
+        state.gain,
+        residual=residual,
+        information=weights @ (rows @ rows.T if gram is None else gram) @ weights.T,
+        score=weights @ inner(rows, residual),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,21 +301,23 @@ def _project(
     readings: Sequence[Reading],
     links: Sequence[Array],
     parameters: Array,
-    zero: float | None,
+    kind: ZeroKind,
+    zero: float | None = None,
     prior: Prior | None = None,
-    own_zeros: bool = False,
 ) -> _Point:
-    decays = [Decay(*map(float, link @ parameters)) for link in links]
+    nothing = _Point(parameters, 0.0, ())
+    found = [r.forcing.at(link @ parameters) for r, link in zip(readings, links, strict=True)]
     with np.errstate(over="ignore", invalid="ignore"):  # a distant trial may overflow; it is then rejected
-        rows = [
-            response_rows(r.time, decay, constant=True) for r, decay in zip(readings, decays, strict=True)
-        ]
+        rows = [r.forcing.rows(r.time, decay) for r, (decay, _) in zip(readings, found, strict=True)]
         grams = [block @ block.T for block in rows]
     if not all(np.isfinite(gram).all() for gram in grams):
-        return _Point(parameters, 0.0, ())
-    moments = [inner(block, reading.yaw) for block, reading in zip(rows, readings, strict=True)]
+        return nothing
+    values = [
+        r.forcing.freed(r.yaw, block, gain) for r, block, (_, gain) in zip(readings, rows, found, strict=True)
+    ]
+    moments = [inner(block[:5], value) for block, value in zip(rows, values, strict=True)]
     try:
-        if own_zeros and zero is None:
+        if kind == "own":
             zeros = [_common_zero([gram], [moment]) for gram, moment in zip(grams, moments, strict=True)]
         else:
             zeros = [_common_zero(grams, moments) if zero is None else zero] * len(grams)
@@ -252,33 +326,23 @@ def _project(
             for gram, moment, best in zip(grams, moments, zeros, strict=True)
         ]
     except np.linalg.LinAlgError:
-        return _Point(parameters, 0.0, ())
+        return nothing
     runs, cost = [], 0.0 if prior is None else prior.cost(parameters)
-    for reading, decay, block, gram, (angle, rate), best in zip(
-        readings, decays, rows, grams, states, zeros, strict=True
+    for reading, block, gram, (decay, gain), (angle, rate), best in zip(
+        readings, rows, grams, found, states, zeros, strict=True
     ):
-        residual = reading.yaw - best - angle * block[0] - rate * block[1]
-        weights = _local_weights(decay, float(angle), float(rate))
-        score = weights @ inner(block, residual)
-        runs.append(RunFit(decay, float(angle), float(rate), residual, weights @ gram @ weights.T, score))
+        state = State(decay, best, float(angle), float(rate), gain)
+        residual = reading.residual(state, block)
+        runs.append(run_at(reading.forcing, state, block, residual, gram))
         cost += float(inner(residual, residual))
     mean = zeros[0] if len(set(zeros)) == 1 else float(np.mean(zeros))
     return _Point(parameters, mean, tuple(runs), cost)
 
 
-def _local_weights(decay: Decay, angle: float, rate: float) -> Array:
-    # The run's Jacobian, transposed, as a combination of the rows u, s, w, t·s, 1.
-    weights = np.zeros((5, 5))
-    weights[:2, :4] = sensitivity_weights(decay, angle, rate)
-    weights[ZERO, 4] = weights[ANGLE, 0] = weights[ANGULAR_RATE, 1] = 1.0
-    return weights
-
-
 def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
     numerator = denominator = 0.0
-    order = [4, 0, 1]
     for gram, moment in zip(grams, moments, strict=True):
-        information, score = eliminate(gram[np.ix_(order, order)], moment[order], 1)
+        information, score = eliminate(gram[_ZERO_FIRST], moment[[4, 0, 1]], 1)
         denominator += float(information[0, 0])
         numerator += float(score[0])
     if not denominator > 0.0:  # motions so slow that they cannot be separated from the zero
@@ -286,24 +350,30 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
     return numerator / denominator
 
 
-def _shared_system(
-    point: _Point, links: Sequence[Array], with_zero: bool, prior: Prior | None, own_zeros: bool
+def shared_system(
+    runs: Sequence[RunFit],
+    links: Sequence[Array],
+    zero: ZeroKind,
+    parameters: PerParameter,
+    prior: Prior | None = None,
 ) -> tuple[Array, Array]:
-    shared = with_zero and not own_zeros
-    keep = 3 if shared else 2
+    """Information, shape (m, m), and score, shape (m,), of shared parameters φ, shape (p,), and a shared zero last.
+
+    Args:
+        links: from φ to the coefficients, as in `fit_decays`.
+    """
     normal: Array | float = 0.0
     gradient: Array | float = 0.0
-    for run, link in zip(point.runs, links, strict=True):
-        order = [RATE, STIFFNESS, *([ZERO] if with_zero else []), ANGLE, ANGULAR_RATE]
-        information, score = eliminate(run.information[np.ix_(order, order)], run.score[order], keep)
-        extended = embed(link, with_zero=shared)
+    for run, link in zip(runs, links, strict=True):
+        information, score = run.reduced(zero)
+        extended = embed(link[: len(run.coefficients)], with_zero=zero == "shared")
         normal = normal + extended.T @ information @ extended
         gradient = gradient + extended.T @ score
     normal, gradient = np.asarray(normal), np.asarray(gradient)
     if prior is not None:
-        size = point.parameters.size
+        size = parameters.size
         normal[:size, :size] += prior.information
-        gradient[:size] += prior.information @ (prior.mean - point.parameters)
+        gradient[:size] += prior.information @ (prior.mean - parameters)
     return normal, gradient
 
 
@@ -327,12 +397,8 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
     return Reading(mean_of_blocks(reading.time, factor), mean_of_blocks(reading.yaw, factor)), factor
 
 
-def mean_of_blocks(values: Array, factor: int) -> Array:
-    """Means of consecutive values, shape (n // factor,); the remainder at the end is dropped.
-
-    Args:
-        values: shape (n,).
-    """
+def mean_of_blocks(values: Vector, factor: int) -> Array:
+    """Means of consecutive values, shape (n // factor,); the remainder at the end is dropped."""
     if factor == 1:
         return values
     usable = values.size // factor * factor

@@ -26,6 +26,7 @@ from identification.signal.free_decay import Decay, response_rows
 from identification.statistics import inner, inverse, scaled_solve
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles
 
 _GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is made
 _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
@@ -134,14 +135,13 @@ class Innovations:
     """The prediction errors of a model.
 
     Args:
-        values: shape (n,), rad.
         variance: their expected variance, rad².
         cost: −2 ln L up to a constant, dimensionless.
         gain: of a known input, rad/s² per unit; 0 where there is none.
         gain_variance: variance of the gain with the other parameters fixed, in the square of its unit.
     """
 
-    values: Array
+    values: Angles
     variance: float
     cost: float
     gain: float = 0.0

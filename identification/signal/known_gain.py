@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.policy import REFUSAL_DEVIATIONS
-from identification.signal.driven import driven_start
-from identification.signal.driven_fit import constant_gain, fit_with_inputs
+from identification.signal.decay_fit import Reading, fit_decays
+from identification.signal.forcing import driven_start
 from identification.statistics import determined, inverse
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -56,9 +56,9 @@ def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = T
 
 def _gain_differs(run: Run, start: tuple[float, float, float], derivative: int) -> bool:
     """Whether the gain that best fits a run differs from the known gain far beyond its noise."""
-    began = np.array(start) - constant_gain(run)
-    found = fit_with_inputs([run], [np.eye(3)], began, own_zeros=True, derivative=derivative)
+    reading = Reading.from_run(run, derivative)
+    found = fit_decays([reading], [np.eye(3)], np.array(start) - reading.forcing.fixed)
     if not found.converged or not determined(found.normal):
         return False
-    std = float(np.std(found.residuals[0]) * np.sqrt(inverse(found.normal)[2, 2]))
+    std = float(np.std(found.runs[0].residual) * np.sqrt(inverse(found.normal)[2, 2]))
     return abs(float(found.parameters[2])) > REFUSAL_DEVIATIONS * std

@@ -19,6 +19,7 @@ from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, N
 from identification.statistics import inner
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.shapes import Angles, Seconds
 
 _ORDER = 6
 # Variance of one sixth difference of unit white noise, and the number of samples per degree of freedom:
@@ -44,12 +45,11 @@ class Residual:
     peak: float
 
 
-def eighth_of_a_cycle(omega_n: float, sample_interval: float) -> int:
+def eighth_of_a_cycle(omega_n: float, sample_interval: Seconds) -> int:
     """Samples in an eighth of the natural period, at least one.
 
     Args:
         omega_n: natural angular frequency, rad/s.
-        sample_interval: s.
     """
     return max(1, round(min(2.0 * np.pi / (8.0 * omega_n * sample_interval), _LONGEST_BLOCK)))
 
@@ -129,13 +129,12 @@ def reading_noise(record: Record, sensor: SensorProperties) -> float:
     return _as_stated(fast, count / _SAMPLES_PER_DEGREE, floor, sensor)
 
 
-def slow_power(values: Array, block: int) -> tuple[float, int]:
+def slow_power(values: Angles, block: int) -> tuple[float, int]:
     """Power of the slow part of a residual, by its means over blocks, rad², and the number of blocks.
 
     The power of white noise is its variance times that number.
 
     Args:
-        values: shape (n,), rad.
         block: number of samples in a block, such as `eighth_of_a_cycle`.
     """
     blocks = values.size // block

@@ -20,21 +20,12 @@ from identification.policy import (
     LEAST_WINDOW_ENERGY,
     MISFIT_DEVIATIONS,
 )
-from identification.signal.decay_fit import (
-    ANGLE,
-    ANGULAR_RATE,
-    RATE,
-    STIFFNESS,
-    ZERO,
-    DecayFit,
-    Reading,
-    RunFit,
-    fit_run,
-)
+from identification.signal.decay_fit import DecayFit, Reading, RunFit, fit_decays, fit_run
+from identification.signal.forcing import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
 from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level, slow_power
-from identification.statistics import determined, inner, inverse, widened_covariance
+from identification.statistics import determined, eliminate, inner, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -51,17 +42,55 @@ _NEAR = 1e-6  # relative tolerance of the fit to block means that gives the star
 
 
 @dataclass(frozen=True, eq=False)
+class Gained:
+    """Decay rate, stiffness and gain of the input of a run; a free decay has a gain of zero.
+
+    Args:
+        coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
+        weight: their information, the other unknowns eliminated, shape (3, 3); rows of zeros for a k known to be 0,
+            and for a g that is k or a known number.
+        offset: for a body without a spring, the constant moment added to the input, in the unit of the input.
+    """
+
+    coefficients: Array
+    weight: Array
+    offset: Quantity | None = None
+
+    @classmethod
+    def of(cls, coefficients: Array, covariance: Array, sought: Sequence[int] = (0, 1)) -> Gained:
+        """From the covariance of those sought, at their places in (a, k, g).
+
+        Args:
+            coefficients: (a, k, g), shape (3,), in SI units.
+            covariance: shape (s, s), in the products of their units.
+        """
+        weight = np.zeros((3, 3))
+        weight[np.ix_(sought, sought)] = inverse(covariance)
+        return cls(coefficients, weight)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the coefficients, shape (3,), in their units; 0 where the weight has no row."""
+        known = np.flatnonzero(self.weight.diagonal() > 0.0)
+        found = np.zeros(3)
+        found[known] = np.sqrt(inverse(self.weight[np.ix_(known, known)]).diagonal())
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class FittedRun:
     """A run and its fit.
 
     Args:
         fit: None where the run could not be identified; the estimate's status says why.
+        gained: decay rate, stiffness and gain from the fit; None where fit is.
     """
 
     reading: Reading
     fit: RunFit | None
     noise: NoiseLevel | None
     estimate: RunEstimate
+    gained: Gained | None = None
 
     @classmethod
     def failed(cls, run: Run, reading: Reading, status: Status) -> FittedRun:
@@ -73,39 +102,68 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, for any spring.
 
     Args:
-        cycles_per_window: periods in each of its windows; where None three, or one in a short record.
+        run: with its input where it is driven; stiffness and gain are not used, except that a body without a spring
+            has k = 0.
+        cycles_per_window: periods in each window of a free decay; where None three, or one in a short record.
     """
-    reading = Reading.from_record(run.record)
-    start = starting_decay(run.record)
+    reading = Reading.from_run(run, sensor.derivative)
+    forcing = reading.forcing
+    if reading.time.size < forcing.least_samples:
+        return FittedRun.failed(run, reading, Status.NOT_DETERMINED)
+    start = forcing.start(run.record)
     if start is None:
         return FittedRun.failed(run, reading, Status.NO_OSCILLATION)
     fit = fit_from(run, reading, start)
     if fit is None:
         return FittedRun.failed(run, reading, Status.NOT_CONVERGED)
-    fitted = fit.runs[0]
-    noise, failure = noise_and_failure(reading, fitted, fit.zero, sensor)
+    fitted = forcing.alone(fit.runs[0])
+    if fitted is None:
+        return FittedRun.failed(run, reading, Status.NOT_DETERMINED)
+    zero = forcing.level(reading.yaw, fit.zero)
+    noise, failure = noise_and_failure(reading, fitted, zero, sensor)
     if failure is not None:
         return FittedRun.failed(run, reading, failure)
     variance = noise.std**2 * noise.slow_ratio
     covariance = decay_covariance_of(fitted) * variance
-    windows = fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles_per_window)
-    estimate = describe_run(
-        run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
+    windows = (
+        () if forcing.driven else fit_windows(reading, fitted.decay, zero, noise, cycles=cycles_per_window)
     )
-    found = fitted if estimate.identified else None
-    return FittedRun(reading, found, noise, estimate)
+    estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise, windows=windows)
+    if not estimate.identified:
+        return FittedRun(reading, None, noise, estimate)
+    return FittedRun(reading, fitted, noise, estimate, _gained(run, reading, fit, variance))
 
 
-def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
-    """The least-squares fit of a run by itself; None where it finds no decay of positive stiffness."""
-    if start.omega_d > 0.0:
+def _gained(run: Run, reading: Reading, fit: DecayFit, variance: float) -> Gained:
+    sought, fitted = reading.forcing.sought, fit.runs[0]
+    weight = np.zeros((3, 3))
+    size = len(sought)
+    weight[np.ix_(sought, sought)] = eliminate(fit.normal, np.zeros(size + 1), size)[0] / variance
+    coefficients = np.array([fitted.decay.rate, fitted.decay.stiffness, fitted.gain])
+    offset = None
+    if run.drive is not None and run.unrestrained:  # the constant acceleration, over the gain
+        slope = np.array([0.0, -fit.zero / fitted.gain**2, 1.0 / fitted.gain])
+        std = float(np.sqrt(slope @ inverse(fit.normal) @ slope * variance))
+        offset = Quantity(fit.zero / fitted.gain, std, run.drive.kind.unit)
+    return Gained(coefficients, weight, offset)
+
+
+def fit_from(run: Run, reading: Reading, start: Array) -> DecayFit | None:
+    """The least-squares fit of a run by itself; None where it finds no motion that its body can have.
+
+    Args:
+        start: (a, k, g), shape (3,), in SI units.
+    """
+    forcing, decay = reading.forcing, Decay(float(start[0]), float(start[1]))
+    if not forcing.driven and decay.omega_d > 0.0:
         # Block means come close to the optimum at a twentieth of the cost; the final fit uses all samples.
-        thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
+        thin = thinned_reading(run.record, decay.omega_d / (2.0 * np.pi))
         if thin.time.size <= run.record.time_s.size // 4:
-            near = fit_run(thin, start, tolerance=_NEAR)
-            start = near.runs[0].decay if near.converged else start
-    fit = fit_run(reading, start)
-    return fit if fit.converged and fit.runs[0].decay.stiffness > 0.0 else None
+            near = fit_run(thin, decay, tolerance=_NEAR)
+            if near.converged:
+                start = np.array([near.runs[0].decay.rate, near.runs[0].decay.stiffness])
+    fit = fit_decays([reading], [forcing.link], start[forcing.sought])
+    return fit if fit.converged and forcing.admits(fit.runs[0].decay, reading.time) else None
 
 
 def residuals_of(
@@ -125,7 +183,7 @@ def residuals_of(
             rate, angle = float(np.std(np.gradient(motion, reading.time))), float(np.std(motion))
             omega = max(rate, 1e-300) / max(angle, 1e-300)
         interval = float(reading.time[-1] - reading.time[0]) / (reading.time.size - 1)
-        peak = float(np.abs(reading.yaw - zero).max())
+        peak = float(np.abs(reading.yaw - reading.forcing.level(reading.yaw, zero)).max())
         residuals.append(Residual(run.residual, eighth_of_a_cycle(omega, interval), unknowns, peak))
     return residuals
 
@@ -269,7 +327,7 @@ def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> Residual
     None where the least squares do not converge to a decay that the record determines.
     """
     reading = Reading.from_record(run.record)
-    fit = fit_from(run, reading, decay)
+    fit = fit_from(run, reading, np.array([decay.rate, decay.stiffness]))
     if fit is None:
         return None
     noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles
 
 _WINDOW = 0.12  # of the time between reversals, on both sides of one: the motion is a parabola there
 _FEWEST = 2  # samples on either side
@@ -40,13 +41,12 @@ class Strokes:
         return np.abs(np.diff(self.angle))
 
 
-def reversals(angle: Array, least: float) -> NDArray[np.int64]:
+def reversals(angle: Angles, least: float) -> NDArray[np.int64]:
     """Indices of the extremes between which a motion travels far enough, shape (k,).
 
     The ends of the record do not count: the body need not be at rest there.
 
     Args:
-        angle: rad, shape (n,).
         least: travel that makes a stroke, rad.
     """
     places, low, high, upward = [], 0, 0, 0

@@ -25,6 +25,7 @@ from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.shapes import PerParameter
 
 _Relative = Annotated[
     float,
@@ -168,11 +169,10 @@ class Budget:
 
     Args:
         names: of p quantities: the estimate's parameters, and ``wind_off_inertia``.
-        values: shape (p,).
     """
 
     names: tuple[str, ...]
-    values: Array
+    values: PerParameter
     components: tuple[Component, ...] = ()
 
     @property

@@ -20,9 +20,9 @@ from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import Design, build_design, derivatives, has_size
 from identification.campaign.repeatability import moves_of
 from identification.estimate import PARAMETERS
-from identification.signal.decay_fit import information_at
-from identification.signal.driven_fit import normal_equations
+from identification.signal.decay_fit import Reading, information_at, run_at, shared_system
 from identification.signal.filter import discretised, steady_filters
+from identification.signal.forcing import State
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
 from tunnel_sim.vocabulary.between_runs import SCATTERED
@@ -189,7 +189,6 @@ def campaign_bound(
                 remedy = "state release_angle or initial_states"
                 raise TunnelError("no initial state", where=f"run {run.id}", remedy=remedy)
         states = [(run.release_angle or 0.0, 0.0) for run in runs]
-    own = np.array([(0.0, angle, rate) for angle, rate in states])
     drifting = any(run.unrestrained for run in runs)
     filters = None
     if random_moments is not None:
@@ -206,7 +205,19 @@ def campaign_bound(
         filters = [(numerator * np.sqrt(variance / spread), poles) for numerator, poles, spread in steady]
     links, priors = _with_deviations(runs, linked, parameters, repeatability)
     values = np.concatenate((parameters, np.zeros(priors.size)))
-    normal = normal_equations(runs, links, values, own, own_zeros=drifting, filters=filters)[1]
+    fits = []
+    for i, (run, link, initial) in enumerate(zip(runs, links, states, strict=True)):
+        reading = Reading.from_run(run, 0)
+        decay, gain = reading.forcing.at(link @ values)
+        rows = reading.forcing.rows(reading.time, decay)
+        if filters is not None:
+            from scipy.signal import lfilter  # only here: slow to load
+
+            rows = np.asarray(lfilter(*filters[i], rows, axis=1))
+        fits.append(
+            run_at(reading.forcing, State(decay, 0.0, *initial, gain), rows, np.zeros(reading.time.size))
+        )
+    normal = shared_system(fits, links, "own" if drifting else "shared", values)[0]
     places = linked.size + np.arange(priors.size)
     normal[places, places] += noise_std**2 * priors
     information, _ = eliminate(normal, np.zeros(len(normal)), design.size)

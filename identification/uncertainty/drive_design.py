@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from identification.uncertainty.cramer_rao import CampaignBound, campaign_bound
 from tunnel_sim.files.plan_drive import DriveTable, check_drive
 from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, plan_from

@@ -117,7 +117,8 @@ static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* 
   const mjtNum drive = self->drive < 0 ? 0 : drive_at(m, self, state, at->time);
   const int on_end = given(m, self->drive_on_end);
   const mjtNum root = on_end && drive != 0 && p->spring_stiffness > 0 ? drive / p->spring_stiffness : 0;
-  vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at, root)};
+  vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at, root),
+                     vwt_load(p, at->angle, on_end ? 0 : drive)};
   if (self->drive >= 0) {
     *(on_end ? &law.mechanism : &law.air) += drive;
   }
@@ -175,13 +176,13 @@ static mjtNum friction(const mjModel* m, const mjData* d, vwt_instance* instance
   if (p->presliding > 0) {
     const mjtNum range = vwt_presliding_range(p, inertia, m->opt.timestep);
     const mjtNum least = vwt_friction_least_rate(p, inertia, m->opt.timestep);
-    return -deflection_at(state, range, now) / range * vwt_friction_level(p, least, fabs(now->rate));
+    return -deflection_at(state, range, now) / range * vwt_friction_level(p, least, fabs(now->rate), present.load);
   }
   const vwt_motion start = start_motion(state, now);
   const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
   const vwt_moments law = moments_at_start(m, d, instance, p, state, &start, now, present);
   const mjtNum other = other_moment(m, self, p, law, &start) + applied;
-  return vwt_friction_moment(p, inertia, start.rate, other, m->opt.timestep, now->rate);
+  return vwt_friction_moment(p, inertia, start.rate, other, law.load, m->opt.timestep, now->rate, present.load);
 }
 
 void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, const vwt_state* state) {
@@ -191,7 +192,7 @@ void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, cons
   const vwt_motion now = present_motion(m, d, self);
   const vwt_moments law = moments_at(m, d, self, &p, state, &now);
   mjtNum mechanism = law.mechanism;
-  if (p.friction_moment > 0) {
+  if (vwt_rubs(&p)) {
     mechanism += friction(m, d, instance, &p, state, &now, law);
   }
   d->qfrc_passive[self->dof] += law.air + mechanism;

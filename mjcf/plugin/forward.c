@@ -73,6 +73,11 @@ static double air_at(const Step* s, double duration, const Motion* y) {
   return vwt_air_moment(s->p, &air) + drive_at(s, time, 0) + ambient_at(s->run, time);
 }
 
+// The moment that the joint carries, on which friction may depend, N m.
+static double load_at(const Step* s, double time, const Motion* y) {
+  return s->p->friction_load != 0 ? vwt_load(s->p, y->angle, drive_at(s, time, 0)) : 0;
+}
+
 // The moment stated as an expression.
 static double stated_moment(const Step* s, double time, const Motion* y) {
   const vwt_program program = {s->run->program, (int)s->run->program_count};
@@ -106,8 +111,8 @@ static Motion derivative(const Step* s, double duration, const Motion* y) {
   const int coulomb = !(s->range > 0);
   const double along = coulomb ? s->slip * y->rate : fabs(y->rate);
   const double friction = (coulomb ? -s->slip : -deflection_at(s, duration, y) / s->range) *
-                          vwt_friction_level(p, s->least_rate, along);
-  const int stuck = coulomb && p->friction_moment > 0 && s->slip == 0;
+                          vwt_friction_level(p, s->least_rate, along, load_at(s, time, y));
+  const int stuck = coulomb && vwt_rubs(p) && s->slip == 0;
   Motion d = {y->rate, 0, y->twist_rate, 0};
   if (s->run->twist_stiffness > 0) {
     const double share = s->run->inertia_share;
@@ -157,7 +162,8 @@ static void move(Step* s, double h, const Motion* to) {
 // Sign of the slip that starts from rest in the present state; 0 while friction sticks.
 static int slip_from_rest(const Step* s) {
   const double other = other_moment(s, air_at(s, 0, &s->from), s->start, &s->from);
-  return fabs(other) <= vwt_friction_level(s->p, s->least_rate, 0) ? 0 : other > 0 ? 1 : -1;
+  const double limit = vwt_friction_level(s->p, s->least_rate, 0, load_at(s, s->start, &s->from));
+  return fabs(other) <= limit ? 0 : other > 0 ? 1 : -1;
 }
 
 // Length of the step after which the rate is zero, by Newton's method on repeated steps, kept between a length with
@@ -307,7 +313,7 @@ static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle,
   LagWeights weights = {{0}, {{0}}, 0};
   Step s = vwt_release(p, run, &weights);
   const int samples = (int)run->samples, steps = (int)run->steps;
-  const int coulomb = p->friction_moment > 0 && !(p->presliding > 0);
+  const int coulomb = vwt_rubs(p) && !(p->presliding > 0);
   if (p->presliding > 0) {
     const double share = run->twist_stiffness > 0 ? run->inertia_share : 1;
     s.range = vwt_presliding_range(p, share * p->yaw_inertia, run->step);

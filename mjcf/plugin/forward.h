@@ -94,6 +94,7 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
   X(friction_saturation)   /* rad/s, that acts */                                      \
   X(friction_peak_rate)    /* rad/s, that acts */                                      \
   X(friction_peak)                                                                    \
+  X(friction_load)                                                                    \
   X(lag)                   /* s */                                                     \
   X(turn)                  /* rad/s, of the shedding */                                \
   X(pace)                  /* ln of the step in s; by it the motion of the law itself */ \
@@ -117,8 +118,8 @@ VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_ru
 // the run's `winds`, m/s, shape (VWT_MOST_WINDS at most, wind_count). With weights of the ends of an interval between
 // samples, by run, shape (4, weighed) for its first and last angle and its first and last rate, the derivatives are
 // those of the weighted sums instead, shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all
-// intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain or its friction is
-// a root of the rate.
+// intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain, or its friction is
+// a root of the rate or depends on the load.
 VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
                        const double* const* winds, const double* const* weights, int weighed, double* const* angle,
                        double* const* rate, double* const* angle_slopes, double* const* rate_slopes);

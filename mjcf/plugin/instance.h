@@ -46,9 +46,10 @@ typedef struct {
   double time, angle, rate, twist, twist_rate;
 } vwt_motion;
 
-// The moments of the law, the drive and the surroundings except friction, N m: on the body, and on the rod's upper end.
+// The moments of the law, the drive and the surroundings except friction, N m: on the body, and on the rod's upper end;
+// and what the joint carries, on which friction may depend.
 typedef struct {
-  double air, mechanism;
+  double air, mechanism, load;
 } vwt_moments;
 
 typedef struct {

@@ -1,5 +1,5 @@
 // Plain runs integrated side by side, which keeps a processor's arithmetic units busy: the steps of one run wait for
-// each other, those of several do not. Every operation is that of forward.c and moment.c in the same order, so that
+// each other, those of several do not. Every operation is that of forward.c in the same order, so that
 // a run has the same bits in any company, and as an only run of forward.c.
 
 #include <math.h>
@@ -18,14 +18,14 @@ int vwt_alike(const vwt_run* one, const vwt_run* other) {
 }
 
 // The motion after a step.
-INLINE void runge_kutta(const Coefficients* c, const State* s, int features, Lane* angle, Lane* rate) {
+INLINE void runge_kutta(const Lanes* c, const State* s, int features, Lane* angle, Lane* rate) {
   const Lane h = c->whole_step, half = c->half_step, none = {0};
   const int sheds = features & SHEDDING, lags = features & LAG;
-  Lane shed = sheds ? shed_at(c, s->start) : none;
+  Lane shed = sheds ? shed_at(&c->law, s->start) : none;
   Air air = air_at(c, features, s->start);
   const Lane a1 = acceleration_at(c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
   const Lane y2 = s->angle + half * s->rate, r2 = s->rate + half * a1;
-  shed = sheds ? shed_at(c, s->start + half) : none;
+  shed = sheds ? shed_at(&c->law, s->start + half) : none;
   air = air_at(c, features, s->start + half);
   Lane lagged = lags ? lagged_at(c, s, c->half, half, y2, r2) : none;
   const Lane a2 = acceleration_at(c, &air, s->slip, features, y2, r2, shed, lagged);
@@ -33,7 +33,7 @@ INLINE void runge_kutta(const Coefficients* c, const State* s, int features, Lan
   lagged = lags ? lagged_at(c, s, c->half, half, y3, r3) : none;
   const Lane a3 = acceleration_at(c, &air, s->slip, features, y3, r3, shed, lagged);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
-  shed = sheds ? shed_at(c, s->start + h) : none;
+  shed = sheds ? shed_at(&c->law, s->start + h) : none;
   air = air_at(c, features, s->start + h);
   lagged = lags ? lagged_at(c, s, c->whole, h, y4, r4) : none;
   const Lane a4 = acceleration_at(c, &air, s->slip, features, y4, r4, shed, lagged);
@@ -41,7 +41,7 @@ INLINE void runge_kutta(const Coefficients* c, const State* s, int features, Lan
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }
 
-INLINE void step(const Coefficients* c, State* s, int features, Step* alone) {
+INLINE void step(const Lanes* c, State* s, int features, Step* alone) {
   const State before = *s;
   runge_kutta(c, &before, features, &s->angle, &s->rate);
   if (features & LAG) {
@@ -67,7 +67,7 @@ INLINE void step(const Coefficients* c, State* s, int features, Step* alone) {
 }
 
 // Samples within a step, as vwt_fill.
-INLINE void fill(const Coefficients* c, const State* from, const State* to, int stride, int at, int samples,
+INLINE void fill(const Lanes* c, const State* from, const State* to, int stride, int at, int samples,
                  double* const* angle, double* const* rate) {
   const Lane h = c->whole_step, change = to->angle - from->angle;
   const Lane c1 = h * from->rate;
@@ -84,7 +84,7 @@ INLINE void fill(const Coefficients* c, const State* from, const State* to, int 
   }
 }
 
-INLINE int integrate(const Coefficients* c, State* s, int features, int count, Step* alone,
+INLINE int integrate(const Lanes* c, State* s, int features, int count, Step* alone,
                             const vwt_run* like, double* const* angle, double* const* rate) {
   const int samples = (int)like->samples, steps = (int)like->steps;
   const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
@@ -116,12 +116,12 @@ INLINE int integrate(const Coefficients* c, State* s, int features, int count, S
 
 CLONED int vwt_integrate_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs,
                                double* const* angle, double* const* rate) {
-  Coefficients c = {.count = count};
+  Lanes c = {.count = count};
   State s = {.rests = {0}};
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
   Step alone[VWT_LANES];
   release(count, parameters, runs, &c, &s, alone, weights);
   // the law of most runs has none of the features that need a function of the library
-  return c.features == 0 ? integrate(&c, &s, 0, count, alone, runs, angle, rate)
-                         : integrate(&c, &s, c.features, count, alone, runs, angle, rate);
+  return c.law.features == 0 ? integrate(&c, &s, 0, count, alone, runs, angle, rate)
+                         : integrate(&c, &s, c.law.features, count, alone, runs, angle, rate);
 }

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "law.h"
+
 #define X(name, unit, least) #name,
 const char* const vwt_parameter_names[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)};
 #undef X
@@ -12,84 +14,48 @@ const char* const vwt_parameter_units[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)}
 const double vwt_parameter_least[VWT_PARAMETER_COUNT] = {VWT_PARAMETERS(X)};
 #undef X
 
-static const double kTwoPi = 6.283185307179586476925286766559;
-
 double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
   return wind_speed > 0 ? p->aero_lag * p->reference_length / wind_speed : 0;
 }
 
-// x^textbook for x >= 0, or another power of x that equals it at the reference; exponent 0 selects the textbook power.
-static double power(double x, double textbook, double exponent, double reference) {
-  if (exponent == 0 || exponent == textbook) {
+double vwt_power(double x, double textbook, double exponent, double reference) {
+  if (exponent == textbook) {
     return textbook == 2 ? x * x : x * x * x;
   }
   return pow(reference, textbook) * pow(x / reference, exponent);
 }
 
-double vwt_power_of_angle(double x, double textbook, double exponent) {
-  return power(x, textbook, exponent, VWT_ANGLE_REFERENCE);
-}
-
-double vwt_power_of_rate(double x, double exponent) { return power(x, 2, exponent, VWT_RATE_REFERENCE); }
-
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
-  const double speed = s->wind_speed;
-  if (!(speed > 0)) {
+  if (!(s->wind_speed > 0)) {
     return 0;
   }
-  const double flow = 0.5 * p->air_density * speed * p->frontal_area * p->reference_length;
-  const double scale = flow * speed;
-  const double stiffness = scale * p->cn_beta;                   // Ka (paper, eq. 4)
-  const double damping = flow * p->reference_length * p->cn_r;  // Ca (paper, eq. 5)
-  const double lag = p->aero_lag;
-  // A phase lag uses the state x. A phase lead (lag < 0) mirrors x about the angle, b + (b - x), because the
-  // equation of the lag is unstable with a negative time constant.
-  const double angle = lag > 0 ? s->lagged : lag < 0 ? 2 * s->angle - s->lagged : s->angle;
-  double steepening = 1, thickening = 1;
-  if (p->moment_cubic != 0) {
-    steepening += p->moment_cubic * vwt_power_of_angle(fabs(s->angle), 2, p->moment_cubic_exponent);
-  }
-  if (p->damping_quadratic != 0) {
-    thickening += p->damping_quadratic * vwt_power_of_angle(fabs(s->angle), 2, p->damping_quadratic_exponent);
-  }
-  double moment = stiffness * (angle * steepening + p->flow_angle) + damping * thickening * s->rate;
-  if (p->shedding_amplitude != 0 && p->width > 0) {
-    const double phase = kTwoPi * p->strouhal_number * speed / p->width * s->time + p->shedding_phase;
-    moment += scale * p->shedding_amplitude * sin(phase);
-  }
-  return moment + scale * s->forcing;
+  Coefficients c;
+  Air air;
+  Powers powers;
+  set_coefficients(&c, 0, p);
+  set_wake(&c, 0, p, s->wind_speed);
+  set_air(&air, 0, p, s->wind_speed);
+  const double shed = shed_at(&c, s->time), forcing = flow_at(p, s->wind_speed) * s->wind_speed * s->forcing;
+  return moment_of_air(&c, &air, ANY, s->angle, s->rate, shed, s->lagged, &powers) + forcing;
 }
 
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate) {
-  const double spring = p->spring_stiffness;
-  double moment = 0;
-  if (p->quadratic_damping != 0) {
-    const double square = vwt_power_of_rate(fabs(rate), p->quadratic_damping_exponent);
-    moment -= p->quadratic_damping * copysign(square, rate);
-  }
-  if (p->loss_factor != 0) {
-    moment -= p->loss_factor * sqrt(spring * p->yaw_inertia) * rate;  // eta Kr/wn, wn of the rig at rest
-  }
-  if (p->stiffness_cubic != 0) {
-    const double cube = vwt_power_of_angle(fabs(deflection), 3, p->stiffness_cubic_exponent);
-    moment -= spring * p->stiffness_cubic * copysign(cube, deflection);
-  }
-  if (p->stiffness_quadratic != 0) {
-    const double square = vwt_power_of_angle(fabs(deflection), 2, p->stiffness_quadratic_exponent);
-    moment -= spring * p->stiffness_quadratic * square;
-  }
-  if (p->free_play > 0) {  // cancels the linear spring inside the dead zone
-    const double gap = p->free_play;
-    moment += spring * (deflection > gap ? gap : deflection < -gap ? -gap : deflection);
-  }
-  if (p->gravity_stiffness != 0) {
-    moment -= p->gravity_stiffness * sin(angle - p->gravity_angle);
-  }
-  return moment;
+  Coefficients c;
+  Powers powers;
+  set_coefficients(&c, 0, p);
+  return moment_of_mechanism(&c, ANY, angle, deflection, rate, &powers);
 }
 
-double vwt_friction_level(const vwt_parameters* p, double least, double along) {
-  double level = p->friction_moment;
+double vwt_load(const vwt_parameters* p, double angle, double drive) {
+  if (p->friction_load == 0) {
+    return 0;
+  }
+  const double gravity = p->gravity_stiffness * sin(angle - p->gravity_angle);
+  return fmax(fabs(gravity + p->load_stiffness * sin(angle - p->load_angle)), fabs(drive));
+}
+
+double vwt_friction_level(const vwt_parameters* p, double least, double along, double load) {
+  double level = p->friction_moment + p->friction_load * load;
   if (p->friction_exponent != 0) {
     level *= pow(fabs(along) / VWT_RATE_REFERENCE, p->friction_exponent);
   }
@@ -130,17 +96,22 @@ void vwt_friction_slopes(const vwt_parameters* p, double least, double along, do
   slopes[4] = level * power * turn * shape;
 }
 
-double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
-  return p->friction_moment * (1 + p->friction_peak) * duration / inertia;  // 1 rad in a step
+// Under the greatest load of gravity.
+static double greatest_friction(const vwt_parameters* p) {
+  return p->friction_moment + p->friction_load * (fabs(p->gravity_stiffness) + fabs(p->load_stiffness));
 }
 
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration,
-                           double now) {
-  if (!(p->friction_moment > 0)) {
+double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration) {
+  return greatest_friction(p) * (1 + p->friction_peak) * duration / inertia;  // 1 rad in a step
+}
+
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double load,
+                           double duration, double now, double load_now) {
+  if (!vwt_rubs(p)) {
     return 0;
   }
-  const double least = vwt_friction_least_rate(p, inertia, duration), limit = vwt_friction_level(p, least, 0);
-  const double level = vwt_friction_level(p, least, fabs(now));
+  const double least = vwt_friction_least_rate(p, inertia, duration), limit = vwt_friction_level(p, least, 0, load);
+  const double level = vwt_friction_level(p, least, fabs(now), load_now);
   if (limit == 0) {  // it vanishes where the rate does, and needs no care there
     return -copysign(level, now);
   }
@@ -149,7 +120,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
   if (rate == 0) {
     return fabs(other) <= limit ? -other : other > 0 ? -level : level;
   }
-  const double start = vwt_friction_level(p, least, fabs(rate));
+  const double start = vwt_friction_level(p, least, fabs(rate), load);
   const double slip = rate > 0 ? -start : start;
   const double acceleration = (other + slip) / inertia;
   const double stop = -rate / acceleration;  // time at which the rate passes zero
@@ -163,7 +134,7 @@ double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate,
 }
 
 double vwt_presliding_range(const vwt_parameters* p, double inertia, double duration) {
-  return fmax(p->presliding, p->friction_moment * duration * duration / (2 * inertia));  // 2 rad in a step
+  return fmax(p->presliding, greatest_friction(p) * duration * duration / (2 * inertia));  // 2 rad in a step
 }
 
 // Deflection after a motion over `distance` in the direction `side`, 1 or -1.

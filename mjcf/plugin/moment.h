@@ -38,6 +38,9 @@ extern "C" {
   X(friction_saturation, "rad/s", 0)             \
   X(friction_peak, "1", 0)                       \
   X(friction_peak_rate, "rad/s", 0)              \
+  X(friction_load, "1", 0)                       \
+  X(load_stiffness, "N m/rad", -VWT_ANY)         \
+  X(load_angle, "rad", -VWT_ANY)                 \
   X(quadratic_damping, "N m s2/rad2", -VWT_ANY)  \
   X(quadratic_damping_exponent, "1", 0)          \
   X(loss_factor, "1", -VWT_ANY)                  \
@@ -85,12 +88,10 @@ typedef struct {
 // Time constant of the aerodynamic lag, s (a l/V); 0 without lag, negative for a phase lead.
 double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 
-// x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at 0.2 rad; x^2, or another power that
-// equals it at 2 rad/s. An exponent of 0 selects the textbook power.
+// x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at the reference.
 #define VWT_ANGLE_REFERENCE 0.2  // rad
 #define VWT_RATE_REFERENCE 2.0   // rad/s
-double vwt_power_of_angle(double x, double textbook, double exponent);
-double vwt_power_of_rate(double x, double exponent);
+double vwt_power(double x, double textbook, double exponent, double reference);
 
 // Aerodynamic yaw moment on the body, N m.
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
@@ -99,11 +100,19 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
 // -spring_stiffness*deflection - mechanical_damping*rate. The spring's deflection is the angle less that of its root.
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate);
 
+static inline int vwt_rubs(const vwt_parameters* p) { return p->friction_moment > 0 || p->friction_load > 0; }
+
+// The moment that the joint carries, N m: the greater of gravity's and the drive's, which act on its two sides. Gravity
+// is that of the law, and that of load_stiffness sin(angle - load_angle), which acts in another part of the model. 0
+// where friction does not depend on it.
+double vwt_load(const vwt_parameters* p, double angle, double drive);
+
 // Moment of the friction, N m, against a slip at a rate of `along` rad/s in its own direction:
-// friction_moment (along/2)^n tanh(along/v0) (1 + b exp(-(along/vs)^2)), with the exponent n, the saturation v0, the peak
-// b and the peak_rate vs; a factor whose parameter is zero is one. v0 and vs are at least `least`, from
-// `vwt_friction_least_rate`, so that friction does not change by more than the integration with steps of `duration` s follows.
-double vwt_friction_level(const vwt_parameters* p, double least, double along);
+// (friction_moment + friction_load load) (along/2)^n tanh(along/v0) (1 + b exp(-(along/vs)^2)), with the exponent n, the
+// saturation v0, the peak b and the peak_rate vs; a factor whose parameter is zero is one. v0 and vs are at least `least`,
+// from `vwt_friction_least_rate`, so that friction does not change by more than the integration with steps of `duration` s
+// follows.
+double vwt_friction_level(const vwt_parameters* p, double least, double along, double load);
 // Its derivatives by `along`, by its exponent, and by the saturation and the peak rate that act, which are those above
 // `least`, and by the peak, in this order.
 void vwt_friction_slopes(const vwt_parameters* p, double least, double along, double slopes[5]);
@@ -111,9 +120,10 @@ double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double d
 
 // Coulomb friction in a step of `duration` s, N m. It opposes the rate. Where the rate would pass zero within the step, it
 // is the constant moment with the same impulse: friction reverses there or sticks, depending on the other moments.
-// `rate` and `other`, the sum of all other moments, are taken at the start of the step, `now` is the present rate.
-double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double duration,
-                           double now);
+// `rate`, `other`, the sum of all other moments, and `load` are taken at the start of the step, `now` and `load_now` are
+// the present rate and load.
+double vwt_friction_moment(const vwt_parameters* p, double inertia, double rate, double other, double load,
+                           double duration, double now, double load_now);
 
 // Range zs of Dahl's friction, rad, which replaces Coulomb friction where `presliding` is not zero:
 // -friction_moment z/zs, where the deflection z follows dz = dangle - |dangle| z/zs. The range is limited from below so

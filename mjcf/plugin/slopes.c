@@ -55,7 +55,7 @@ INLINE Row row_of(const Stage at[4], const LagSlopes* half, const LagSlopes* who
 // The motion after a step without a reversal, and the change there; arithmetic of the motion as in lanes.c.
 INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane middle, const LagSlopes* half,
                     const LagSlopes* whole, int width, const int* columns, Change* change, Lane* angle, Lane* rate) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   const int lags = features & LAG;
   Stage at[4];
   const Lane a1 = evaluate(law, s->slip, features, s->start, s->angle, s->rate, s->lagged, &at[0]);
@@ -156,7 +156,7 @@ typedef struct {
 
 INLINE void step(const Law* law, const Asked* asked, State* s, int features, Step* alone, Passage* passages,
                  Change* change) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   const State before = *s;
   Change old;
   for (int i = 0; c->rubs && i < asked->width; i++) {
@@ -220,10 +220,10 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
     out->rate[i] = change->rate[i];
   }
   if (asked->pace >= 0) {
-    const Lane none = {0}, shed = features & SHEDDING ? shed_at(law->c, s->start) : none;
+    const Lane none = {0}, shed = features & SHEDDING ? shed_at(&law->c->law, s->start) : none;
     const Air air = air_at(law->c, features, s->start);
     const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
-    const Mask rests = (law->c->friction > 0) & (s->rate == 0);
+    const Mask rests = law->c->dry & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);
   }
@@ -272,17 +272,21 @@ INLINE void between(Lane h, double u, Lane angle0, Lane rate0, Lane angle1, Lane
   *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
 }
 
-// Whether a run's motion has derivatives: friction as a root of the rate is infinitely steep at a reversal.
+// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, and
+// friction that depends on the load has none by gravity's terms.
 static int is_smooth(const vwt_parameters* p) {
-  return !(p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1);
+  const int root = p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1;
+  return !root && p->friction_load == 0;
 }
 
 // Whether a term of one lane has a derivative.
-static int exists(const Coefficients* c, int k, int term) {
-  const vwt_parameters* p = c->p[k];
+static int exists(const Lanes* c, int k, int term) {
+  const vwt_parameters* p = c->law.p[k];
   switch (term) {
     case VWT_TERM_friction:
       return p->friction_moment > 0;
+    case VWT_TERM_friction_load:  // exists on one side only
+      return 0;
     case VWT_TERM_friction_exponent:
       return p->friction_moment > 0 && p->friction_exponent >= 1;
     case VWT_TERM_friction_saturation:
@@ -293,12 +297,12 @@ static int exists(const Coefficients* c, int k, int term) {
     case VWT_TERM_shedding_sine:
     case VWT_TERM_shedding_cosine:
     case VWT_TERM_turn:
-      return c->shedding[k] != 0;
+      return c->law.shedding[k] != 0;
     case VWT_TERM_seen:
-      return c->lag[k] != 0 || is_sampled(c, k);
+      return c->law.lag[k] != 0 || is_sampled(c, k);
     case VWT_TERM_lag:
     case VWT_TERM_start_lagged:
-      return c->lag[k] != 0;
+      return c->law.lag[k] != 0;
     case VWT_TERM_air_rate:
       return is_sampled(c, k);
     default:
@@ -308,7 +312,7 @@ static int exists(const Coefficients* c, int k, int term) {
 
 INLINE int integrate(const Law* law, const Asked* asked, State* s, int features, Step* alone, Passage* passages,
                      const vwt_run* like, const Out* out) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   const int samples = out->samples, steps = (int)like->steps, width = asked->width;
   const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
   Change change;
@@ -370,7 +374,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
 
 CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width,
                                   const int* columns, const double* const* winds, const Out* out) {
-  Coefficients c = {.count = count};
+  Lanes c = {.count = count};
   State s = {.rests = {0}};
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
   Step alone[VWT_LANES];
@@ -422,7 +426,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
 
 void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values) {
   for (int i = 0; i < count; i += VWT_LANES) {
-    Coefficients c = {.count = 1};
+    Lanes c = {.count = 1};
     for (int k = 0; k < VWT_LANES; k++) {
       const int at = i + k < count ? i + k : i;
       set_lane(&c, k, &parameters[at], &runs[at]);

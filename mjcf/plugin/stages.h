@@ -10,7 +10,7 @@
 // Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law; also
 // the changes of a wind of samples.
 typedef struct {
-  const Coefficients* c;
+  const Lanes* c;
   int features;
   const double* winds[VWT_LANES];
   Lane inverse;
@@ -43,7 +43,7 @@ typedef struct {
   Lane angle[VWT_MOST_COLUMNS], rate[VWT_MOST_COLUMNS], lagged[VWT_MOST_COLUMNS];
 } Change;
 
-static int is_sampled(const Coefficients* c, int k) { return c->run[k]->wind_count > 1; }
+static int is_sampled(const Lanes* c, int k) { return c->run[k]->wind_count > 1; }
 
 // What the air's stiffness and damping have in common with those at any other speed, kg/m; times the model's length.
 static double flow_of(const vwt_parameters* p) {
@@ -52,10 +52,10 @@ static double flow_of(const vwt_parameters* p) {
 
 static double acting(double exponent, double textbook) { return exponent != 0 ? exponent : textbook; }
 
-static Law law_of(const Coefficients* c) {
-  Law law = {.c = c, .features = c->features, .inverse = 1 / c->inertia};
+static Law law_of(const Lanes* c) {
+  Law law = {.c = c, .features = c->law.features, .inverse = 1 / c->inertia};
   for (int k = 0; k < VWT_LANES; k++) {
-    const vwt_parameters* p = c->p[k];
+    const vwt_parameters* p = c->law.p[k];
     const double body = c->body[k];
     law.steepening[k] = acting(p->moment_cubic_exponent, 2);
     law.thickening[k] = acting(p->damping_quadratic_exponent, 2);
@@ -73,13 +73,13 @@ static Law law_of(const Coefficients* c) {
   return law;
 }
 
-INLINE LagSlopes lag_slopes(const Coefficients* c, Lane duration) {
+INLINE LagSlopes lag_slopes(const Lanes* c, Lane duration) {
   LagSlopes out = {0};
   for (int k = 0; k < VWT_LANES; k++) {
-    if (c->lag[k] == 0) {
+    if (c->law.lag[k] == 0) {
       continue;
     }
-    const double time = fabs(c->lag[k]), h = duration[k], z = h / time;
+    const double time = fabs(c->law.lag[k]), h = duration[k], z = h / time;
     double* w = out.w[k];
     double slopes[4];
     vwt_lag_weights(z, w);
@@ -90,14 +90,14 @@ INLINE LagSlopes lag_slopes(const Coefficients* c, Lane duration) {
     out.angle1[k] = c->body[k] * (3 * w[2] - 2 * w[3]);
     out.rate1[k] = c->body[k] * h * (w[3] - w[2]);
     for (int n = 0; n < 4; n++) {
-      out.weights[n][k] = -slopes[n] * z / c->lag[k];  // dz/dlag, whose sign is that of a lead too
+      out.weights[n][k] = -slopes[n] * z / c->law.lag[k];  // dz/dlag, whose sign is that of a lead too
     }
   }
   return out;
 }
 
 // The derivative of the lag's state by the lag, over a path from the step's start.
-INLINE Lane by_lag(const Coefficients* c, const State* s, const LagSlopes* l, Lane h, Lane angle, Lane rate) {
+INLINE Lane by_lag(const Lanes* c, const State* s, const LagSlopes* l, Lane h, Lane angle, Lane rate) {
   const Lane change = c->body * (angle - s->angle), rate0 = c->body * s->rate, rate1 = c->body * rate;
   return l->weights[0] * (c->body * s->angle - s->lagged) + l->weights[1] * h * rate0 +
          l->weights[2] * (3 * change - h * (2 * rate0 + rate1)) +
@@ -111,7 +111,7 @@ INLINE Lane steepness(Lane power, Lane x, Lane exponent) {
 
 // The derivative of the friction's level by the rate in its own direction, and what belongs to its form.
 INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   Lane by_rate = {0};
   if (!(law->features & RATE)) {
     at->level = (Lane){0} + 1;
@@ -121,9 +121,9 @@ INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
     const double along = slip[k] * at->rate[k], moment = c->friction[k];
     double slopes[5] = {0};
     if (moment > 0 && slip[k] != 0) {
-      vwt_friction_slopes(c->p[k], c->least_rate[k], along, slopes);
+      vwt_friction_slopes(c->law.p[k], c->least_rate[k], along, slopes);
     }
-    at->level[k] = moment > 0 ? vwt_friction_level(c->p[k], c->least_rate[k], along) / moment : 1;
+    at->level[k] = moment > 0 ? vwt_friction_level(c->law.p[k], c->least_rate[k], along, 0) / moment : 1;
     by_rate[k] = slopes[0];
     for (int n = 0; n < 4; n++) {
       at->by_friction[n][k] = -slip[k] * slopes[n + 1] * law->inverse[k];
@@ -134,7 +134,7 @@ INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
 
 // The wind's speed at a stage, and the derivative of the acceleration by it.
 INLINE void blow(const Law* law, Stage* at) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   at->speed = at->pressure = (Lane){0} + 1;
   at->by_speed = (Lane){0};
   for (int k = 0; k < VWT_LANES; k++) {
@@ -143,13 +143,13 @@ INLINE void blow(const Law* law, Stage* at) {
     }
     const vwt_run* run = c->run[k];
     const double wind = fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, at->time[k]));
-    const double moment = at->seen[k] * (1 + c->moment_cubic[k] * at->powers.steepening[k]) + c->flow_angle[k];
-    const double loss = (1 + c->damping_quadratic[k] * at->powers.thickening[k]) * c->body[k] * at->rate[k];
-    const double flow = flow_of(c->p[k]), length = c->p[k]->reference_length;
+    const double moment = at->seen[k] * (1 + c->law.moment_cubic[k] * at->powers.steepening[k]) + c->law.flow_angle[k];
+    const double loss = (1 + c->law.damping_quadratic[k] * at->powers.thickening[k]) * c->body[k] * at->rate[k];
+    const double flow = flow_of(c->law.p[k]), length = c->law.p[k]->reference_length;
     at->speed[k] = wind;
     at->pressure[k] = wind * wind;
     at->by_speed[k] = wind > 0 ? law->inverse[k] * c->body[k] * flow *
-                                     (2 * wind * c->p[k]->cn_beta * moment + length * c->p[k]->cn_r * loss)
+                                     (2 * wind * c->law.p[k]->cn_beta * moment + length * c->law.p[k]->cn_r * loss)
                                : 0;
   }
 }
@@ -157,15 +157,16 @@ INLINE void blow(const Law* law, Stage* at) {
 // The acceleration at a stage, and its derivatives by the motion there.
 INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged,
                      Stage* at) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   const Lane none = {0}, body = c->body * angle, size = size_of(body);
   at->angle = angle;
   at->rate = rate;
   at->time = time;
-  at->seen = seen_at(c, features, body, lagged);
+  at->seen = seen_at(&c->law, features, body, lagged);
   at->air = air_at(c, features, time);
   const Air air = at->air;
-  set_powers(c, size, size_of(angle), size_of(rate), features & POWERS, &at->powers);
+  const Lane shed = features & SHEDDING ? shed_at(&c->law, time) : none;
+  const Lane found = acceleration(c, &air, slip, features, angle, rate, shed, lagged, &at->powers);
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
        square = 2 * size_of(angle);
@@ -176,33 +177,32 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     cube = steepness(p->cube, size_of(angle), law->cube);
     square = steepness(p->square, size_of(angle), law->square);
   }
-  const Lane leads = choose(c->lag < 0, 2 * c->body, c->body);
-  const Lane seen_by_angle = features & LAG ? choose(c->lag > 0, none, leads) : c->body;
+  const Lane leads = choose(c->law.lag < 0, 2 * c->body, c->body);
+  const Lane seen_by_angle = features & LAG ? choose(c->law.lag > 0, none, leads) : c->body;
   if (features & WIND) {
     blow(law, at);
   }
-  const Lane steep = air.stiffness * (1 + c->moment_cubic * p->steepening);
+  const Lane steep = air.stiffness * (1 + c->law.moment_cubic * p->steepening);
   Lane by_angle = c->body * (steep * seen_by_angle +
-                             air.stiffness * at->seen * c->moment_cubic * with_sign(steepening, body) * c->body +
-                             air.damping * c->damping_quadratic * with_sign(thickening, body) * c->body *
+                             air.stiffness * at->seen * c->law.moment_cubic * with_sign(steepening, body) * c->body +
+                             air.damping * c->law.damping_quadratic * with_sign(thickening, body) * c->body *
                                  (c->body * rate));
-  by_angle -= c->cubic * cube + c->quadratic * with_sign(square, angle) + c->rod;
-  by_angle -= choose(size_of(angle) < c->free_play, none, c->spring);
+  by_angle -= c->law.cubic * cube + c->law.quadratic * with_sign(square, angle) + c->rod;
+  by_angle -= choose(size_of(angle) < c->law.free_play, none, c->law.spring);
   if (features & GRAVITY) {
     for (int k = 0; k < VWT_LANES; k++) {
-      by_angle[k] -= c->gravity[k] != 0 ? c->gravity[k] * cos(angle[k] - c->gravity_angle[k]) : 0;
+      by_angle[k] -= c->law.gravity[k] != 0 ? c->law.gravity[k] * cos(angle[k] - c->law.gravity_angle[k]) : 0;
     }
   }
-  Lane by_rate = c->body * air.damping * (1 + c->damping_quadratic * p->thickening) * c->body;
-  by_rate -= c->quadratic_damping * turning_rate + c->loss + c->damping + slip * slip * rub(law, slip, at);
+  Lane by_rate = c->body * air.damping * (1 + c->law.damping_quadratic * p->thickening) * c->body;
+  by_rate -= c->law.quadratic_damping * turning_rate + c->law.loss + c->damping + slip * slip * rub(law, slip, at);
   at->by_angle = by_angle * law->inverse;
   at->by_rate = by_rate * law->inverse;
   if (features & LAG) {
-    const Lane side = choose(c->lag > 0, none + 1, choose(c->lag < 0, none - 1, none));
+    const Lane side = choose(c->law.lag > 0, none + 1, choose(c->law.lag < 0, none - 1, none));
     at->by_lagged = side * c->body * steep * law->inverse;
   }
-  const Lane shed = features & SHEDDING ? shed_at(c, time) : none;
-  return acceleration(c, &air, p, slip, features, angle, rate, shed, lagged);
+  return found;
 }
 
 INLINE Lane logarithm(Lane x, double reference) {
@@ -236,7 +236,7 @@ INLINE Lane by_wind(const Law* law, int change, const Stage* at) {
 
 // The derivative of the acceleration at a stage by a term, `features` those of the law.
 INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Stage* at) {
-  const Coefficients* c = law->c;
+  const Lanes* c = law->c;
   const Lane none = {0}, angle = at->angle, rate = at->rate;
   const Powers* p = &at->powers;
   const double quarter = 1.5707963267948966192313216916398;
@@ -264,7 +264,7 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
     case VWT_TERM_square:
       return -p->square;
     case VWT_TERM_play:
-      return taken_up(c, angle);
+      return taken_up(&c->law, angle);
     case VWT_TERM_constant:
       return pressure;
     case VWT_TERM_gravity_sine: {
@@ -284,24 +284,24 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
     case VWT_TERM_friction:
       return -slip * at->level;
     case VWT_TERM_shedding_sine:
-      return sine(at, c->shedding_turn, none, 0);
+      return sine(at, c->law.turn, none, 0);
     case VWT_TERM_shedding_cosine:
-      return sine(at, c->shedding_turn, none, quarter);
+      return sine(at, c->law.turn, none, quarter);
     case VWT_TERM_steepening_exponent:
-      return law->inverse * c->body * at->air.stiffness * c->moment_cubic * at->seen * p->steepening *
+      return law->inverse * c->body * at->air.stiffness * c->law.moment_cubic * at->seen * p->steepening *
              logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_thickening_exponent:
-      return law->inverse * c->body * c->body * at->air.damping * c->damping_quadratic * rate * p->thickening *
+      return law->inverse * c->body * c->body * at->air.damping * c->law.damping_quadratic * rate * p->thickening *
              logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_rate_exponent:
-      return -law->inverse * c->quadratic_damping * with_sign(p->rate, rate) *
+      return -law->inverse * c->law.quadratic_damping * with_sign(p->rate, rate) *
              logarithm(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_cube_exponent:
-      return -law->inverse * c->cubic * with_sign(p->cube, angle) * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.cubic * with_sign(p->cube, angle) * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_square_exponent:
-      return -law->inverse * c->quadratic * p->square * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.quadratic * p->square * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_gap:
-      return choose(size_of(angle) > c->free_play, with_sign(law->inverse * c->spring, angle), none);
+      return choose(size_of(angle) > c->law.free_play, with_sign(law->inverse * c->law.spring, angle), none);
     case VWT_TERM_friction_exponent:
       return law->features & RATE ? at->by_friction[0]
                                   : -slip * law->inverse * c->friction * logarithm(size_of(rate), VWT_RATE_REFERENCE);
@@ -314,7 +314,7 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
     case VWT_TERM_lag:
       return at->by_lag;
     case VWT_TERM_turn:
-      return law->inverse * c->body * c->shedding * at->time * sine(at, c->shedding_turn, c->shedding_phase, quarter);
+      return law->inverse * c->body * c->law.shedding * at->time * sine(at, c->law.turn, c->law.phase, quarter);
     default:  // of the start
       return none;
   }
@@ -322,40 +322,41 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
 
 // The values of the terms of one lane.
 static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
-  const Coefficients* c = law->c;
-  const vwt_parameters* p = c->p[k];
-  const int lags = c->lag[k] != 0, sampled = is_sampled(c, k);
+  const Lanes* c = law->c;
+  const vwt_parameters* p = c->law.p[k];
+  const int lags = c->law.lag[k] != 0, sampled = is_sampled(c, k);
   const double inverse = law->inverse[k], body = c->body[k], flow = flow_of(p);
-  const double air = body * (sampled ? flow * p->cn_beta : c->air_stiffness[k]) * inverse;
-  const double air_rate = body * body * (sampled ? flow * p->reference_length * p->cn_r : c->air_damping[k]) * inverse;
-  out[VWT_TERM_angle] = (c->spring[k] + c->rod[k]) * inverse - (lags || sampled ? 0 : air * body);
-  out[VWT_TERM_rate] = (c->damping[k] + c->loss[k]) * inverse - (sampled ? 0 : air_rate);
+  const double air = body * (sampled ? flow * p->cn_beta : c->air.stiffness[k]) * inverse;
+  const double air_rate = body * body * (sampled ? flow * p->reference_length * p->cn_r : c->air.damping[k]) * inverse;
+  out[VWT_TERM_angle] = (c->law.spring[k] + c->rod[k]) * inverse - (lags || sampled ? 0 : air * body);
+  out[VWT_TERM_rate] = (c->damping[k] + c->law.loss[k]) * inverse - (sampled ? 0 : air_rate);
   out[VWT_TERM_seen] = lags || sampled ? air * body : 0;
   out[VWT_TERM_air_rate] = sampled ? air_rate : 0;
-  out[VWT_TERM_steepening] = air * c->moment_cubic[k] / law->steep[k];
-  out[VWT_TERM_thickening] = air_rate * c->damping_quadratic[k] / law->thick[k];
-  out[VWT_TERM_rate_power] = c->quadratic_damping[k] * inverse;
-  out[VWT_TERM_cube] = c->cubic[k] * inverse;
-  out[VWT_TERM_square] = c->quadratic[k] * inverse;
-  out[VWT_TERM_play] = c->free_play[k] > 0 ? c->spring[k] * inverse : 0;
-  out[VWT_TERM_constant] = air * c->flow_angle[k];
-  out[VWT_TERM_gravity_sine] = c->gravity[k] * inverse * cos(c->gravity_angle[k]);
-  out[VWT_TERM_gravity_cosine] = c->gravity[k] * inverse * sin(c->gravity_angle[k]);
+  out[VWT_TERM_steepening] = air * c->law.moment_cubic[k] / law->steep[k];
+  out[VWT_TERM_thickening] = air_rate * c->law.damping_quadratic[k] / law->thick[k];
+  out[VWT_TERM_rate_power] = c->law.quadratic_damping[k] * inverse;
+  out[VWT_TERM_cube] = c->law.cubic[k] * inverse;
+  out[VWT_TERM_square] = c->law.quadratic[k] * inverse;
+  out[VWT_TERM_play] = c->law.free_play[k] > 0 ? c->law.spring[k] * inverse : 0;
+  out[VWT_TERM_constant] = air * c->law.flow_angle[k];
+  out[VWT_TERM_gravity_sine] = c->law.gravity[k] * inverse * cos(c->law.gravity_angle[k]);
+  out[VWT_TERM_gravity_cosine] = c->law.gravity[k] * inverse * sin(c->law.gravity_angle[k]);
   out[VWT_TERM_friction] = c->friction[k] * inverse;
-  out[VWT_TERM_shedding_sine] = body * c->shedding[k] * inverse * cos(c->shedding_phase[k]);
-  out[VWT_TERM_shedding_cosine] = body * c->shedding[k] * inverse * sin(c->shedding_phase[k]);
+  out[VWT_TERM_shedding_sine] = body * c->law.shedding[k] * inverse * cos(c->law.phase[k]);
+  out[VWT_TERM_shedding_cosine] = body * c->law.shedding[k] * inverse * sin(c->law.phase[k]);
   out[VWT_TERM_steepening_exponent] = law->steepening[k];
   out[VWT_TERM_thickening_exponent] = law->thickening[k];
   out[VWT_TERM_rate_exponent] = law->rate[k];
   out[VWT_TERM_cube_exponent] = law->cube[k];
   out[VWT_TERM_square_exponent] = law->square[k];
-  out[VWT_TERM_gap] = c->free_play[k];
+  out[VWT_TERM_gap] = c->law.free_play[k];
   out[VWT_TERM_friction_exponent] = p->friction_exponent;
   out[VWT_TERM_friction_saturation] = p->friction_saturation != 0 ? fmax(p->friction_saturation, c->least_rate[k]) : 0;
   out[VWT_TERM_friction_peak_rate] = p->friction_peak_rate != 0 ? fmax(p->friction_peak_rate, c->least_rate[k]) : 0;
   out[VWT_TERM_friction_peak] = p->friction_peak;
-  out[VWT_TERM_lag] = c->lag[k];
-  out[VWT_TERM_turn] = c->shedding_turn[k];
+  out[VWT_TERM_friction_load] = p->friction_load;
+  out[VWT_TERM_lag] = c->law.lag[k];
+  out[VWT_TERM_turn] = c->law.turn[k];
   out[VWT_TERM_pace] = log(run->step);
   out[VWT_TERM_start_angle] = run->angle;
   out[VWT_TERM_start_rate] = run->rate;

@@ -75,9 +75,12 @@ class Oracle:
         )
         return moment - self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
 
-    def friction(self, speed: float) -> float:
+    def friction(self, speed: float, angle: float) -> float:
         """Moment against a slip, at a rate without its sign."""
         level, power = self.term("friction_moment"), self.term("friction_exponent")
+        hung = self.term("gravity_stiffness") * sin(angle - self.term("gravity_angle"))
+        hung += self.term("load_stiffness") * sin(angle - self.term("load_angle"))
+        level += self.term("friction_load") * abs(hung)
         if power:
             level *= (speed / 2.0) ** power
         if self.term("friction_saturation"):
@@ -99,7 +102,7 @@ class Oracle:
         """`slip` is the sign of the rate under friction, None at rest."""
         angle, rate, twist, twist_rate, lagged, deflection = state = y.tolist()
         end, body = self.others(t, state)
-        friction, reach, yielding = self.friction(abs(rate)), self.term("presliding"), 0.0
+        friction, reach, yielding = self.friction(abs(rate), angle), self.term("presliding"), 0.0
         share = 1.0  # of the friction's moment, against the slip
         if reach > 0.0 and slip is not None:  # Dahl's: slip is the side to which the motion goes
             share = slip * deflection / reach
@@ -133,14 +136,14 @@ class Oracle:
         self, t: float, y: np.ndarray, stop: float, times: np.ndarray, angle: np.ndarray
     ) -> tuple[float, np.ndarray]:
         """Integrate to `stop` or to the next kink or jump of the law."""
-        friction, play = self.term("friction_moment"), self.term("free_play")
+        friction, play = self.term("friction_moment") + self.term("friction_load"), self.term("free_play")
         slip: int | None = 0
         events = []
         if friction > 0.0:
             rest = self._way_from_rest if self.term("presliding") > 0.0 else self._slip_from_rest
             slip = int(np.sign(y[1])) or rest(t, y)
             if slip is None:
-                events.append(lambda t, y: self.friction(0.0) - abs(self.others(t, y)[0]))
+                events.append(lambda t, y: self.friction(0.0, y[0]) - abs(self.others(t, y)[0]))
                 events[-1].direction = -1
             else:
                 events.append(lambda _, y: y[1])
@@ -167,12 +170,12 @@ class Oracle:
     def _slip_from_rest(self, t: float, y: np.ndarray) -> int | None:
         other = self.others(t, y)[0]
         # just broken away counts as slipping: the event above ends a rest on the edge
-        edge = self.friction(0.0) * (1.0 - 1e-12)
+        edge = self.friction(0.0, y[0]) * (1.0 - 1e-12)
         return None if abs(other) < edge else int(np.sign(other))
 
     def _way_from_rest(self, t: float, y: np.ndarray) -> int:
         end, body = self.others(t, y)
-        end -= self.friction(0.0) * y[5] / self.term("presliding")
+        end -= self.friction(0.0, y[0]) * y[5] / self.term("presliding")
         return 1 if (end if abs(end) > 1e-12 else body) > 0.0 else -1  # from balance it follows the body
 
 

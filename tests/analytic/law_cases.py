@@ -153,8 +153,26 @@ OF_RATE = (
         {"friction_moment": 0.02, "presliding": 0.005, "friction_peak": 1.0, "friction_peak_rate": 0.3},
     ),
 )  # fmt: skip
+LOADED = (
+    Case(
+        "loaded_friction", {"friction_moment": 0.02, "friction_load": 0.1, "gravity_stiffness": 2.0},
+        tolerance=2e-6, forward_tolerance=1e-7,
+    ),
+    Case(
+        "only_loaded_friction", {"friction_load": 0.3, "gravity_stiffness": 1.0, "gravity_angle": 0.4},
+        tolerance=4e-6,
+    ),
+    Case(
+        "loaded_friction_flexible_rod", {"friction_load": 0.1, "load_stiffness": 1.0, "load_angle": 0.4},
+        twist=RodTwist(2e-3, 0.3, 0.02), tolerance=2e-5, forward_tolerance=1e-5,
+    ),
+)  # fmt: skip
 #: Friction that jumps, or rises without bound in its slope, where the rate reverses.
-REVERSING = (*FRICTION, *(c for c in OF_RATE if not {"presliding", "friction_saturation"} & c.terms.keys()))
+REVERSING = (
+    *FRICTION,
+    *LOADED,
+    *(c for c in OF_RATE if not {"presliding", "friction_saturation"} & c.terms.keys()),
+)
 PRESLIDING = (
     Case("presliding", {"friction_moment": 0.02, "presliding": 0.005}),
     Case("wide_presliding", {"friction_moment": 0.4, "presliding": 0.1}),
@@ -171,4 +189,4 @@ PRESLIDING = (
     ),
     Case("presliding_and_lag", {"friction_moment": 0.02, "presliding": 0.005, "aero_lag": 2.0}),
 )  # fmt: skip
-CASES = (*SMOOTH, FREE_PLAY, *FRICTION, *OF_RATE, *PRESLIDING)
+CASES = (*SMOOTH, FREE_PLAY, *FRICTION, *LOADED, *OF_RATE, *PRESLIDING)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tests.marks import slow
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion, simulate_motions

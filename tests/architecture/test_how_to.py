@@ -15,7 +15,7 @@ from identification import estimators
 from tests.architecture.test_readme import BLOCK, HOW_TO, ROOT, assert_same, output_of, sessions, toml_block
 from tests.architecture.test_tutorials import printed, steps
 from tunnel_lab.cli import main
-from tunnel_lab.experiments.score_trials import packaged_baseline
+from tunnel_lab.experiments.score import packaged_baseline
 
 PAGES = HOW_TO
 INDEX = ROOT / "docs" / "README.md"

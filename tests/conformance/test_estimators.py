@@ -54,7 +54,7 @@ whole_campaign = cache(campaign)
 @cache
 def clean_campaign(**options):
     """Six runs without noise."""
-    return campaign(TWELVE[:6], **options)
+    return campaign(TWELVE[:6], rate=500.0, **options)
 
 
 def noisy_campaign():
@@ -284,7 +284,7 @@ PARTIAL = {
 @cache
 def partial_campaign(case):
     settings, options, *_ = PARTIAL[case]
-    return campaign(settings, noise=5e-4, rng=np.random.default_rng(5), **options)
+    return campaign(settings, noise=5e-4, rate=500.0, rng=np.random.default_rng(5), **options)
 
 
 @each_estimator

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import signal
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
-from tunnel_sim import processes
+from tunnel_sim import sandbox
 from tunnel_sim.vocabulary.errors import TunnelError
 
 LIMIT_S = 60.0
@@ -90,9 +92,10 @@ def _close_figures() -> None:
 
 
 def in_fork(
-    work: Callable[[bytes], bytes], given: bytes, *, prepare: Callable[[], None], seconds: float, memory: int
-) -> bytes:
-    """As `processes.in_limited_process` in milliseconds; the work is expected to raise nothing."""
+    work: sandbox.Work, given: dict[str, Any], parts: Sequence[bytes], *, prepare: Callable[[], None],
+    seconds: float, memory: int,
+) -> tuple[dict[str, Any], list[bytes]]:  # fmt: skip
+    """As `sandbox.in_sandbox` in milliseconds; the work is expected to raise nothing but a refusal."""
     prepare()
     ours, theirs = os.pipe()
     child = os.fork()
@@ -100,8 +103,12 @@ def in_fork(
         status = 1
         try:
             warnings.simplefilter("ignore")
-            processes._limit(seconds, memory)
-            os.write(theirs, work(given))
+            sandbox.limit(seconds, memory, files=False)
+            try:
+                answer = {"given": work(given, [*parts])[0]}
+            except TunnelError as error:
+                answer = {"refused": [error.what, error.remedy]}
+            os.write(theirs, json.dumps(answer).encode())
             status = 0
         except MemoryError:
             status = 77
@@ -111,9 +118,12 @@ def in_fork(
             os._exit(status)
     os.close(theirs)
     with os.fdopen(ours, "rb") as stream:
-        answer = stream.read()
+        said = stream.read()
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    assert status != 1, answer.decode()
+    assert status != 1, said.decode()
     if status:
-        raise processes.LimitReached(f"ended its process with {status}")
-    return answer
+        raise sandbox.LimitReached(f"ended its process with {status}")
+    found = json.loads(said)
+    if "refused" in found:
+        raise TunnelError(found["refused"][0], remedy=found["refused"][1])
+    return found["given"], []

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import tempfile
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import polars as pl
@@ -160,17 +158,17 @@ def springs_csv() -> bytes:
 @cache
 def sweep_folder() -> dict[str, bytes]:
     """The files of a sweep of which three shards of twelve are finished."""
-    from tunnel_lab.experiments.sweep import begin, run_shard
-    from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
+    from tunnel_lab.experiments.experiment import begin
+    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep_work import run_shard
 
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "sweep.toml"
         file.write_text(SMALL.replace("records = true", "records = false"), encoding="utf-8")
-        sweep: Sweep = read_sweep(file)
-        store = begin(sweep, Path(name) / "out")
-        with patch.dict(os.environ, OMP_NUM_THREADS="1"):  # a store takes no shard of several threads
-            for index in range(3):
-                store.keep(run_shard(sweep.to_json(), index))
+        sweep = read_sweep(file)
+        store = begin(sweep.experiment, Path(name) / "out")
+        for index in range(3):
+            store.keep(sweep.experiment.name(index), run_shard(sweep, index))
         return {
             str(path.relative_to(store.folder)): path.read_bytes()
             for path in sorted(store.folder.rglob("*"))

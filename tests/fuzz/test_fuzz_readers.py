@@ -105,7 +105,7 @@ def import_file(folder: Path, draw: Draw) -> None:
 
 def _read_log(path: Path, **choices: Any) -> None:
     """Read a file of an instrument; a reader that ends its process by an exception is a finding."""
-    from tunnel_sim.files.importing.conditions import ImportChoices
+    from tunnel_sim.files.importing.choices import ImportChoices
     from tunnel_sim.files.importing.records import read_records
 
     try:
@@ -195,7 +195,7 @@ def model_file(folder: Path, draw: Draw) -> None:
     recorded = joint_model.Recorded(
         moved, **({} if middle is None else {"middle": middle, "controlled": True})
     )
-    with patch.object(joint_model, "in_limited_process", in_fork):
+    with patch.object(joint_model, "in_sandbox", in_fork):
         found = joint_model.read_joint_model(folder / "model.xml", "hinge", recorded)
     spec, _ = patched(found, JointPatch(found.law.inertia * draw(st.floats(0.5, 2.0)), friction=0.01))
     patched_xml(spec, found, folder)
@@ -217,9 +217,9 @@ def estimate(_folder: Path, draw: Draw) -> None:
 
 def blind_answers(folder: Path, draw: Draw) -> None:
     """Truth, answer or seal of a blind set changed; the hashes mostly agree."""
-    from diagnosis.blind import score_set
-    from diagnosis.blind.sets import folder_hash
-    from tunnel_lab.report import blind
+    from tunnel_lab.experiments.blind import page as blind
+    from tunnel_lab.experiments.blind import score_set
+    from tunnel_lab.experiments.blind.sets import folder_hash
 
     changed = draw(st.sampled_from(("truth", "answer", "truth", "answer", "seal of key", "seal of answer")))
 
@@ -246,17 +246,17 @@ def blind_answers(folder: Path, draw: Draw) -> None:
 
 def sweep_file(folder: Path, draw: Draw) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
-    from tunnel_lab.experiments.sweep import begin
-    from tunnel_lab.experiments.sweep_cases import read_sweep
+    from tunnel_lab.experiments.experiment import begin
+    from tunnel_lab.experiments.sweep import read_sweep
 
     sweep = read_sweep(written(folder / "sweep.toml", draw(spoilt_toml(seeds.SMALL.encode())), draw))
-    begin(sweep, folder / "out")
+    begin(sweep.experiment, folder / "out")
 
 
 def sweep_folder(folder: Path, draw: Draw) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
     from tunnel_lab.experiments.sweep import open_store
-    from tunnel_lab.experiments.sweep_summary import overall_table, summarise
+    from tunnel_lab.experiments.sweep_view import overall_table, summarise
 
     files = dict(seeds.sweep_folder())
     names = [name for name in files if name.startswith("results")]
@@ -270,7 +270,7 @@ def sweep_folder(folder: Path, draw: Draw) -> None:
     written(folder / changed, spoilt_content, draw)
     store = open_store(folder)
     store.finished()
-    overall_table(summarise(store))
+    overall_table(summarise(store.scan()))
 
 
 def score_grid(folder: Path, draw: Draw) -> None:
@@ -285,7 +285,7 @@ def score_baseline(folder: Path, draw: Draw) -> None:
     """A baseline's table, or the grid in it, changed; where it is accepted, it is compared with itself."""
     import polars as pl
 
-    from tunnel_lab.experiments.score_trials import read_trials
+    from tunnel_lab.experiments.score import read_trials
     from tunnel_lab.experiments.score_view import check
 
     frame = seeds.baseline_frame()

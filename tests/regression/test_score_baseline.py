@@ -8,11 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
+from tunnel_lab.experiments.runner import processes
+from tunnel_lab.experiments.score import packaged_baseline, read_trials, score_grid
 from tunnel_lab.experiments.score_grid import load_grid
-from tunnel_lab.experiments.score_trials import Results, packaged_baseline, read_trials, score_grid
 from tunnel_lab.experiments.score_view import check
 
 HERE = Path(__file__).parent
@@ -25,8 +27,7 @@ def baseline():
 
 @pytest.fixture(scope="module")
 def now(baseline):
-    rows = score_grid(baseline.grid, baseline.estimators, jobs=0)
-    return Results(baseline.grid, baseline.estimators, tuple(rows))
+    return score_grid(baseline.grid, baseline.estimators, processes(0))[0]
 
 
 def test_the_baselines_are_of_the_same_estimators_and_of_their_grids(baseline):
@@ -48,12 +49,9 @@ def test_an_estimator_that_is_spoilt_is_caught(baseline, now, name):
     """Its ζ gets noise of four of its own standard deviations."""
     rng = np.random.default_rng(2)
 
-    def spoil(row):
-        if row["quantity"] != "zeta" or row["value"] is None:
-            return row
-        return row | {"value": row["value"] + 4.0 * row["std"] * rng.standard_normal()}
-
-    mine = tuple(row for row in now.rows if row["estimator"] == name)
-    assert check(baseline, replace(now, estimators=(name,), rows=mine)).passed
-    spoilt = replace(now, estimators=(name,), rows=tuple(map(spoil, mine)))
+    mine = now.table.filter(pl.col("estimator") == name)
+    assert check(baseline, replace(now, estimators=(name,), table=mine)).passed
+    noise = 4.0 * pl.col("std") * pl.Series(rng.standard_normal(mine.height))
+    zeta = pl.when(pl.col("quantity") == "zeta").then(noise).otherwise(0.0)
+    spoilt = replace(now, estimators=(name,), table=mine.with_columns(pl.col("value") + zeta))
     assert {finding.quantity for finding in check(baseline, spoilt).worse} == {"zeta"}

@@ -13,11 +13,11 @@ import pytest
 from scipy.stats import binom
 
 from diagnosis import diagnose
-from diagnosis.blind.sets import make_blind
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
+from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_reference import draw
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_folder import read_campaign

@@ -11,8 +11,9 @@ import pytest
 from identification import identify
 from identification.uncertainty.budget import InputUncertainties, make_budget
 from tests.reference.free_decays import RESOLUTION, Setting, campaign
+from tunnel_lab.experiments.runner import processes
+from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import Cell, Grid
-from tunnel_lab.experiments.score_trials import Results, score_grid
 from tunnel_lab.experiments.score_view import check
 
 pytestmark = pytest.mark.slow
@@ -28,7 +29,7 @@ GRID = Grid("quick", 0, 20, (), CELLS)
 
 def scored(seed):
     grid = replace(GRID, seed=seed)
-    return Results(grid, NAMES, tuple(score_grid(grid, NAMES, jobs=0)))
+    return score_grid(grid, NAMES, processes(0))[0]
 
 
 def test_unchanged_estimators_pass_with_another_seed_at_the_stated_rate():

@@ -14,7 +14,7 @@ from tunnel_lab.bench.parts import Fault, Frame, page_words, show_items
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document, read_campaign
 from tunnel_sim.files.importing.condition_names import RIG_KEYS, RUN_KEYS, Conditions
-from tunnel_sim.files.importing.records import ORIGINAL, campaign_text
+from tunnel_sim.files.importing.writing import ORIGINAL, campaign_text
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate

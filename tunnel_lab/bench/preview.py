@@ -14,14 +14,15 @@ from nicegui import events, ui
 
 from tunnel_lab.bench.parts import FIELDS, show_command
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.importing.conditions import ImportChoices, read_recipe
+from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.columns import ColumnPair
-    from tunnel_sim.files.importing.records import Imported, ImportedRun
+    from tunnel_sim.files.importing.imported_run import ImportedRun
+    from tunnel_sim.files.importing.records import Imported
     from tunnel_sim.files.importing.tables import Channel, Table
     from tunnel_sim.vocabulary.record import Array
 
@@ -119,7 +120,7 @@ def settings_from(text: str | None) -> dict[str, Any]:
     Raises:
         TunnelError: when the text is not in this format.
     """
-    from tunnel_sim.files.importing.conditions import parse_setting
+    from tunnel_sim.files.importing.choices import parse_setting
 
     if not (text or "").strip():
         return {"conditions": None, "stated_by": None}
@@ -254,7 +255,7 @@ class Column:
     @property
     def units(self) -> list[str]:
         """The units that the user can state for it; none where only the file can state the unit."""
-        from tunnel_sim.files.importing.tables import UNITS
+        from tunnel_sim.files.importing.units import UNITS
 
         kinds = {"time": ("time",), "angle": READINGS}.get(self.role, ())
         return [unit for kind in kinds for unit in UNITS[kind]]
@@ -289,14 +290,10 @@ def _column(
 ) -> Column:
     import numpy as np
 
-    from tunnel_sim.files.importing.columns import (
-        guessed_angle_unit,
-        guessed_time_unit,
-        is_time,
-        named_kind,
-        stated_input,
-    )
+    from tunnel_sim.files.importing.column_names import is_time, named_kind
+    from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, guessed_time_unit
     from tunnel_sim.files.importing.condition_names import condition_of
+    from tunnel_sim.files.importing.inputs import stated_input
     from tunnel_sim.files.importing.tables import is_input
 
     role: Role
@@ -403,7 +400,7 @@ def show_choices(
     session: Session, columns: list[str], changed: Callable[[str, Any], Awaitable[None]]
 ) -> None:
     """The fields of the choices; a change calls back with name and new value, None for detection from the files."""
-    from tunnel_sim.files.importing.tables import UNITS
+    from tunnel_sim.files.importing.units import UNITS
     from tunnel_sim.vocabulary.drive import HOLDS
     from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 

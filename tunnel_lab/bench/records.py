@@ -293,7 +293,7 @@ def write(session: Session, imported: Imported) -> None:
     """
     from tunnel_lab.bench import conditions
     from tunnel_lab.plotting.runs import import_picture
-    from tunnel_sim.files.importing.records import write_imported
+    from tunnel_sim.files.importing.writing import write_imported
 
     before = conditions.stated(session) if session.imported else {}
     write_imported(imported, session.campaign, overwrite=True, picture=import_picture)

@@ -13,13 +13,14 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
+    SchedulerOption,
     ending,
     refuse_unwritable_files,
     split_names,
     with_format,
     with_quiet,
 )
-from tunnel_lab.terminal.outputs import bar_or_lines, console, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import bar_or_lines, console, say, say_written
 from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
@@ -142,8 +143,8 @@ def make(
     [bold]Exit status[/bold]
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
     """
-    from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
-    from diagnosis.blind.sets import SEAL
+    from tunnel_lab.experiments.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
+    from tunnel_lab.experiments.blind.sets import SEAL
     from tunnel_sim.files.reading import read_json
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
@@ -173,23 +174,31 @@ def make(
 def diagnose(
     folder: Folder,
     exclude: Excluded = None,
-    jobs: Annotated[int, Option("--jobs", min=1, help="Number of campaigns diagnosed at the same time.")] = 1,
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", min=0, help="Number of processes. Default: 0, which uses this one."),
+    ] = None,
+    scheduler: SchedulerOption = None,
     effects_file: EffectsFileOption = None,
 ) -> None:
     """Diagnose every campaign of a set; continue where an interrupted run ended.
 
     The answers go to FOLDER/answers (answers-without-… with --exclude,
     answers-with-… with --effects-file), one JSON file for each campaign; their
-    SHA-256 goes to the seal.json in the same folder. The key is not read.
+    SHA-256 goes to the seal.json in the same folder. The key is not read. With
+    --scheduler, every worker must find the set under the same path.
 
     [bold]Exit status[/bold]
       0 all answered, 2 bad input, 130 interrupted (finished answers are kept).
     """
-    from diagnosis.blind import answer_set, answers_folder
+    from tunnel_lab.experiments.blind import answer_set, answers_folder
+    from tunnel_lab.experiments.runner import crew
 
-    names = split_names(exclude)
-    with bar_or_lines("diagnosing", None) as progress:
-        sealed = answer_set(folder, excluded=names, jobs=jobs, progress=progress, effects_file=effects_file)
+    names, workers = split_names(exclude), crew(jobs, scheduler, usual=0)
+    with bar_or_lines("diagnosing") as progress:
+        sealed = answer_set(
+            folder, excluded=names, workers=workers, progress=progress, effects_file=effects_file
+        )
     say(f"Answers: {answers_folder(folder, names, effects_file)}")
     say(f"Answers sha256 {sealed}")
 
@@ -238,9 +247,9 @@ def score(
       0 scored, 2 bad input: an answer is missing, or a file does not match its hash.
     """
     from diagnosis import vocabulary
-    from diagnosis.blind import score_set
+    from tunnel_lab.experiments.blind import page as blind
+    from tunnel_lab.experiments.blind import score_set
     from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.report import blind
     from tunnel_sim.files.writing import write_json, write_whole
 
     names = split_names(exclude)
@@ -257,11 +266,5 @@ def score(
         write_whole(markdown, blind.markdown(result, str(folder), addresses).encode())
     if json is not None:
         write_json(json, result.to_json_dict())
-    for line in blind.origin_lines(result):
-        say(line)
-    say("")
-    for section in blind.sections(result):
-        show_tables(section)
-        if section.note:
-            say(section.note + "\n")
+    blind.blind_view(result).show()
     say_written(markdown, json, *drawn)

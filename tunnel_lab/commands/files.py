@@ -143,8 +143,9 @@ def import_files(
       0 imported, 1 declined, 2 bad input; nothing is left half written.
     """
     from tunnel_lab.plotting.runs import import_picture
-    from tunnel_sim.files.importing.conditions import ImportChoices, parse_setting, read_recipe
-    from tunnel_sim.files.importing.records import read_records, write_imported
+    from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, read_recipe
+    from tunnel_sim.files.importing.records import read_records
+    from tunnel_sim.files.importing.writing import write_imported
     from tunnel_sim.files.toml_input import validate
     from tunnel_sim.files.writing import refuse_unwritable, write_whole
 

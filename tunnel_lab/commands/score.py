@@ -10,16 +10,29 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import chosen_estimators, ending, estimator_option, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import (
+    SchedulerOption,
+    chosen_estimators,
+    ending,
+    estimator_option,
+    refuse_unwritable_files,
+)
 from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from tunnel_lab.experiments.score_trials import Results
+    from collections.abc import Iterable
+
+    from tunnel_lab.experiments.answers import Failed
+    from tunnel_lab.experiments.runner import Workers
+    from tunnel_lab.experiments.score import Results
+    from tunnel_lab.experiments.view import View
 
 PACKAGED = "packaged"
 """Name of the installed baseline."""
-_RESULTS = ("trials.", "score", "breakdown")  # beginnings of the file names in --out
+PARTS = "parts"
+_JOBS = 2
+_RESULTS = ("trials.", "score", "breakdown", "index.")  # beginnings of the file names in --out
 
 
 def score(
@@ -44,8 +57,14 @@ def score(
         int | None, Option("--seed", min=0, help="Seed of the records; overrides the grid's.")
     ] = None,
     jobs: Annotated[
-        int, Option("--jobs", min=0, help="Number of processes, on which no result depends; 0 uses this one.")
-    ] = 2,
+        int | None,
+        Option(
+            "--jobs",
+            min=0,
+            help="Number of processes, on which no result depends; 0 uses this one. Default: 2.",
+        ),
+    ] = None,
+    scheduler: SchedulerOption = None,
     cells: Annotated[bool, Option("--cells", help="Also show every cell.")] = False,
     check: Annotated[
         str | None,
@@ -101,21 +120,22 @@ def score(
       valid estimate, 2 bad input, 130 interrupted (finished work is kept in --out).
     """
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.experiments import score_trials, score_view
-    from tunnel_lab.experiments.score_drawing import score_figure
+    from tunnel_lab.experiments.runner import crew
+    from tunnel_lab.experiments.score import score_grid, write_trials
     from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_sim.files.writing import write_whole
+    from tunnel_lab.experiments.score_view import check as checked
+    from tunnel_lab.experiments.score_view import score_view, verdict_lines, worse_table
 
     names = chosen_estimators(estimators) or ALL_ESTIMATORS
+    workers = crew(jobs, scheduler, usual=_JOBS)
     if breakdown:  # with its own conditions
         for name, value in {"GRID": grid, "--check": check, "--write-baseline": write_baseline}.items():
             if value is not None:
                 raise TunnelError(
                     "cannot be combined with --breakdown", where=name, remedy="leave one of them out"
                 )
-        _refuse_occupied(out, overwrite)
-        _breakdown(names, out, jobs, 1 if seed is None else seed, trials)
+        parts = _parts(out, overwrite)
+        _breakdown(names, out, parts, workers, 1 if seed is None else seed, trials)
         return
     baseline = None if check is None else _baseline(check, names, everything=not estimators)
     wanted = baseline.grid if baseline is not None else packaged_grid()
@@ -125,43 +145,41 @@ def score(
         wanted = replace(wanted, trials=trials)
     if seed is not None:
         wanted = replace(wanted, seed=seed)
-    _refuse_occupied(out, overwrite)
+    parts = _parts(out, overwrite)
     refuse_unwritable_files(write_baseline)
-    parts = None if out is None else out / "parts"
     with bar("scoring") as progress:
-        rows = score_trials.score_grid(wanted, names, jobs=jobs, parts=parts, progress=progress)
-    results = score_trials.Results(wanted, names, tuple(rows))
-    written: list[Path] = []
+        results, failed = score_grid(wanted, names, workers, parts=parts, progress=progress)
+    view = score_view(results, cells=cells)
     if out is not None:
-        written = [
-            score_trials.write_trials(out / "trials.parquet", results),
-            write_whole(out / "scores.parquet", score_trials.parquet(score_view.scores_frame(results))),
-            *save_both(score_figure(results), out / "score.png"),
-        ]
-        shutil.rmtree(out / "parts", ignore_errors=True)
+        write_trials(out / "trials.parquet", results)
     if write_baseline is not None:
-        written.append(score_trials.write_trials(write_baseline, results))
-    show_tables(*score_view.summary_tables(results))
-    if cells:
-        show_tables(*score_view.cell_tables(results))
-    for line in score_view.lines_below(results):
-        say(line)
-    say_written(*written)
-    failed = score_trials.failure_lines(rows)
-    for line in failed:
-        say(line, stderr=True)
+        write_trials(write_baseline, results)
+    _present(view, out, failed)
+    say_written(write_baseline)
     if baseline is not None:
-        verdict = score_view.check(baseline, results)
+        verdict = checked(baseline, results)
         say("")
-        show_tables(score_view.worse_table(verdict))
-        for line in score_view.verdict_lines(verdict):
+        show_tables(worse_table(verdict))
+        for line in verdict_lines(verdict):
             say(line)
         if failed or not verdict.passed:
             raise typer.Exit(1)
 
 
+def _present(view: View, out: Path | None, failed: Iterable[Failed]) -> None:
+    """Write and print what was found."""
+    written = "" if out is None else view.write(out)
+    if out is not None:
+        shutil.rmtree(out / PARTS)
+    view.show()
+    if written:
+        say(written)
+    for line in (line for one in failed for line in one.lines):
+        say(line, stderr=True)
+
+
 def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results:
-    from tunnel_lab.experiments.score_trials import packaged_baseline, read_trials
+    from tunnel_lab.experiments.score import packaged_baseline, read_trials
 
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
@@ -172,46 +190,43 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     return baseline
 
 
-def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
-    """Refuse a folder with anything other than an interrupted score, unless ``overwrite``."""
+def _parts(out: Path | None, overwrite: bool) -> Path | None:
+    """The folder of unfinished work in ``--out``, which has no other content than that of an interrupted score."""
     from tunnel_sim.files.writing import clear_leftovers
 
-    if out is None or not out.exists():
-        return
-    clear_leftovers(out)
-    if not out.is_dir():
-        raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
-    names = {path.name for path in out.iterdir()}
-    # The parts are removed after all results are written: a full disk may have interrupted the writing.
-    interrupted = "parts" in names and all(name.startswith(_RESULTS) for name in names - {"parts"})
-    if names and not interrupted and not overwrite:
-        raise TunnelError("exists already", where=str(out), remedy="name another --out or add --overwrite")
+    if out is None:
+        return None
+    if out.exists():
+        clear_leftovers(out)
+        if not out.is_dir():
+            raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
+        names = {path.name for path in out.iterdir()}
+        # The parts are removed after all results are written: a full disk may have interrupted the writing.
+        interrupted = PARTS in names and all(name.startswith(_RESULTS) for name in names - {PARTS})
+        if overwrite:
+            shutil.rmtree(out / PARTS, ignore_errors=True)
+        elif names and not interrupted:
+            raise TunnelError(
+                "exists already", where=str(out), remedy="name another --out or add --overwrite"
+            )
+    return out / PARTS
 
 
-def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
-    from tunnel_lab.experiments import breakdown
-    from tunnel_lab.experiments.score_trials import failure_lines, not_given, parquet
-    from tunnel_lab.experiments.score_view import not_given_lines
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_sim.files.writing import write_whole
+def _breakdown(
+    names: tuple[str, ...],
+    out: Path | None,
+    parts: Path | None,
+    workers: Workers,
+    seed: int,
+    trials: int | None,
+) -> None:
+    from tunnel_lab.experiments.answers import failures_in
+    from tunnel_lab.experiments.breakdown import REALISATIONS, breakdown_of, breakdown_view, make_cases
+    from tunnel_lab.experiments.experiment import results_of
 
-    terminal, parts = console(stderr=True).is_terminal, None if out is None else out / "parts"
-    cases = breakdown.make_cases(seed, realisations=trials or breakdown.REALISATIONS, show_steps=terminal)
+    terminal = console(stderr=True).is_terminal
+    cases = make_cases(seed, realisations=trials or REALISATIONS, show_steps=terminal)
     with bar("scoring") as progress:
-        rows = breakdown.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=progress)
-    biases = breakdown.biases(rows)
-    written = []
-    if out is not None:
-        frame = breakdown.breakdown_frame(biases)
-        written.append(write_whole(out / "breakdown.parquet", parquet(frame)))
-        for quantity in (one for one in breakdown.SHOWN if any(bias.quantity == one for bias in biases)):
-            path = out / f"breakdown-{quantity.replace('_', '-')}.png"
-            written += save_both(breakdown.breakdown_figure(frame, quantity), path)
-        shutil.rmtree(out / "parts", ignore_errors=True)
-    for quantity in breakdown.SHOWN:
-        show_tables(*breakdown.breakdown_tables(biases, quantity))
-    for line in (breakdown.ABOUT, *not_given_lines(not_given(rows))):
-        say(line)
-    say_written(*written)
-    for line in failure_lines(rows):
-        say(line, stderr=True)
+        results, outcome = results_of(breakdown_of(cases, names, seed), parts, workers, progress)
+    failed = failures_in(results, ("effect", "severity", "realisation"), outcome.failed)
+    _present(breakdown_view(results), out, failed)

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import chosen_estimators, estimator_option
-from tunnel_lab.terminal.outputs import bar, say, show_tables
+from tunnel_lab.terminal.inputs import SchedulerOption, chosen_estimators, estimator_option
+from tunnel_lab.terminal.outputs import bar, say
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 
@@ -23,14 +23,7 @@ def sweep(
         int | None,
         Option("--jobs", min=1, help="Processes on this machine. Default: one for each processor."),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Use the Dask cluster of this scheduler (tcp://host:8786), or start one here: local.",
-        ),
-    ] = None,
+    scheduler: SchedulerOption = None,
     estimators: Annotated[list[str] | None, estimator_option("Estimate with this one too")] = None,
     summary: Annotated[
         Path | None,
@@ -88,20 +81,14 @@ def sweep(
         raise TunnelError(
             f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
         )
-    if jobs is not None and scheduler not in (None, "local"):
-        what = "its workers are started on their own machines"
-        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
-    from tunnel_lab.experiments.asked import VERBS
-    from tunnel_lab.experiments.runner import available_processors, on_cluster, processes, said
-    from tunnel_lab.experiments.sweep import run_sweep
-    from tunnel_lab.experiments.sweep_cases import read_sweep
+    from tunnel_lab.experiments.experiment import run_in
+    from tunnel_lab.experiments.runner import crew
+    from tunnel_lab.experiments.sweep import read_sweep
 
     plan = read_sweep(file, chosen_estimators(estimators))
-    count = min(jobs or available_processors(), plan.shards)
-
-    crew = processes(count) if scheduler is None else on_cluster(scheduler, count, said)
+    workers = crew(jobs, scheduler, plan.shards)
     with bar("cases", plan.size) as progress:
-        outcome = run_sweep(plan, out, crew, progress)
+        _, outcome = run_in(plan.experiment, out, workers, progress)
     if outcome.found:
         say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
@@ -109,42 +96,27 @@ def sweep(
     say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
     if plan.document.estimators:
         say(f"Tables and figures: tunnel sweep --summary {shlex.quote(str(out))}")
-    for failed in outcome.failed:
-        what = f"{counted(failed.count, 'estimate')} {VERBS[failed.status]}"
-        say(f"{what}: see status '{failed.status}' in the results. The first:", stderr=True)
-        say(failed.first, stderr=True)
+    for line in (line for failed in outcome.failed for line in failed.lines):
+        say(line, stderr=True)
     if any(failed.of_the_estimator for failed in outcome.failed):
         raise typer.Exit(1)
 
 
 def _summarise(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep."""
-    import polars as pl
+    from tunnel_lab.experiments.experiment import Parts
+    from tunnel_lab.experiments.sweep import stored_sweep
+    from tunnel_lab.experiments.sweep_view import sweep_view
 
-    from tunnel_lab.experiments import sweep_summary
-    from tunnel_lab.experiments.score_view import not_given_lines
-    from tunnel_lab.experiments.sweep import open_store
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_sim.files.writing import output_folder, write_encoded
-    from tunnel_sim.vocabulary.text_cells import as_text_cell
-
-    store = open_store(folder)
-    lines = sweep_summary.summarise(store)
-    grouped = sweep_summary.groups(lines)
-    target = output_folder(folder / "summary")
-    frame = pl.DataFrame([line.to_row() for line in lines])
-    texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
-    written = [write_encoded(target / "summary.csv", frame.with_columns(texts).write_csv)]
-    for name, part in grouped.items():
-        drawn = sweep_summary.error_figure(part)
-        if drawn is not None:
-            written += save_both(drawn, target / f"{name}.png")
-    done, shards = len(store.finished()), store.sweep.shards
+    sweep = stored_sweep(folder)
+    store = Parts(folder, sweep.experiment)
+    if not sweep.document.estimators:
+        remedy = "there is no estimate to summarise"
+        raise TunnelError("the sweep has no estimators", where=str(folder), remedy=remedy)
+    view = sweep_view(store.scan(), sweep.document.name)
+    written = view.write(folder / "summary")
+    done, shards = len(store.finished()), sweep.shards
     if done < shards:
         say(f"Finished: {done} of {counted(shards, 'shard')}; run the same command again for the rest\n")
-    along = map(sweep_summary.axis_table, grouped.values())
-    show_tables(sweep_summary.overall_table(lines), *along)
-    say(sweep_summary.BRACKETS)
-    for line in not_given_lines(sweep_summary.unanswered(store), sweep_summary.NAMES):
-        say(line)
-    say(f"Written to {target}: {', '.join(path.name for path in written)}")
+    view.show()
+    say(written)

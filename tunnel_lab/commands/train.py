@@ -5,13 +5,16 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import refuse_unwritable_files
+from tunnel_lab.terminal.inputs import SchedulerOption, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, say, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from tunnel_lab.experiments.runner import Workers
 
 CHECKPOINT_EVERY_S = 5.0
 
@@ -42,7 +45,11 @@ def train(
     shards: Annotated[
         int, Option("--shards", min=1, help="For neural_posterior: training campaigns, in units of 200.")
     ] = 15,
-    jobs: Annotated[int, Option("--jobs", min=0, help="For neural_posterior: processes that simulate.")] = 2,
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", min=0, help="For neural_posterior: processes that simulate. Default: 2."),
+    ] = None,
+    scheduler: SchedulerOption = None,
     restart: Annotated[
         bool, Option("--restart", help="Start again instead of continuing an interrupted training.")
     ] = False,
@@ -82,7 +89,9 @@ def train(
     if out.suffix != ".safetensors":
         raise TunnelError("does not end in .safetensors", where=str(out), remedy="give the file this suffix")
     if estimator == "neural_posterior":
-        _train_posterior(out, seed, shards, steps or 2000, jobs=jobs, restart=restart)
+        from tunnel_lab.experiments.runner import crew
+
+        _train_posterior(out, seed, shards, steps or 2000, crew(jobs, scheduler, usual=2), restart)
         return
     for option, (low, high), most in (("--zeta", zeta, 0.95), ("--omega", omega, 1e4)):
         if not 0.0 < low < high < most:
@@ -142,7 +151,7 @@ def train(
     say(f"Written: {out} and {out.with_suffix('.json')}")
 
 
-def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int, restart: bool) -> None:
+def _train_posterior(out: Path, seed: int, shards: int, steps: int, workers: Workers, restart: bool) -> None:
     """Train and write both networks of `neural_posterior`, with a record beside them."""
     from tunnel_lab.experiments.training import TrainingSpec, train
     from tunnel_sim.files.writing import write_json, write_whole
@@ -155,7 +164,7 @@ def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int
         weights, record = train(
             TrainingSpec(seed, shards, steps),
             folder,
-            jobs=jobs,
+            workers,
             progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
         )
     write_whole(out, weights)

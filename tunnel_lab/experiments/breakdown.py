@@ -7,22 +7,24 @@ refit of 1 or 10 noise variances. matplotlib is imported inside the functions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from math import radians
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import polars as pl
 from rich.text import Text
 
 from identification.printing import significant
-from identification.scoring import Score, collect, score
-from tunnel_lab.experiments.runner import Progress, knowing
-from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, not_given, outcome, rows_of
-from tunnel_lab.experiments.score_view import NAMES
+from identification.scoring import score
+from tunnel_lab.experiments.answers import counted_failures, not_given
+from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, trials_of
+from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
+from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import figure, styled
 from tunnel_lab.terminal.outputs import table
 from tunnel_reference.conditions import Conditions
@@ -33,7 +35,6 @@ from tunnel_reference.severity import read_and_fit, simulate_motions, size_effec
 from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
-    import polars as pl
     from matplotlib.figure import Figure
     from rich.table import Table
 
@@ -49,6 +50,11 @@ REALISATIONS = 3
 TRUTH = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
 NOISE = 5e-4  # rad
 
+_CASE_COLUMNS: Mapping[str, Any] = {
+    "effect": pl.String,
+    **dict.fromkeys(("severity", "reached"), pl.Float64),
+    "realisation": pl.Int64,
+}
 _SPRINGS, _SPEEDS = (16.12, 35.02, 51.88), (0.0, 15.0, 25.0)
 _DENSITY = 1.204
 _RUNS = (
@@ -85,11 +91,6 @@ class BiasCase:
     realisation: int
     campaign: Campaign
     bound: dict[str, float]
-
-    @property
-    def name(self) -> str:
-        """Name of its file."""
-        return f"{self.effect.replace(' ', '_')}-{self.severity:g}-{self.realisation}"
 
 
 def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
@@ -196,116 +197,104 @@ def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     return replace(draw, effects=effects, seed=noise)
 
 
-def break_down(
-    cases: Sequence[BiasCase],
-    estimators: Sequence[str],
-    seed: int,
-    *,
-    jobs: int = 2,
-    parts: Path | None = None,
-    progress: Progress | None = None,
-) -> list[Row]:
-    """Every estimator on every case.
+def breakdown_of(cases: Sequence[BiasCase], estimators: tuple[str, ...], seed: int) -> Experiment[BiasCase]:
+    """Some estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity.
 
     Args:
         seed: of the cases.
-        parts: folder for finished work, to continue an interrupted score; None: finished work is not kept.
     """
-    mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
-    work = knowing(partial(_estimate_case, tuple(estimators)), estimators)
-    rows = rows_of(work, cases, mark, jobs=jobs, parts=parts, progress=progress)
-    return [row for case in cases for row in rows[case.name]]
+    return Experiment(
+        "breakdown",
+        cases,
+        partial(_estimate_case, estimators),
+        case_name,
+        {"cases": list(map(case_name, cases)), "seed": seed, "estimators": list(estimators)},
+        estimators,
+        elsewhere="name another --out, or add --overwrite",
+        code_matters=True,
+    )
 
 
-def _estimate_case(estimators: Sequence[str], case: BiasCase) -> list[Row]:
-    about = {name: getattr(case, name) for name in ("effect", "severity", "reached", "realisation")}
-    return [
-        row for name in estimators for row in estimate_rows(name, case.campaign, TRUTH, case.bound, about)
-    ]
+def case_name(case: BiasCase) -> str:
+    """Effect, severity and realisation."""
+    return f"{case.effect.replace(' ', '_')}-{case.severity:g}-{case.realisation}"
 
 
-@dataclass(frozen=True)
-class Bias:
-    """The bias that one effect causes in one estimate.
+def _estimate_case(estimators: Sequence[str], case: BiasCase) -> Done:
+    rows, failed = [], []
+    for name in estimators:
+        answer, failure = answer_rows(name, case.campaign, TRUTH, case.bound)
+        rows += [(case.effect, case.severity, case.reached, case.realisation, *row) for row in answer]
+        failed += failure
+    columns = {**_CASE_COLUMNS, **ANSWER_COLUMNS, "message": pl.String}
+    return Done({RESULTS: parquet(rows, columns)}, counted_failures(failed))
 
-    Args:
-        effect: its name, or ``no effect``.
-        severity: target excess, in noise variances (a ratio); 0 for no effect.
-        reached: mean excess over the realisations, in noise variances (a ratio).
-        departs: share of the realisations in which the estimator reported a departure from the model.
+
+def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
+    """The biases that each effect causes: a row for each effect, severity, estimator and quantity.
+
+    Quantities that an estimator does not give are left out. Units are in the names of the columns.
     """
-
-    effect: str
-    severity: float
-    reached: float
-    estimator: str
-    quantity: str
-    score: Score
-    departs: float
-
-
-def biases(rows: Sequence[Row]) -> list[Bias]:
-    """Rows summarised over realisations; quantities that an estimator does not give are left out."""
-    absent = not_given(rows)
-    groups: dict[tuple[str, float, str, str], list[Row]] = {}
-    for row in rows:
-        key = (row["effect"], row["severity"], row["estimator"], row["quantity"])
-        if row["quantity"] not in absent.get(row["estimator"], ()):
-            groups.setdefault(key, []).append(row)
-    return [
-        Bias(
-            effect, severity, float(np.mean([row["reached"] for row in some])), estimator, quantity,
-            score(collect(outcome(row) for row in some)),
-            float(np.mean([row["status"] == "model_departs" for row in some])),
+    absent = not_given(results)
+    keys = ("effect", "severity", "estimator", "quantity")
+    figures = {"relative_bias": "bias_percent", "bias_in_stds": "bias_in_stds"}
+    rows = []
+    for (effect, severity, estimator, quantity), some in results.group_by(*keys, maintain_order=True):
+        if quantity in absent.get(str(estimator), ()):
+            continue
+        judged = score(trials_of(some))
+        rows.append(
+            {
+                "effect": effect,
+                "severity_noise_powers": severity,
+                "reached_noise_powers": some["reached"].mean(),
+                "estimator": estimator,
+                "quantity": quantity,
+                "realisations": judged.count,
+                "failures": judged.failures.count,
+                **figure_columns(judged, figures, {}, "_std_error"),
+                "rmse_over_bound": getattr(judged.rmse_over_bound, "value", None),
+                "covered": getattr(judged.coverage, "count", None),
+                "model_departs_share": (some["status"] == "model_departs").mean(),
+            }
         )
-        for (effect, severity, estimator, quantity), some in groups.items()
-    ]  # fmt: skip
-
-
-def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
-    """The biases as a table: a row for each effect, severity, estimator and quantity; units in column names."""
-    import polars as pl
-
-    rows = [
-        {
-            "effect": bias.effect,
-            "severity_noise_powers": bias.severity,
-            "reached_noise_powers": bias.reached,
-            "estimator": bias.estimator,
-            "quantity": bias.quantity,
-            "realisations": bias.score.count,
-            "failures": bias.score.failures.count,
-            "bias_percent": getattr(bias.score.relative_bias, "value", None),
-            "bias_percent_std_error": getattr(bias.score.relative_bias, "std", None),
-            "bias_in_stds": getattr(bias.score.bias_in_stds, "value", None),
-            "bias_in_stds_std_error": getattr(bias.score.bias_in_stds, "std", None),
-            "rmse_over_bound": getattr(bias.score.rmse_over_bound, "value", None),
-            "covered": getattr(bias.score.coverage, "count", None),
-            "model_departs_share": bias.departs,
-        }
-        for bias in biases
-    ]
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def breakdown_tables(biases: Sequence[Bias], quantity: str) -> list[Table]:
+def breakdown_view(results: pl.DataFrame) -> View:
+    """The view of a breakdown.
+
+    Args:
+        results: of `breakdown_of`.
+    """
+    frame = breakdown_frame(results)
+    given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
+    tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
+    return View(
+        "Bias caused by each unmodelled effect",
+        [*tables, ABOUT, *not_given_lines(not_given(results))],
+        {f"breakdown-{one.replace('_', '-')}": partial(breakdown_figure, frame, one) for one in given},
+        {"breakdown.parquet": parquet(frame)},
+    )
+
+
+def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
     """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
-    mine = [bias for bias in biases if bias.quantity == quantity]
-    estimators = list(dict.fromkeys(bias.estimator for bias in mine))
-    cells = {}
-    for bias in mine:
-        relative, in_stds = bias.score.relative_bias, bias.score.bias_in_stds
-        text = "failed" if bias.score.failures.count else "–"
-        if relative is not None:
-            deviations = "–" if in_stds is None else _compact(in_stds.value)
-            text = f"{_compact(relative.value)} ({deviations}σ)"
-        cells[bias.effect, bias.severity, bias.estimator] = text
+    mine = frame.filter(pl.col("quantity") == quantity)
+    estimators = mine["estimator"].unique(maintain_order=True).to_list()
+    cells, places = {}, ("effect", "severity_noise_powers")
+    for row in mine.iter_rows(named=True):
+        text = "failed" if row["failures"] else "–"
+        if row["bias_percent"] is not None:
+            deviations = "–" if row["bias_in_stds"] is None else _compact(row["bias_in_stds"])
+            text = f"{_compact(row['bias_percent'])} ({deviations}σ)"
+        cells[row["effect"], row["severity_noise_powers"], row["estimator"]] = text
     tables = []
     for first in range(0, len(estimators), _SIDE_BY_SIDE):
         some = estimators[first : first + _SIDE_BY_SIDE]
         one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
         one_table.columns[0].no_wrap = True
-        for effect, severity in dict.fromkeys((bias.effect, bias.severity) for bias in mine):
+        for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows():
             row = [cells[effect, severity, name] for name in some]
             one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
         tables.append(one_table)
@@ -384,7 +373,5 @@ def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str]
 
 def packaged_breakdown() -> pl.DataFrame:
     """Results of ``tunnel score --breakdown``; columns as in its Parquet file."""
-    import polars as pl
-
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-breakdown.parquet") as path:
         return pl.read_parquet(path)

@@ -1,17 +1,15 @@
-"""The runner of experiments: a task is data, its work a pure function; finished tasks are not repeated.
+"""The workers of experiments: processes of this machine, or of a Dask cluster.
 
-The workers are processes of this machine or of a Dask cluster. Only this process keeps results: a repeated task is
-stored once. Nothing heavy is imported here, because worker processes start with this module.
+Nothing heavy is imported here, because worker processes start with this module.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
-from functools import partial
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -20,9 +18,6 @@ from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
 
 if TYPE_CHECKING:
     from distributed import Client
-
-    from identification.estimators import Own
-
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
@@ -34,9 +29,9 @@ PATIENCE = 3
 """How often processes may die in succession without finishing a task."""
 LOCAL = "local"
 ATTEMPTS = 3
-"""How often a shard is submitted again after Dask has given it up."""
+"""How often a task is submitted again after Dask has given it up."""
 POLL_S = 5.0
-"""How long to wait for a shard before the workers are counted, s."""
+"""How long to wait for a task before the workers are counted, s."""
 CONNECT_S = 10.0
 """How long a scheduler may take to answer, s."""
 _FEWEST_IN_FLIGHT = 8
@@ -47,65 +42,8 @@ class Workers(Protocol):
 
     def __call__(
         self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], /
-    ) -> Iterator[tuple[TaskT, ResultT]]:
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
         """Yield every task with its result, in the order of completion."""
-
-
-def run_tasks(
-    work: Callable[[TaskT], ResultT],
-    tasks: Sequence[TaskT],
-    workers: Workers,
-    *,
-    finished: Callable[[TaskT], bool],
-    keep: Callable[[TaskT, ResultT], object],
-    size: Callable[[TaskT], int] = lambda _: 1,
-    progress: Progress | None = None,
-) -> int:
-    """Do the unfinished tasks.
-
-    Args:
-        work: a pure function of a module: a repeated task gives the same result.
-        finished: whether the result of a task is already stored.
-        keep: called in this process with each task and its result.
-        size: weight of a task in the progress.
-
-    Returns:
-        Number of tasks that were finished before.
-    """
-    waiting = [task for task in tasks if not finished(task)]
-    total = sum(map(size, tasks))
-    done = total - sum(map(size, waiting))
-    show = progress or (lambda _done, _total: None)
-    show(done, total)
-
-    def results() -> Generator[tuple[TaskT, ResultT], None, None]:
-        if waiting:
-            yield from workers(work, waiting)
-
-    with closing(results()) as finishing:  # the workers end with the first error
-        for task, result in finishing:
-            keep(task, result)
-            done += size(task)
-            show(done, total)
-    return len(tasks) - len(waiting)
-
-
-def knowing(work: Callable[[TaskT], ResultT], estimators: Iterable[str]) -> Callable[[TaskT], ResultT]:
-    """The same work, with the user's estimators known in any process.
-
-    Args:
-        estimators: names of all that the work uses.
-    """
-    from identification.estimators import own_estimators  # only here: worker processes start with this module
-
-    own = own_estimators(estimators)
-    return partial(_with_own, own, work) if own else work
-
-
-def _with_own(own: Sequence[Own], work: Callable[[TaskT], ResultT], task: TaskT) -> ResultT:
-    for one in own:
-        one.register()
-    return work(task)
 
 
 def said(line: str) -> None:
@@ -118,7 +56,9 @@ def said(line: str) -> None:
 def processes(jobs: int, say: Say = said) -> Workers:
     """Processes of this machine; 0 jobs: this process. The tasks of a process that dies are repeated."""
 
-    def workers(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+    def workers(
+        work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
         waiting = list(tasks)
         broken = 0
         while waiting:
@@ -133,7 +73,7 @@ def processes(jobs: int, say: Say = said) -> Workers:
                     what = f"worker processes died {PATIENCE} times without finishing a task"
                     remedy = (
                         "give fewer --jobs if memory is short, and check that an estimator of your own does not "
-                        "end its process; finished work in --out is kept"
+                        "end its process; finished work is kept"
                     )
                     raise TunnelError(what, remedy=remedy) from None
                 say("a worker process was lost; its tasks are repeated")
@@ -146,16 +86,40 @@ def available_processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def crew(
+    jobs: int | None, scheduler: str | None, tasks: int | None = None, *, usual: int | None = None
+) -> Workers:
+    """The workers that the options of a command ask for.
+
+    Args:
+        jobs: value of ``--jobs``; None: ``usual``.
+        scheduler: value of ``--scheduler``; None: processes of this machine.
+        tasks: number of tasks, which limits the number of workers; None: it is not known yet.
+        usual: None: a worker for each processor.
+    """
+    if jobs is not None and scheduler not in (None, LOCAL):
+        what = "its workers are started on their own machines"
+        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
+    count = available_processors() if usual is None else usual
+    count = count if jobs is None else jobs
+    count = count if tasks is None else min(count, tasks)
+    return processes(count) if scheduler is None else on_cluster(scheduler, max(count, 1), said)
+
+
 def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) -> Workers:
     """Workers of a Dask cluster.
 
     Args:
         address: of a scheduler, such as ``tcp://host:8786``, or ``local`` to start a cluster here.
         workers: number of workers of a local cluster.
-        poll_s: time to wait for a shard before counting the workers, s.
+        poll_s: time to wait for a task before counting the workers, s.
     """
 
-    def crew(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
+    def at_work(
+        work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
+    ) -> Generator[tuple[TaskT, ResultT], None, None]:
+        if not tasks:
+            return
         distributed = library("distributed", "--scheduler", "cluster")
         gone = distributed.CancelledError, distributed.comm.core.CommClosedError
         with _client(address, workers) as client:
@@ -164,7 +128,7 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
             except gone:
                 raise _gone() from None
 
-    return crew
+    return at_work
 
 
 @contextmanager
@@ -201,19 +165,19 @@ def _work_of(
     from distributed import KilledWorker, wait
 
     wait_for: Any = wait
-    waiting = iter(tasks)
-    flying: dict[Any, TaskT] = {}
-    attempts: dict[TaskT, int] = {}
+    waiting = iter(range(len(tasks)))
+    flying: dict[Any, int] = {}
+    attempts: dict[int, int] = {}
 
-    def submit(task: TaskT) -> None:
-        key = f"shard-{task}-{attempts.setdefault(task, 1)}-{id(attempts)}"
-        flying[client.submit(work, task, key=key, pure=False)] = task
+    def submit(number: int) -> None:
+        key = f"task-{number}-{attempts.setdefault(number, 1)}-{id(attempts)}"
+        flying[client.submit(work, tasks[number], key=key, pure=False)] = number
 
     alone = _tell_of_workers(client, False, say)
     while True:
         threads = sum(int(count) for count in client.nthreads().values())
-        for task in islice(waiting, max(0, max(_FEWEST_IN_FLIGHT, 2 * threads) - len(flying))):
-            submit(task)
+        for number in islice(waiting, max(0, max(_FEWEST_IN_FLIGHT, 2 * threads) - len(flying))):
+            submit(number)
         if not flying:
             return
         try:
@@ -222,24 +186,24 @@ def _work_of(
             alone = _tell_of_workers(client, alone, say)
             continue
         for future in landed:
-            task = flying.pop(future)
+            number = flying.pop(future)
             try:
                 result: ResultT = future.result()
             except (ImportError, RuntimeError) as error:
                 remedy = "give scheduler and workers the same environment as here"
-                raise TunnelError(f"a worker cannot do a shard ({one_line(error)})", remedy=remedy) from None
+                raise TunnelError(f"a worker cannot do a task ({one_line(error)})", remedy=remedy) from None
             except KilledWorker:
-                attempts[task] += 1
-                if attempts[task] > ATTEMPTS:
-                    what = f"shard {task} lost every worker it was given to"
-                    remedy = "check the memory of the workers; finished shards are kept"
+                attempts[number] += 1
+                if attempts[number] > ATTEMPTS:
+                    what = f"a task lost all {ATTEMPTS} workers it was given to"
+                    remedy = "check the memory of the workers; finished work is kept"
                     raise TunnelError(what, remedy=remedy) from None
-                submit(task)
+                submit(number)
                 continue
             finally:
                 future.release()
             alone = False
-            yield task, result
+            yield tasks[number], result
 
 
 def _tell_of_workers(client: Any, alone: bool, say: Say) -> bool:
@@ -259,5 +223,5 @@ def _tell_of_workers(client: Any, alone: bool, say: Say) -> bool:
 def _gone() -> TunnelError:
     return TunnelError(
         "the scheduler is gone",
-        remedy="finished shards are kept: start scheduler and workers again, and repeat the command",
+        remedy="finished work is kept: start scheduler and workers again, and repeat the command",
     )

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.scoring import INTERVAL, NOMINAL_COVERAGE, Score, score
+from tunnel_lab.experiments.figures import NAMES
+from tunnel_lab.experiments.score import Results
 from tunnel_lab.experiments.score_grid import Cell
-from tunnel_lab.experiments.score_trials import Results
-from tunnel_lab.experiments.score_view import NAMES
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled, text_width
 from tunnel_lab.terminal.inputs import NO_EFFECT
 
@@ -87,7 +87,7 @@ def score_figure(results: Results) -> Figure:
 
 def _block(part: SubFigure, results: Results, rows: _Rows, room: float, *, covered: bool) -> None:
     """One row of panels, each ``room`` inches wide."""
-    trials = results.trials()
+    trials = results.trials
     panels = part.subplots(1, len(results.estimators), sharex=True, sharey=True, squeeze=False)[0]
     handles: dict[str, Any] = {}
     for axes, name in zip(panels, results.estimators, strict=True):

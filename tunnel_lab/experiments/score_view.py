@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 from rich.text import Text
 
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
-from identification.printing import SYMBOLS, concise, significant
+from identification.printing import concise, significant
 from identification.scoring import (
     Change,
     Score,
@@ -24,16 +26,16 @@ from identification.scoring import (
     score,
 )
 from identification.statistics import Proportion
-from tunnel_lab.experiments.score_trials import Key, Results, groups_of
+from tunnel_lab.experiments.experiment import parquet
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, share_text
+from tunnel_lab.experiments.score import Results, groups_of
+from tunnel_lab.experiments.view import View
 from tunnel_lab.terminal.outputs import table
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
-    import polars as pl
     from rich.table import Table
 
-NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
-"""How the quantities of a score are written."""
 ABOUT = (
     "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter. Worst: of the cells. In "
     "brackets: the standard error in the last digits; after shares: their 95 % interval. Time: of identify for a "
@@ -102,7 +104,7 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         remedy = f"score one of {', '.join(baseline.estimators)}"
         raise TunnelError("the baseline does not include these estimators", where="--check", remedy=remedy)
     places = [now.grid.cells.index(cell) for cell in baseline.grid.cells]
-    before, after = baseline.trials(), now.trials()
+    before, after = baseline.trials, now.trials
     tested: list[tuple[str, str, str, Change]] = []
     for name in estimators:
         for group, cells in groups_of(baseline.grid).items():
@@ -119,17 +121,16 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
     return Verdict(
         findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
         false_alarm_rate=rate,
-        identical=_estimates(baseline, estimators) == _estimates(now, estimators),
+        identical=_estimates(baseline, estimators).equals(_estimates(now, estimators)),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
     )
 
 
-def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, int], object]:
-    return {
-        ((row["estimator"], row["cell"], row["quantity"]), row["trial"]): (row["value"], row["std"])
-        for row in results.rows
-        if row["estimator"] in estimators
-    }
+def _estimates(results: Results, estimators: Sequence[str]) -> pl.DataFrame:
+    """The estimates of some estimators, in an order of their own."""
+    keys = ["estimator", "cell", "quantity", "trial"]
+    mine = results.table.filter(pl.col("estimator").is_in(list(estimators)))
+    return mine.select(*keys, "value", "std").sort(keys)
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
@@ -137,23 +138,14 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
     It has the conditions, the figures, and their standard errors and intervals.
     """
-    import polars as pl
-
+    figures = ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound")
+    columns = {name: "relative_bias_percent" if name == "relative_bias" else name for name in figures}
+    shares = {"coverage": "coverage", "failures": "failure_share"}
     rows = []
-    for (estimator, index, quantity), trials in results.trials().items():
+    for (estimator, index, quantity), trials in results.trials.items():
         if not results.gives(estimator, quantity):
             continue
         cell, judged = results.grid.cells[index], score(trials)
-        figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
-        for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
-            found: Quantity | None = getattr(judged, name)
-            label = "relative_bias_percent" if name == "relative_bias" else name
-            figures[label] = None if found is None else found.value
-            figures[f"{label}_std_error"] = None if found is None else found.std
-        for name, share in {"coverage": judged.coverage, "failure_share": judged.failures}.items():
-            ends = (None, None) if share is None else share.interval
-            figures[name] = None if share is None else share.value
-            figures[f"{name}_low"], figures[f"{name}_high"] = ends
         rows.append(
             {
                 "estimator": estimator,
@@ -168,7 +160,9 @@ def scores_frame(results: Results) -> pl.DataFrame:
                 "runs": cell.runs,
                 "quantity": quantity,
                 "unit": trials.unit,
-                **figures,
+                "trials": judged.count,
+                "failures": judged.failures.count,
+                **figure_columns(judged, columns, shares, "_std_error"),
                 "milliseconds_per_record": results.milliseconds(estimator, [index]),
             }
         )
@@ -178,7 +172,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
 def summary_tables(results: Results) -> list[Table]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     tables = []
-    trials = results.trials()
+    trials = results.trials
     for group, cells in groups_of(results.grid).items():
         many = counted(len(cells), "cell")
         result = table(
@@ -207,22 +201,25 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -
     result.add_row(f"  {significant(results.milliseconds(name, cells), 2)} ms/record")
 
 
+def score_view(results: Results, *, cells: bool = False) -> View:
+    """The view of a score.
+
+    Args:
+        cells: whether it has a table for each cell.
+    """
+    from tunnel_lab.experiments.score_drawing import score_figure
+
+    return View(
+        f"Score on the grid {results.grid.name}",
+        [*summary_tables(results), *(cell_tables(results) if cells else ()), *lines_below(results)],
+        {"score": partial(score_figure, results)},
+        {"scores.parquet": parquet(scores_frame(results))},
+    )
+
+
 def lines_below(results: Results) -> list[str]:
     """Lines below the tables: the meaning of the figures, missing quantities, and the accuracy of few trials."""
     return [ABOUT, *not_given_lines(results.not_given), *_few_trials(results)]
-
-
-def not_given_lines(not_given: Mapping[str, Sequence[str]], symbols: Mapping[str, str] = NAMES) -> list[str]:
-    """Quantities that estimators do not give, a line for each estimator.
-
-    Args:
-        not_given: names of quantities by estimator.
-        symbols: of the quantities, by name.
-    """
-    return [
-        f"Not given by {name}: {', '.join(symbols[one] for one in quantities)}."
-        for name, quantities in not_given.items()
-    ]
 
 
 def _few_trials(results: Results) -> list[str]:
@@ -257,7 +254,7 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 
 def cell_tables(results: Results) -> list[Table]:
     """One table for each cell: a section for each estimator, a row for each quantity."""
-    trials = results.trials()
+    trials = results.trials
     tables = []
     for index, cell in enumerate(results.grid.cells):
         result = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
@@ -284,14 +281,6 @@ def cell_figures(judged: Score) -> tuple[str, ...]:
 
 def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
-
-
-def share_text(share: Proportion | None) -> str:
-    """A share with its 95 % interval, in %."""
-    if share is None:
-        return "–"
-    low, high = share.interval
-    return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
 
 
 def worse_table(verdict: Verdict) -> Table:

@@ -25,26 +25,25 @@ from identification.neural.posterior import (
     variances,
     weight_shapes,
 )
-from tunnel_lab.experiments.runner import processes, run_tasks
+from tunnel_lab.experiments.experiment import read_manifest, refuse_other_content, run_in
+from tunnel_lab.experiments.runner import Workers
 from tunnel_lab.experiments.training_samples import (
     PARTS,
-    ShardSpec,
-    read_shards,
+    TRAINING,
+    read_samples,
+    samples_of,
     sizes_at_unit_excess,
-    write_shard,
 )
 from tunnel_reference.forms import FAMILIES
-from tunnel_sim.files.reading import read_json, read_regular
-from tunnel_sim.files.writing import json_line, output_folder, write_json, write_whole
+from tunnel_sim.files.reading import read_regular
+from tunnel_sim.files.writing import json_line, write_whole
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 FALSE_ALARMS = 0.01
 """Share of calibration samples, like those of the training, that are called unlike them."""
 _KEPT_EVERY = 250  # steps between checkpoints
 _SHRINK = 0.05  # shrinkage of the context's covariance towards its mean variance
-_LETTERS = {"record": "r", "campaign": "c"}
 Progress = Callable[[str, int, int], None]
 INPUTS = ("rivals", "runs", "valid", "shifts")
 """The network's arguments, by their names among the samples."""
@@ -69,44 +68,30 @@ class TrainingSpec:
 
 
 def train(
-    spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
+    spec: TrainingSpec, folder: Path, workers: Workers, progress: Progress = lambda _what, _done, _all: None
 ) -> tuple[bytes, dict[str, Any]]:
     """Simulate the missing shards, and fit both networks; finished work in the folder is kept and used.
 
     Args:
-        jobs: number of simulating processes; the result does not depend on it.
+        workers: of the simulations; the result does not depend on them.
         progress: called with the name of the step, the amount finished, and the total.
 
     Returns:
         The safetensors file, and the record of the training as JSON.
 
     Raises:
-        TunnelError: when the folder belongs to another seed, or cannot be written.
+        TunnelError: when the folder belongs to another seed or version, or cannot be written.
     """
-    output_folder(folder)
-    path = folder / "sizes.json"  # sizes of the forms; the file also identifies the seed of the folder
-    if not path.exists():
-        write_json(path, {"seed": spec.seed, "sizes": sizes_at_unit_excess(spec.seed)})
-    document = read_json(path, remedy="remove the folder")
-    if document.get("seed") != spec.seed or not isinstance(document.get("sizes"), dict):
-        raise TunnelError(
-            "belongs to another training", where=str(path), remedy="name another file, or --restart"
-        )
-    sizes = tuple(sorted(document["sizes"].items()))
-    shards = [
-        ShardSpec(spec.seed, part, number, sizes) for part in PARTS for number in range(spec.of_part(part))
-    ]
-    run_tasks(
-        partial(write_shard, folder=folder),
-        shards,
-        processes(jobs),
-        finished=lambda shard: (folder / shard.name).exists(),
-        keep=lambda *_: None,
-        progress=partial(progress, "simulating"),
-    )
-    parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
+    shards = {part: spec.of_part(part) for part in PARTS}
+    if (folder / f"{TRAINING}.json").is_file():  # the sizes take long; another seed is refused below
+        sizes = read_manifest(TRAINING, folder)[TRAINING].get("sizes", {})
+    else:
+        refuse_other_content(samples_of(spec.seed, shards, {}), folder)
+        sizes = sizes_at_unit_excess(spec.seed)
+    run_in(samples_of(spec.seed, shards, sizes), folder, workers, partial(progress, "simulating"))
     used = {
-        kind: {part: usable(samples, _LETTERS[kind]) for part, samples in parts.items()} for kind in KINDS
+        kind: {part: usable(read_samples(folder, f"{kind}s", part, count)) for part, count in shards.items()}
+        for kind in KINDS
     }
     networks = {kind: _fitted(kind, spec, used[kind][PARTS[0]], folder, progress) for kind in KINDS}
     trained = {kind: judged(networks[kind], used[kind][PARTS[0]], used[kind][PARTS[2]]) for kind in KINDS}
@@ -215,13 +200,12 @@ class State:
     step: int
 
 
-def usable(samples: Mapping[str, Array], kind: str) -> dict[str, Array]:
-    """The samples of a kind without its prefix, except those with targets very far from the nominal fit."""
-    mine = {name[2:]: values for name, values in samples.items() if name.startswith(f"{kind}.")}
-    if not all(np.all(np.isfinite(values)) for values in mine.values()):
+def usable(samples: Mapping[str, Array]) -> dict[str, Array]:
+    """The samples, except those with targets very far from the nominal fit."""
+    if not all(np.all(np.isfinite(values)) for values in samples.values()):
         raise ValueError("internal error: a training sample is not finite")
-    near = np.abs(mine["target"]).max(axis=1) < FAR
-    return {name: values[near] for name, values in mine.items()}
+    near = np.abs(samples["target"]).max(axis=1) < FAR
+    return {name: values[near] for name, values in samples.items()}
 
 
 def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:

@@ -1,7 +1,6 @@
-"""Training samples: features of simulated campaigns and of their runs with the truth, in shards on disk.
+"""Training samples: features of simulated campaigns and of their runs with the truth, as an experiment.
 
-A shard is simulated together and depends only on the seed, its part and its number; it is bit-identical for any
-number of processes.
+A shard is simulated together and depends only on the seed, its part and its number.
 """
 
 from __future__ import annotations
@@ -11,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from safetensors.numpy import load_file, save
+import polars as pl
 
 from identification.campaign.derivatives import build_design
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.rivals import Features, campaign_features, record_features
+from tunnel_lab.experiments.experiment import Done, Experiment, parquet
 from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
@@ -24,11 +24,13 @@ from tunnel_reference.integrator import Motion, Term, integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects, read_and_fit
-from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record
 
-PARTS = ("training", "tuning", "calibration")
+TRAINING = "training"
+PARTS = (TRAINING, "tuning", "calibration")
+LETTERS = {"records": "r", "campaigns": "c"}
+"""Kinds of samples by the name of their table."""
 CAMPAIGNS = 200
 """Campaigns of a shard that are integrated together."""
 VARIANTS = 3
@@ -54,31 +56,52 @@ class ShardSpec:
     number: int
     sizes: tuple[tuple[str, float], ...]
 
-    @property
-    def name(self) -> str:
-        """Name of its file."""
-        return f"{self.part}-{self.number:04d}.safetensors"
+
+def samples_of(seed: int, shards: Mapping[str, int], sizes: Mapping[str, float]) -> Experiment[ShardSpec]:
+    """The samples of some shards of each part, a table for each network; shards may be added later.
+
+    Args:
+        shards: number of each part's.
+        sizes: from `sizes_at_unit_excess`.
+    """
+    known = tuple(sorted(sizes.items()))
+    return Experiment(
+        TRAINING,
+        [ShardSpec(seed, part, number, known) for part, count in shards.items() for number in range(count)],
+        shard_samples,
+        lambda spec: f"{spec.part}-{spec.number:04d}",
+        {"seed": seed, "sizes": dict(sizes)},
+        datasets=tuple(LETTERS),
+        elsewhere="name another file, or add --restart",
+    )
 
 
-def write_shard(spec: ShardSpec, folder: Path) -> Path:
-    """Write the samples of a shard; names begin with ``c.`` for campaigns and ``r.`` for records."""
+def shard_samples(spec: ShardSpec) -> Done:
+    """The samples of a shard: a row for each, with an array in each column."""
     samples = [
         sample
         for campaign, conditions, families, number in readings_of(spec)
         for sample in reduced(campaign, truth_of(conditions), families, first_run=number)
     ]
-    names = sorted({name for sample in samples for name in sample})
-    stacked = {
-        name: np.stack([sample[name] for sample in samples if name in sample]).astype(np.float32)
-        for name in names
-    }
-    return write_whole(folder / spec.name, save(stacked))
+    files = {}
+    for dataset, letter in LETTERS.items():
+        mine = [values for kind, values in samples if kind == letter]
+        names = sorted(mine[0]) if mine else ()
+        stacked = {name: np.stack([one[name] for one in mine]).astype(np.float32) for name in names}
+        files[dataset] = parquet(pl.DataFrame(stacked))
+    return Done(files)
 
 
-def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
-    """The samples of the first shards of a part, joined."""
-    shards = [load_file(folder / f"{part}-{number:04d}.safetensors") for number in range(count)]
-    return {name: np.concatenate([shard[name] for shard in shards]) for name in shards[0]}
+def read_samples(folder: Path, dataset: str, part: str, count: int | None = None) -> dict[str, Array]:
+    """The samples of the first shards of a part, joined: arrays by name, their first axis the samples.
+
+    Args:
+        dataset: ``records`` or ``campaigns``.
+        count: None: all shards.
+    """
+    paths = sorted((folder / dataset).glob(f"{part}-*.parquet"))[:count]
+    frames = [frame for frame in map(pl.read_parquet, paths) if frame.width]
+    return {series.name: series.to_numpy() for series in pl.concat(frames).rechunk()}
 
 
 def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
@@ -131,7 +154,7 @@ def truth_of(c: Conditions) -> dict[str, float]:
 
 def reduced(
     campaign: Campaign, truth: Mapping[str, float], families: list[str], *, first_run: int
-) -> Iterator[dict[str, Array]]:
+) -> Iterator[tuple[str, dict[str, Array]]]:
     """The samples of one campaign: itself, and one of its records.
 
     Args:
@@ -186,20 +209,20 @@ def decay_of(coefficients: Array, run: Run, rig: RigProperties) -> Array:
     return np.array([(damping - drag * cn_r) / (2.0 * inertia * omega), omega])
 
 
-def _sample(kind: str, features: Features, truth: Array, labels: Array) -> dict[str, Array]:
+def _sample(kind: str, features: Features, truth: Array, labels: Array) -> tuple[str, dict[str, Array]]:
     runs = np.zeros((MOST_RUNS if kind == "c" else 1, features.runs.shape[1] + 1))
     count = min(len(features.runs), len(runs))
     runs[:count, :-1], runs[:count, -1] = features.runs[:count], 1.0
     widths = np.sqrt(np.maximum(np.diagonal(features.covariances, axis1=1, axis2=2), 1e-12))
-    return {
-        f"{kind}.rivals": features.rivals,
-        f"{kind}.runs": runs,
-        f"{kind}.shifts": features.shifts,
-        f"{kind}.widths": np.where(features.known, np.minimum(widths, 1e9), 1.0),
-        f"{kind}.valid": features.valid,
-        f"{kind}.known": features.known,
-        f"{kind}.target": np.where(features.known, (truth - features.values) / features.stds, 0.0),
-        f"{kind}.labels": labels,
+    return kind, {
+        "rivals": features.rivals,
+        "runs": runs,
+        "shifts": features.shifts,
+        "widths": np.where(features.known, np.minimum(widths, 1e9), 1.0),
+        "valid": features.valid,
+        "known": features.known,
+        "target": np.where(features.known, (truth - features.values) / features.stds, 0.0),
+        "labels": labels,
     }
 
 

@@ -29,7 +29,9 @@ def friction_figure(document: Document) -> Figure | None:
     axes = fig.add_subplot()
     low, high = moment - INTERVAL * std, moment + INTERVAL * std
     axes.fill_between(rate, np.maximum(low, 0.0), high, color=AFTER, alpha=0.25, lw=0)
-    axes.plot(rate, moment, color=AFTER, label="law, fitted")
+    load = found.get("per_load", 0.0)
+    more = f" without load; {100.0 * load:.2g} % of the load comes on top" if load else ""
+    axes.plot(rate, moment, color=AFTER, label=f"law, fitted{more}")
     tops = [float(high.max())]
     if found["points"]:
         at, mean, error = (
@@ -45,6 +47,8 @@ def friction_figure(document: Document) -> Figure | None:
     mark = "N m" if found["unit"] == "N m" else f"{unit_mark(found['unit'])}, over inertia"
     axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(found['effect'])} [{mark}]")
     log_axis(axes, "x")
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.0, borderaxespad=0.3)
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if load else 2, borderpad=0.0, borderaxespad=0.3
+    )
     grid(axes)
     return fig

@@ -166,6 +166,18 @@ def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Drawing:
     return figures[what]
 
 
+def page_of(title: str, body: str) -> str:
+    """A page in the style of the report.
+
+    Args:
+        body: HTML, included unchanged.
+    """
+    from markupsafe import Markup
+
+    words = {"style": Markup(_resource("style.css")), "script": "", "charts": {}}
+    return _rendered("plain.html.j2", {"title": title, "body": Markup(body), **words})
+
+
 def _rendered(name: str, context: dict[str, Any]) -> str:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 

@@ -149,6 +149,16 @@ LeaveOutOption = Annotated[
 ]
 
 
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Use the Dask cluster of this scheduler (tcp://host:8786), or start one here: local.",
+    ),
+]
+
+
 def estimator_option(what: str, more: str = "") -> Any:
     """The option ``--estimator`` of a command, which takes a name or a class.
 

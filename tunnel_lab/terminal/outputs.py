@@ -110,9 +110,8 @@ def show_tables(*tables: Table | RichTable) -> None:
 
 def rendered(table: RichTable, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
-    heads = [_plain(column.header) for column in table.columns]
-    rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
-    title = _plain(table.title or "")
+    plain = text_table(table)
+    title, heads, rows = plain.title, list(plain.columns), plain.rows
     if kind is TableFormat.JSON:
         from tunnel_sim.files.writing import json_line
 
@@ -134,6 +133,16 @@ def rendered(table: RichTable, kind: TableFormat) -> str:
     texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
     csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
+
+
+def text_table(table: RichTable) -> Table:
+    """A table of texts without its style, each cell on one line."""
+    heads = tuple(_plain(column.header) for column in table.columns)
+    rows = tuple(zip(*(map(_plain, column.cells) for column in table.columns), strict=True))
+    right = tuple(
+        head for head, column in zip(heads, table.columns, strict=True) if column.justify == "right"
+    )
+    return Table(_plain(table.title or ""), heads, rows, right)
 
 
 def _as_markdown(text: str) -> str:

@@ -24,6 +24,7 @@ _CONTACT = {  # parameters of the moment law by those of the friction's forms
     "friction_saturation": "saturation",
     "friction_peak": "peak",
     "friction_peak_rate": "peak_rate",
+    "friction_load": "load",
 }
 #: Terms of the moment law, each of which makes friction depend on the rate.
 AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
@@ -40,6 +41,10 @@ class CoulombFriction(Effect):
     Sliding friction depends on the rate in three ways: it rises as a power less than one, it saturates, or it has a
     peak near rest (Armstrong-Hélouvry et al. 1994). All of them leave the friction less than proportional to the
     rate, which separates the family from damping.
+
+    In a joint, friction grows with the moment carried (Hamon, Gautier & Garrec 2011): gravity's or that of
+    an actuator, whichever is greater, since they act on the two sides of the joint. The moment of a spring does not
+    count: friction proportional to it is structural damping.
     """
 
     name = "coulomb_friction"
@@ -51,7 +56,8 @@ class CoulombFriction(Effect):
     advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (
         "−Tc sgn β̇; rest while the other moments stay within ±Tc; general forms: −Tc z/zs, ż = β̇ − |β̇| z/zs; "
-        "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc"
+        "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc; in a joint Tc + μ |M|, where M is "
+        "the greater of the moments of gravity and of an actuator"
     )
     signature = (
         "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
@@ -61,6 +67,7 @@ class CoulombFriction(Effect):
         "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
         "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
         "Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994) 1083, doi 10.1016/0005-1098(94)90209-7",
+        "Hamon, Gautier & Garrec, IEEE Int. Conf. Robotics and Automation (2011) 1077",
     )
     example = (0.05,)
 
@@ -95,16 +102,29 @@ class CoulombFriction(Effect):
         scale=0.1, lower=1e-3, upper=10.0, fit_lower=0.01, fit_upper=_LOW_RATE, default=0.2,
         form=True, inside=True,
     )  # fmt: skip
+    load: float = parameter(
+        "μ", "1", "further friction per moment carried by the joint, of gravity or of an actuator",
+        scale=0.1, lower=0.0, upper=0.9, form=True, of_load=True,
+    )  # fmt: skip
 
     @classmethod
     def forms(cls) -> tuple[tuple[str, ...], ...]:
-        """The contact's deflection, and each dependence on the rate."""
-        return ("presliding",), ("exponent",), ("saturation",), ("peak", "peak_rate")
+        """The contact's deflection, each dependence on the rate, and that on the load."""
+        return ("presliding",), ("exponent",), ("saturation",), ("peak", "peak_rate"), ("load",)
+
+    @property
+    def is_null(self) -> bool:
+        """Whether there is neither a constant friction nor one that grows with the load."""
+        return self.friction_moment == 0.0 and self.load == 0.0
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """The friction, and its dependence on the rate."""
+        """The friction, and its dependence on the rate or the load."""
         said = super().phrase(values, stds, text)
+        if (load := values.get("load", 0.0)) > 0.0:
+            std = stds.get("load")
+            share = text(100.0 * load, None if std is None else 100.0 * std, "%")
+            said = f"{said} and {share} of the moment carried by the joint"
         power, saturation, peak = (values.get(name, 0.0) for name in ("exponent", "saturation", "peak"))
         if power > 0.0:
             return f"{said} that rises as the rate to the power of {text(power, stds.get('exponent'), '1')}"
@@ -125,12 +145,12 @@ class CoulombFriction(Effect):
 
     @property
     def at_rest(self) -> float:
-        """The friction that holds a body at rest, N m; 0 where it vanishes with the rate."""
+        """The friction that holds a body at rest without a load, N m; 0 where it vanishes with the rate."""
         rises = self.exponent > 0.0 or self.saturation > 0.0
         return 0.0 if rises else self.friction_moment * (1.0 + self.peak)
 
     def sliding(self, rate: Array) -> Array:
-        """The friction at a steady rate, when the contact has deflected fully, N m, shape (n,).
+        """The friction at a steady rate without a load, when the contact has deflected fully, N m, shape (n,).
 
         Args:
             rate: above 0, rad/s, shape (n,).
@@ -158,8 +178,9 @@ class CoulombFriction(Effect):
         del stated, drawn
         friction = cls.column(effects, "friction_moment")
         runs["friction_moment"][:] = friction
+        acts = (friction != 0.0) | (cls.column(effects, "load") != 0.0)
         for term, own in _CONTACT.items():
-            runs[term][:] = np.where(friction != 0.0, cls.column(effects, own), 0.0)
+            runs[term][:] = np.where(acts, cls.column(effects, own), 0.0)
         runs["friction_peak_rate"][runs["friction_peak"] == 0.0] = 0.0
 
 

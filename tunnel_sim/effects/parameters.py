@@ -41,6 +41,8 @@ class ParameterInfo:
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
+        of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
+            gravity or an actuator makes this moment vary.
     """
 
     name: str
@@ -61,6 +63,7 @@ class ParameterInfo:
     inside: bool
     of_input: bool
     along_run: bool
+    of_load: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
         """Least and greatest value that a fit may take.
@@ -101,6 +104,7 @@ def parameter(
     inside: bool = False,
     of_input: bool = False,
     along_run: bool = False,
+    of_load: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -120,6 +124,7 @@ def parameter(
         "inside": inside,
         "of_input": of_input,
         "along_run": along_run,
+        "of_load": of_load,
     }
     return field(default=default, metadata=metadata)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -16,7 +15,7 @@ import numpy as np
 from tunnel_sim.engine.model import load_plugin
 from tunnel_sim.engine.model_files import ModelFiles, engine_refusals, read_model_files
 from tunnel_sim.engine.simulate import no_log
-from tunnel_sim.processes import LimitReached, in_limited_process
+from tunnel_sim.sandbox import LimitReached, Message, in_sandbox
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 from tunnel_sim.vocabulary.record import Array
@@ -86,18 +85,23 @@ def read_joint_model(
             where the joint has a spring, beside gravity or in driven runs.
     """
     files = read_model_files(path, asset_dir)
-    request = json.dumps([joint, asdict(recorded)]).encode() + b"\n" + files.to_bytes()
+    names, contents = files.to_parts()
+    request = {"joint": joint, "recorded": asdict(recorded), "names": names}
     try:
-        found = in_limited_process(
-            law_of_request, request, prepare=prepare, seconds=limits.MODEL_SECONDS, memory=limits.MODEL_MEMORY
+        answer, _ = in_sandbox(
+            law_of_request,
+            request,
+            contents,
+            prepare=prepare,
+            seconds=limits.MODEL_SECONDS,
+            memory=limits.MODEL_MEMORY,
         )
     except LimitReached as error:
         remedy = "leave out what the motion of the joint does not need"
         raise TunnelError(f"loading it {error}", where=shown(path), remedy=remedy) from None
-    answer = json.loads(found)
-    if "what" in answer:
+    except TunnelError as error:
         where = f"{shown(path)}, joint {one_line(joint)!r}"
-        raise TunnelError(answer["what"], where=where, remedy=answer["remedy"])
+        raise TunnelError(error.what, where=where, remedy=error.remedy) from None
     given = answer["law"].pop("actuator")
     terms = tuple(Term(**one) for one in answer["law"].pop("terms"))
     actuator = None
@@ -140,38 +144,35 @@ def prepare() -> None:
     load_plugin()
 
 
-def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, or a refusal, as JSON; from joint and `Recorded` as JSON, followed by the files."""
-    at = request.index(b"\n") + 1
-    joint, given = json.loads(request[:at])
-    recorded = Recorded(**given)
-    try:
-        with no_log(), np.errstate(all="ignore"):
-            with engine_refusals("MuJoCo cannot load it", "correct the file"):
-                model = ModelFiles.from_bytes(request[at:]).spec().compile()
-            if not model.opt.timestep > 0.0:
-                remedy = "correct the model's option"
-                raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
-            names = [model.joint(i).name for i in range(model.njnt)]
-            if joint not in names:
-                known = [name for name in names if name]
-                remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
-                raise TunnelError("there is no such joint", remedy=remedy)
-            others = [name or "without a name" for name in names if name != joint]
-            if others:
-                remedy = "remove them, so that the bodies are welded; one joint is recorded"
-                raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
-            if model.neq or model.nflex or model.na:
-                what = "equality constraints, deformable bodies and actuators with states cannot be part of the law"
-                raise TunnelError(what, remedy="remove them")
-            kind = _TYPES.get(int(model.jnt_type[0]))
-            if kind is None:
-                raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
-            actuator = _actuator(model, recorded)  # removes its limits
-            law = replace(_law(model, recorded, slide=kind == "slide"), actuator=actuator)
-    except TunnelError as error:
-        return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
-    return json.dumps({"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}).encode()
+def law_of_request(request: dict[str, Any], contents: Sequence[bytes]) -> Message:
+    """The law of a joint, from its name, the fields of `Recorded` and the parts of `ModelFiles`."""
+    joint, recorded = request["joint"], Recorded(**request["recorded"])
+    with no_log(), np.errstate(all="ignore"):
+        with engine_refusals("MuJoCo cannot load it", "correct the file"):
+            model = ModelFiles.from_parts(request["names"], contents).spec().compile()
+        if not model.opt.timestep > 0.0:
+            remedy = "correct the model's option"
+            raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
+        names = [model.joint(i).name for i in range(model.njnt)]
+        if joint not in names:
+            known = [name for name in names if name]
+            remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
+            raise TunnelError("there is no such joint", remedy=remedy)
+        others = [name or "without a name" for name in names if name != joint]
+        if others:
+            remedy = "remove them, so that the bodies are welded; one joint is recorded"
+            raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
+        if model.neq or model.nflex or model.na:
+            what = (
+                "equality constraints, deformable bodies and actuators with states cannot be part of the law"
+            )
+            raise TunnelError(what, remedy="remove them")
+        kind = _TYPES.get(int(model.jnt_type[0]))
+        if kind is None:
+            raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
+        actuator = _actuator(model, recorded)  # removes its limits
+        law = replace(_law(model, recorded, slide=kind == "slide"), actuator=actuator)
+    return {"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}, []
 
 
 class _Engine:

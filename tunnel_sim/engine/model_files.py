@@ -7,7 +7,6 @@ it opens no file, and the model is the same at every compilation.
 from __future__ import annotations
 
 import html
-import json
 import os
 import posixpath  # MuJoCo's names have slashes everywhere
 import re
@@ -47,24 +46,18 @@ class ModelFiles:
         with engine_refusals("MuJoCo cannot load it", "correct the file"):
             return mujoco.MjSpec.from_string(self.text, include=self.documents, assets=dict(self.assets))
 
-    def to_bytes(self) -> bytes:
-        """The sizes in one line of JSON, then the contents."""
-        parts = [{"": self.text.encode()}, self.documents, self.assets]
-        sizes = [{name: len(content) for name, content in part.items()} for part in parts]
-        contents = [content for part in parts for content in part.values()]
-        return b"".join([json.dumps(sizes).encode(), b"\n", *contents])
+    def to_parts(self) -> tuple[dict[str, list[str]], list[bytes]]:
+        """The names of documents and assets, and the contents of the model, the documents and the assets."""
+        names = {"documents": [*self.documents], "assets": [*self.assets]}
+        return names, [self.text.encode(), *self.documents.values(), *self.assets.values()]
 
     @classmethod
-    def from_bytes(cls, content: bytes) -> ModelFiles:
-        """The files from the bytes of `to_bytes`."""
-        at = content.index(b"\n") + 1
-        parts: list[dict[str, bytes]] = []
-        for sizes in json.loads(content[:at]):
-            parts.append({})
-            for name, size in sizes.items():
-                parts[-1][name] = content[at : at + size]
-                at += size
-        return cls(parts[0][""].decode(), parts[1], parts[2])
+    def from_parts(cls, names: Mapping[str, Sequence[str]], parts: Sequence[bytes]) -> ModelFiles:
+        """The files from the result of `to_parts`."""
+        text, *contents = parts
+        count = len(names["documents"])
+        documents = dict(zip(names["documents"], contents[:count], strict=True))
+        return cls(text.decode(), documents, dict(zip(names["assets"], contents[count:], strict=True)))
 
 
 def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:

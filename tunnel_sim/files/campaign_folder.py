@@ -13,8 +13,8 @@ import tomli_w
 from pydantic import Field
 
 from tunnel_sim.files.plausible import checked_record, plausible_values
-from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
+from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.scatter_tables import RepeatabilityTable
 from tunnel_sim.files.toml_input import (
     NotNegative,
@@ -261,18 +261,6 @@ def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
     if run.drive_gain == 0.0:
         what = f"drive_gain = 0 of the column {column}"
         raise TunnelError(what, where=where, remedy="give drive_gain in N m per unit, not zero")
-
-
-def as_campaign(given: Campaign | Path | str) -> Campaign:
-    """A campaign, read if its folder, its ``campaign.toml`` or one file of a data logger is given."""
-    if isinstance(given, Campaign):
-        return given
-    path = Path(given)
-    if not path.is_file() or path.name == CAMPAIGN_FILE:
-        return read_campaign(path)
-    from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
-
-    return read_records([path]).campaign
 
 
 def write_campaign(

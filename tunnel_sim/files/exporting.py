@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY
-from tunnel_sim.files.readers import COLUMNS
+from tunnel_sim.files.run_files import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run

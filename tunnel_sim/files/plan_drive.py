@@ -9,13 +9,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from tunnel_sim.files.readers import read_input
+from tunnel_sim.files.run_files import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
 from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.quantities import Times
 
 Positive = Annotated[float, Field(gt=0.0)]
 Kind = Literal["sine", "stepped_sine", "chirp", "multisine", "random", "square", "file"]
@@ -146,13 +146,12 @@ def _check_sampled(name: str, frequency: float | None, sample_rate: float, where
         raise TunnelError(what, where=where, remedy="lower it, or raise sample_rate under [sensor]")
 
 
-def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
+def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Times) -> Drive:
     """The input of one driven run, unless a file gives it.
 
     Args:
         amplitude: peak, in the unit of the input.
         number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
-        time_s: of the samples from 0 on, shape (n,), s.
     """
     low, high = table.from_hz or 0.0, table.to_hz or 0.0
     rng = np.random.default_rng([table.seed or 0, number])
@@ -170,12 +169,8 @@ def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array
     return Drive(table.column, amplitude * wave, table.hold)
 
 
-def drive_of_file(path: Path, time_s: Array, table: DriveTable, where: str) -> Drive:
-    """The input of a file at the times of the samples, its first value at time 0.
-
-    Args:
-        time_s: of the samples from 0 on, shape (n,), s.
-    """
+def drive_of_file(path: Path, time_s: Times, table: DriveTable, where: str) -> Drive:
+    """The input of a file at the times of the samples from 0 on, its first value at time 0."""
     given, column, values = read_input(path, where)
     hold = table.hold
     if not INPUTS[column].amplitudes:

@@ -17,7 +17,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array, Record, count_cycles
+from tunnel_sim.vocabulary.quantities import Hertz, Rad, Readings, Times
+from tunnel_sim.vocabulary.record import Record, count_cycles
 
 KEEP = "state plausible = false under [sensor] to keep it"
 #: With fewer samples per cycle the peaks are only resolved to 5 %, and the record may be an undetectable alias of
@@ -100,21 +101,15 @@ def plausible_values(values: Mapping[str, Any], where: str) -> None:
 
 
 def checked_record(
-    time_s: Array,
-    reading: Array,
+    time_s: Times,
+    reading: Readings,
     column: str,
     sensor: SensorProperties,
-    release_angle: float | None,
+    release_angle: Rad | None,
     where: str,
     drive: Drive | None = None,
 ) -> Record:
-    """The record of a run, unless it or its input is refused.
-
-    Args:
-        time_s: sample times, shape (n,), s.
-        reading: shape (n,), rad, rad/s or rad/s².
-        release_angle: as stated, rad.
-    """
+    """The record of a run, unless it or its input is refused."""
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     swing = 0.5 * (float(reading.max()) - float(reading.min()))  # the sensor's zero is unknown
@@ -171,13 +166,8 @@ def _check(said: str, value: float, allowed: Range, where: str) -> None:
     raise TunnelError(f"{said}: {_LOOKS} {slip}", where=where, remedy=f"give it in {allowed.unit}; {KEEP}")
 
 
-def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> None:
-    """Refuse times that do not increase, or are not in s. Steps may differ, and samples may be missing.
-
-    Args:
-        time_s: sample times, shape (n,), s.
-        sample_rate: as stated in the campaign, Hz; None where it is not stated.
-    """
+def increasing_times(time_s: Times, sample_rate: Hertz | None, where: str) -> None:
+    """Refuse times that do not increase, or are not in s. Steps may differ, and samples may be missing."""
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
     steps = np.diff(time_s)

@@ -1,52 +1,32 @@
-"""The readers of files, by file extension; and run files: tables of times and angles in CSV or Parquet."""
+"""The readers of files, by file extension: a new format is a `Reader` and a line in `READERS`."""
 
 from __future__ import annotations
 
 import functools
 import pkgutil
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-import polars as pl
-from numpy.typing import NDArray
-
-from tunnel_sim.files.reading import check_count, check_lines, check_utf8, is_blank, read_regular
-from tunnel_sim.files.writing import encoded
-from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError, added_to, loading, one_line, one_of
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, WITHOUT_UNIT, InputColumn
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, loading, one_line
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from tunnel_sim.files.importing.tables import Table
 
 ENTRY_POINTS = "tunnel.readers"
 """Group of the entry points by which an installed package adds readers: ending without its dot, and `Reader`."""
 
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "angle": ("yaw_rad", "yaw_deg"),
-    "rate": ("yaw_rate_rad_s", "yaw_rate_deg_s"),
-    "acceleration": ("yaw_acceleration_rad_s2",),
-}
-"""The columns that may hold the reading, by the sensor's quantity; the first one is written."""
-
-USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names), *INPUT_COLUMNS)
-"""The columns of a run file that are read; others are left alone."""
-
 
 @dataclass(frozen=True)
 class FileTable:
-    """The table of a run file: at least its `USED_COLUMNS`, possibly as texts below a line of headings.
+    """The table of a run file: at least its columns of times, readings and input.
 
     Args:
         names: of all columns of the file, including those that are not in the frame.
+        text: whether its cells are texts, below a line of headings.
     """
 
     frame: pl.DataFrame
@@ -74,18 +54,18 @@ class Reader:
 
 
 READERS: Mapping[str, str] = {
-    ".csv": "tunnel_sim.files.readers:CSV",
-    ".parquet": "tunnel_sim.files.importing.binary:PARQUET",
-    ".xlsx": "tunnel_sim.files.importing.workbook:WORKBOOK",
-    ".xlsm": "tunnel_sim.files.importing.workbook:WORKBOOK",
-    ".mat": "tunnel_sim.files.importing.binary:MAT",
-    ".h5": "tunnel_sim.files.importing.binary:HDF5",
-    ".hdf5": "tunnel_sim.files.importing.binary:HDF5",
-    ".hdf": "tunnel_sim.files.importing.binary:HDF5",
-    ".tdms": "tunnel_sim.files.importing.binary:TDMS",
-    ".json": "tunnel_sim.files.importing.json_tables:JSON",
-    ".jsonl": "tunnel_sim.files.importing.json_tables:JSON_LINES",
-    ".ndjson": "tunnel_sim.files.importing.json_tables:JSON_LINES",
+    ".csv": "tunnel_sim.files.run_files:CSV",
+    ".parquet": "tunnel_sim.files.importing.formats.binary:PARQUET",
+    ".xlsx": "tunnel_sim.files.importing.formats.workbook:WORKBOOK",
+    ".xlsm": "tunnel_sim.files.importing.formats.workbook:WORKBOOK",
+    ".mat": "tunnel_sim.files.importing.formats.binary:MAT",
+    ".h5": "tunnel_sim.files.importing.formats.binary:HDF5",
+    ".hdf5": "tunnel_sim.files.importing.formats.binary:HDF5",
+    ".hdf": "tunnel_sim.files.importing.formats.binary:HDF5",
+    ".tdms": "tunnel_sim.files.importing.formats.binary:TDMS",
+    ".json": "tunnel_sim.files.importing.formats.json_tables:JSON",
+    ".jsonl": "tunnel_sim.files.importing.formats.json_tables:JSON_LINES",
+    ".ndjson": "tunnel_sim.files.importing.formats.json_tables:JSON_LINES",
 }
 """Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
 
@@ -138,181 +118,3 @@ def faults(kind: str, where: str) -> Iterator[None]:
             raise
         what = f"is not {kind} that can be read ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="export it again, or as text") from None
-
-
-RUN_FORMATS = ("parquet", "csv")
-"""Formats that are written."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunTableValues:
-    """The content of a run file.
-
-    Args:
-        time_s: sample times, shape (n,), s; None without a column time_s.
-        reading: shape (n,), rad, rad/s or rad/s².
-        input: shape (n,), in the unit of its column; None for a free decay.
-    """
-
-    time_s: Array | None
-    reading: Array
-    column: str
-    input_column: InputColumn | None = None
-    input: Array | None = None
-
-
-def read_table(
-    path: Path,
-    where: str,
-    *,
-    timed: bool = False,
-    quantity: Quantity = "angle",
-    most: int = limits.RUN_SAMPLES,
-) -> RunTableValues:
-    """Read finite times, readings and an input from a run file; ``timed``: the times are required."""
-    missing = "put the file there or correct 'file' in campaign.toml"
-    known = COLUMNS[quantity]
-    holds = f"give it a column {' or '.join(known)}, and time_s unless [sensor] sample_rate is given"
-    held = _held(path, where, missing, most, holds)
-    names = held.names
-    driven = _input_column(names, where)
-    found = [name for name in known if name in names]
-    if len(found) > 1:
-        raise TunnelError(f"both {' and '.join(found)}", where=where, remedy="leave one of them out")
-    if not found:
-        other = next((kind for kind, columns in COLUMNS.items() if not set(columns).isdisjoint(names)), None)
-        raise TunnelError(
-            f"no column {' or '.join(known)} (columns found: {one_line(', '.join(names) or 'none', 60)})",
-            where=where,
-            remedy=f"name the {quantity}'s column {' or '.join(known)}"
-            + (f", or state quantity = '{other}' under [sensor]" if other else ""),
-        )
-    column = found[0]
-    stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
-    if timed and "time_s" not in names and stray is not None:
-        what = f"no column time_s and no sample_rate, but a column '{one_line(stray, 40)}'"
-        remedy = "did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]"
-        raise TunnelError(what, where=where, remedy=remedy)
-    used = [name for name in ("time_s", column, driven) if name in names and name is not None]
-    table = held.frame.select(used)
-    if held.text:
-        # A text table without the blank lines at its end.
-        blank = table.select(pl.all_horizontal(pl.all().is_null())).to_series().to_numpy()
-        filled = np.flatnonzero(~blank)
-        table = table.head(int(filled[-1]) + 1 if filled.size else 0)
-    if table.height == 0:
-        remedy = "record the run again or leave it out"
-        raise TunnelError("the file has no samples", where=where, remedy=remedy)
-    values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
-    reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
-    given = None if driven is None else values[driven]
-    return RunTableValues(values.get("time_s"), reading, column, driven, given)
-
-
-def _held(
-    path: Path, where: str, missing: str, most: int, holds: str = "give it a header line and samples"
-) -> FileTable:
-    reader = load_reader(path.suffix.lower())
-    if reader is None or reader.read_run is None:
-        what = f"unsupported file type '{one_line(path.suffix)}'"
-        raise TunnelError(what, where=where, remedy=f"use {' or '.join(run_endings())}")
-    readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
-    content = read_regular(path, reader.limit, where=where, missing=missing, readable=readable)
-    if is_blank(content):
-        raise TunnelError("the file is empty", where=where, remedy=holds)
-    return reader.read_run(content, where, most)
-
-
-def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
-    """Read the input of a driven run, and its times, s, increasing, from a file that need not contain a reading."""
-    held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
-    column = _input_column(held.names, where)
-    if column is None or "time_s" not in held.names:
-        what = f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}"
-        raise TunnelError(what, where=where, remedy="give it time_s in s and one input column")
-    time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
-    if time.size < 2 or not np.all(np.diff(time) > 0.0):
-        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
-    return time, column, values
-
-
-def table_bytes(
-    record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
-) -> bytes:
-    """The content of a run file, in the format of the path, with readings in radians, to the last digit."""
-    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
-    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
-    # CSV values have the fewest digits that are read as the same float.
-    return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
-
-
-def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
-    for bare, columns in WITHOUT_UNIT.items():
-        if bare in names:
-            remedy = f"name it {one_of(columns)}"
-            raise TunnelError(f"the input column {bare} does not say its unit", where=where, remedy=remedy)
-    found = [name for name in INPUT_COLUMNS if name in names]
-    if len(found) > 1:
-        remedy = "a run has one input: keep its column and rename the others"
-        raise TunnelError(f"{len(found)} input columns: {' and '.join(found)}", where=where, remedy=remedy)
-    return found[0] if found else None
-
-
-def _numbers(series: pl.Series, text: bool, where: str) -> Array:
-    """The values of a column as finite floats, or a message naming the first that is not finite."""
-    if series.dtype == pl.String and text:
-        numbers = series.str.strip_chars(' \t\r"').cast(pl.Float64, strict=False)
-    else:
-        numbers = series.cast(pl.Float64)
-    values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
-    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # true for NaN as well
-    if bad.size:
-        at = int(bad[0])
-        cell = series[at]
-        said = "no value" if cell is None or not str(cell).strip() else one_line(cell, 30)
-        raise TunnelError(
-            f"{series.name} is {said}{'' if said == 'no value' else ', not a finite number,'} in "
-            f"{f'line {at + 2}' if text else f'row {at + 1}'} ({bad.size} such)",
-            where=where,
-            remedy="cut the record before it, or leave the run out",
-        )
-    return values
-
-
-def _read_csv(content: bytes, where: str, most: int) -> FileTable:
-    """A table as text."""
-    check_utf8(content, where)
-    check_lines(content, where, "save it again as text, or cut off what a crash has left at its end")
-    head = content[: content.find(b"\n") + 1] or content
-    columns, lines = head.count(b",") + 1, content.count(b"\n")
-    check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    check_count(lines - 1, most, "samples", where, "split the file, or thin it out")
-    check_count(lines * columns, limits.CELLS, "cells", where, "leave out columns that are not needed")
-    try:
-        # All columns, though few are used: Polars does not detect an extra value in a line that it reads in part.
-        rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
-    except pl.exceptions.PolarsError as error:
-        what = f"not a comma-separated table ({one_line(error, 60)})"
-        remedy = "give every line one value for each column, with commas between and decimal points"
-        raise TunnelError(what, where=where, remedy=remedy) from None
-    names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
-    for name in names:
-        with suppress(ValueError):
-            float(name)
-            remedy = "name the columns in the first line, such as time_s,yaw_rad"
-            raise TunnelError("no header line", where=where, remedy=remedy)
-    if len(names) == 1 and re.search(r"[;\t]", names[0]):
-        raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
-    twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
-    if twice is not None:
-        raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
-    # Other columns without a name, or with a shared one, are named by their position.
-    names = [name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)]
-    used = [i for i, name in enumerate(names) if name in USED_COLUMNS]
-    frame = rows[1:, used]
-    frame.columns = [names[i] for i in used]
-    return FileTable(frame, names, text=True)
-
-
-CSV = Reader("a comma-separated table", limits.CSV_BYTES, read_run=_read_csv)
-"""Run files as comma-separated text."""

@@ -11,6 +11,7 @@ from typing import Self
 
 import numpy as np
 
+from tunnel_sim.vocabulary.quantities import PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
 _JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot separate a shorter part from rounding
@@ -24,12 +25,11 @@ class Samples:
     """An input at increasing times: constant from each to the next, or linear between them.
 
     Args:
-        time_s: shape (n,), s.
-        values: shape (n,), in one unit throughout.
+        values: in one unit throughout.
     """
 
-    time_s: Array
-    values: Array
+    time_s: Times
+    values: PerSample
     held: bool
 
     @property

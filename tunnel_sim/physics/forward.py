@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling, spring_end_angle
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.quantities import Angles, Hertz, Laws, Rad, Rates, Seconds
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _NONE: Array = np.zeros(0)
 
 
-def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
-    """Integrate runs of equal length: angle (rad) and rate (rad/s) of the rod's upper end, shape (n, samples).
+def integrate(law: Laws, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
+    """Integrate runs of equal length: angle (rad) and rate (rad/s) of the rod's upper end, shape (runs, samples).
 
     The status is 0, or one more than the index of the first run whose motion diverged (that run and
     the later ones are unset).
 
     Args:
-        law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; the arrays behind its pointers must stay alive.
+        runs: of `run_dtype`; the arrays behind its pointers must stay alive.
         samples: samples per run, the first at time 0.
     """
     count = len(runs)
@@ -51,12 +51,8 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
     return angle, rate, int(status)
 
 
-def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:
-    """Integrate one run with its timestep; a ValueError where the motion diverges.
-
-    Args:
-        sample_rate: Hz.
-    """
+def forward_motion(rig: Rig, settings: RunSettings, sample_rate: Hertz) -> Motion:
+    """Integrate one run with its timestep; a ValueError where the motion diverges."""
     samples, steps = sampling(settings, sample_rate)
     run, keep_alive = forward_run(settings)
     run["steps"] = steps
@@ -121,14 +117,8 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     return np.array([row], dtype=run_dtype()), (values, imposed, beside, program, *driven)
 
 
-def backlash(angle: Array, half_width: float, start: float) -> Array:
-    """The reading behind a backlash, rad, shape (n,): it moves only when pushed.
-
-    Args:
-        angle: of the driving side, rad, shape (n,).
-        half_width: rad.
-        start: the reading before the first sample, rad.
-    """
+def backlash(angle: Angles, half_width: Rad, start: Rad) -> Angles:
+    """The reading behind a backlash: it moves only when pushed, at first from a starting reading."""
     source = np.ascontiguousarray(angle, dtype=np.float64)
     result = np.empty_like(source)
     forward_library().vwt_backlash(source.size, source.ctypes.data, half_width, start, result.ctypes.data)
@@ -154,13 +144,8 @@ class Ringing:
     amplitude: complex
     root: complex
 
-    def added(self, angle: Array, rate: Array, interval: float) -> tuple[Array, Array]:
-        """Angle and rate with the ringing.
-
-        Args:
-            angle, rate: of the slow motion at equal intervals from the release, rad and rad/s, shape (n,).
-            interval: s.
-        """
+    def added(self, angle: Angles, rate: Rates, interval: Seconds) -> tuple[Angles, Rates]:
+        """Angle and rate of the slow motion, at equal intervals from the release, with the ringing."""
         size = abs(self.amplitude)
         if size <= _GONE:
             return angle, rate

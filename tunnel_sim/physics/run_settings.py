@@ -22,6 +22,7 @@ from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.quantities import Angles, Moments, Number, PerSample, RadPerS, Rates, Times
 from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -113,8 +114,8 @@ class DriveMoment:
     """The moment of a drive: linear or constant between its samples, constant before the first and after the last.
 
     Args:
-        time_s: of the samples, since the run's start, shape (n,), s, increasing.
-        values: at these times, shape (n,), any unit.
+        time_s: of the samples, since the run's start, increasing.
+        values: at these times, in any unit.
         scale: N m per unit.
         delay: time by which it acts later than its samples, s.
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
@@ -123,8 +124,8 @@ class DriveMoment:
         by_actuator: whether it is the demand on an actuator, where it acts on the body.
     """
 
-    time_s: Array
-    values: Array
+    time_s: Times
+    values: PerSample
     scale: float = 1.0
     delay: float = 0.0
     held: bool = False
@@ -185,15 +186,8 @@ class DriveMoment:
         )
         return bool(even) and abs(apart - round(apart)) <= 1e-6 * apart
 
-    def means(self, ends: Array) -> Array:
-        """Means of the delayed input between successive times, which keep its impulse.
-
-        Args:
-            ends: since the run's start, shape (n + 1,), s, increasing.
-
-        Returns:
-            In the unit of the values, shape (n,).
-        """
+    def means(self, ends: Times) -> PerSample:
+        """Means of the delayed input between successive times since the run's start, which keep its impulse."""
         acting = self.acting
         times, given, ends = acting.time_s, acting.values, ends - acting.delay
         before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
@@ -204,18 +198,15 @@ class DriveMoment:
         return np.asarray(np.diff(integral) / np.diff(ends), np.float64)
 
     def oscillation(
-        self, frequency: float, damping_ratio: float, time_s: Array, derivative: int = 0
-    ) -> Array:
+        self, frequency: RadPerS, damping_ratio: Number, time_s: Times, derivative: int = 0
+    ) -> Moments:
         """The response of an oscillator at rest to the moment u: q̈ + 2ζω q̇ + ω² q = ω² u, exact for both holds.
 
         Args:
-            frequency: undamped, ω, rad/s.
-            damping_ratio: ζ below 1, dimensionless.
-            time_s: since the run's start, at which it begins at rest, shape (n,), s.
-            derivative: which derivative of q is returned: 0, 1 or 2.
-
-        Returns:
-            q in N m, or its derivative per s or s², shape (n,).
+            frequency: undamped, ω.
+            damping_ratio: ζ below 1.
+            time_s: since the run's start, at which it begins at rest.
+            derivative: which derivative of q is returned, per s or s²: 0, 1 or 2.
         """
         ringing = np.sqrt(1.0 - damping_ratio**2)
         pole = frequency * complex(-damping_ratio, ringing)
@@ -398,13 +389,13 @@ class Motion:
     """The true motion of one run at the sensor's sample times.
 
     Args:
-        time_s: shape (n,), s from the release.
-        angle, rate: of the rod's upper end, which carries spring and sensor, shape (n,), rad and rad/s.
+        time_s: from the release.
+        angle, rate: of the rod's upper end, which carries spring and sensor.
     """
 
-    time_s: Array
-    angle: Array
-    rate: Array = field(repr=False)
+    time_s: Times
+    angle: Angles
+    rate: Rates = field(repr=False)
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

@@ -11,6 +11,7 @@ import numpy as np
 from tunnel_sim.physics.moment_law import parameter_names
 from tunnel_sim.physics.run_settings import DriveMoment, RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.quantities import Laws, PerRun, SpeedPerRun, StiffnessPerRun
 from tunnel_sim.vocabulary.record import Array
 
 _BESIDE = ("wind_speed", "release_angle", "release_rate", "duration")
@@ -74,29 +75,29 @@ class SettingsTable:
         """Number of runs."""
         return len(self.numbers)
 
-    def __getitem__(self, name: str) -> Array:
-        """A column by its name, in its unit, shape (runs,); a view, so that its values can be set."""
+    def __getitem__(self, name: str) -> PerRun:
+        """A column by its name, in its unit; a view, so that its values can be set."""
         column: Array = self.numbers[:, column_places()[name]]
         return column
 
     @property
-    def spring_stiffness(self) -> Array:
-        """Kr, N m/rad, shape (runs,)."""
+    def spring_stiffness(self) -> StiffnessPerRun:
+        """The stiffness Kr."""
         return self["spring_stiffness"]
 
     @property
-    def wind_speed(self) -> Array:
-        """V, m/s, shape (runs,)."""
+    def wind_speed(self) -> SpeedPerRun:
+        """The speed V."""
         return self["wind_speed"]
 
     @property
-    def air_density(self) -> Array:
-        """ρ, kg/m³, shape (runs,)."""
+    def air_density(self) -> PerRun:
+        """The density ρ, kg/m³."""
         return self["air_density"]
 
     @property
-    def law(self) -> Array:
-        """The moment law's parameters, in the law's order, shape (runs, parameters); a view."""
+    def law(self) -> Laws:
+        """The parameters of the moment law; a view."""
         return self.numbers[:, : len(parameter_names())]
 
     def copy(self) -> SettingsTable:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import forward_library
+from tunnel_sim.vocabulary.quantities import Laws
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -26,12 +27,11 @@ def most_winds() -> int:
     return int(forward_library().vwt_most_winds())
 
 
-def terms(law: Array, runs: NDArray[np.void]) -> Array:
-    """Values of the terms of plain runs, in units of kg, m, s and rad, shape (n, terms).
+def terms(law: Laws, runs: NDArray[np.void]) -> Array:
+    """Values of the terms of plain runs, in units of kg, m, s and rad, shape (runs, terms).
 
     Args:
-        law: the moment law's parameters, shape (n, number of parameters), in the law's order.
-        runs: shape (n,), of `run_dtype`; the arrays behind its pointers must stay alive.
+        runs: of `run_dtype`; the arrays behind its pointers must stay alive.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     values = np.zeros((len(runs), len(term_places())))
@@ -61,7 +61,7 @@ class Slopes:
 
 
 def slopes(
-    law: Array,
+    law: Laws,
     runs: NDArray[np.void],
     samples: int,
     columns: Sequence[int],
@@ -71,8 +71,7 @@ def slopes(
     """Integrate plain runs of equal length, and their derivatives by some terms.
 
     Args:
-        law: as in `terms`, shape (n, number of parameters).
-        runs: as in `terms`, shape (n,).
+        runs: as in `terms`.
         samples: samples per run, the first at time 0.
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval

@@ -23,6 +23,7 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.quantities import DurationPerRun, Hertz, Laws, RatePerRun, Seconds, SpeedPerRun
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -45,7 +46,7 @@ _FIT_STEP = 8.75e-3  # s: a body at the 2 Hz to which the fits scale time turns 
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
 _FIT_MOST_STRIDE = 3  # block means per step
 #: Parameters of moments that a long step of a fit does not resolve: kinks, and a nonlinear spring.
-_ROUGH = ("friction_moment", "free_play", "gravity_stiffness")
+_ROUGH = ("friction_moment", "friction_load", "free_play", "gravity_stiffness")
 _FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, whose error is of second order
 _FIT_SHORTEST = 2e-4  # s, for any stiffness of the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
@@ -57,19 +58,16 @@ _MOST_CONTACT_SUBSTEPS = 40
 _LEAST_RANGE = 1e-6  # rad: a shorter presliding range does not shorten the steps further
 
 
-def whole_steps(sample_rate: float) -> float:
-    """The longest step, s, at most 1/`USUAL_RATE`, that divides the sample interval of a rate in Hz."""
+def whole_steps(sample_rate: Hertz) -> Seconds:
+    """The longest step, at most 1/`USUAL_RATE`, that divides the sample interval."""
     return 1.0 / (sample_rate * max(1, ceil(USUAL_RATE / sample_rate)))
 
 
-def fit_substeps(runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
-    """Number of steps of the fits from one block mean to the next, shape (runs,).
+def fit_substeps(runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:
+    """Number of steps of the fits from one block mean to the next, by run.
 
     A fit may try a body that turns more than half a turn between block means. The steps are too long to resolve
     such a body, and its motion decays at once or diverges.
-
-    Args:
-        interval: between block means, s, shape (runs,).
     """
     body = np.sqrt(runs.spring_stiffness / runs["yaw_inertia"])
     turn = np.where(runs["free_play"] != 0.0, _FIT_KINKED_TURN, _FIT_BODY_TURN)
@@ -81,13 +79,10 @@ def fit_substeps(runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
     return np.ceil(interval / longest).astype(np.int64)
 
 
-def fit_stride(rig: Rig, runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
-    """Number of block means in one step of a fit, shape (runs,); the motion between its ends is cubic.
+def fit_stride(rig: Rig, runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:
+    """Number of block means in one step of a fit, by run; the motion between its ends is cubic.
 
     The rods are rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
-
-    Args:
-        interval: between block means, s, shape (runs,).
     """
     turn = np.maximum(body_rates(rig, runs) * interval, 1e-9)
     turn[~np.isfinite(turn)] = np.inf
@@ -97,17 +92,12 @@ def fit_stride(rig: Rig, runs: SettingsTable, interval: Array) -> NDArray[np.int
     return np.where(rough | sampled, 1, stride)
 
 
-def compensated(law: Array, wind_speed: Array, step: Array) -> tuple[Array, Array]:
+def compensated(law: Laws, wind_speed: SpeedPerRun, step: DurationPerRun) -> tuple[Laws, DurationPerRun]:
     """The moment laws and the steps with which the method's leading errors in a linear oscillation vanish.
 
     Per step h the method turns a root λ by λh − (λh)⁵/120 + (λh)⁶/144. For an oscillation that decays slowly, at
     the rate σ, this is ωh (1 − (ωh)⁴/120): the step is lengthened by that share. The decay is then
     σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper compensates for both. The residual error is of the order (ωh)⁵.
-
-    Args:
-        law: shape (runs, parameters), in the law's order.
-        wind_speed: m/s, shape (runs,).
-        step: h, s, shape (runs,).
     """
     at = column_places()
     inertia, loss = law[:, at["yaw_inertia"]], law[:, at["mechanical_damping"]]
@@ -122,12 +112,8 @@ def compensated(law: Array, wind_speed: Array, step: Array) -> tuple[Array, Arra
     return found, step * (1.0 + turn**4 / 120.0)
 
 
-def report_substeps(run: RunSettings, interval: float) -> int:
-    """Number of steps of the reported prediction from one block mean to the next.
-
-    Args:
-        interval: between block means, s.
-    """
+def report_substeps(run: RunSettings, interval: Seconds) -> int:
+    """Number of steps of the reported prediction from one block mean to the next, after an interval."""
     longest = REPORT_STEP
     if run.rod_twist is not None:
         rod = run.rod_twist.free_frequency(run.yaw_inertia)
@@ -149,6 +135,10 @@ def for_contact(run: RunSettings) -> RunSettings:
     reach, friction, peak = (
         run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
     )
+    if share := run.parameters.get("friction_load", 0.0):
+        weight = sum(abs(run.parameters.get(name, 0.0)) for name in ("gravity_stiffness", "load_stiffness"))
+        driven = run.drive.greatest[0] if run.drive is not None and run.drive.on_body else 0.0
+        friction += share * max(weight, driven)
     names = ("friction_saturation", "friction_peak_rate")
     rates = [rate for name in names if (rate := run.parameters.get(name, 0.0)) > 0.0]
     if friction == 0.0 or (reach == 0.0 and not rates):
@@ -185,11 +175,8 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     return float(body_rates(rig, SettingsTable.of([run]))[0])
 
 
-def body_rates(rig: Rig, runs: SettingsTable) -> Array:
-    """The fastest rate of every body on its spring, with or without wind, at the slopes of the release.
-
-    In rad/s, shape (runs,).
-    """
+def body_rates(rig: Rig, runs: SettingsTable) -> RatePerRun:
+    """The fastest rate of every body on its spring, with or without wind, at the slopes of the release."""
     with np.errstate(over="ignore", invalid="ignore"):  # a fit may try a diverging law
         return _body_rates(rig, runs)
 
@@ -230,7 +217,7 @@ def _body_rates(rig: Rig, runs: SettingsTable) -> Array:
 
 
 def _slope(runs: SettingsTable, name: str, textbook: float, x: Array, reference: float) -> Array:
-    """Magnitude of the slope at x of a power term, shape (runs,)."""
+    """Magnitude of the slope at x of a power term, by run."""
     coefficient = np.abs(runs[name])
     # the aerodynamic factor multiplies the angle itself, which adds one to the exponent
     beside = 1.0 if name == "moment_cubic" else 0.0

@@ -28,7 +28,7 @@ UPLOAD_BYTES = 128 * 2**20
 """Most bytes dropped on the bench at once: they pass through memory; tunnel import reads larger files."""
 
 READER_SECONDS = 20.0
-"""Longest that a library may take to read a file, s, with more for a large one by READER_PACE: most take 0.01 s."""
+"""Longest processor time of reading a file, s, with more for a large one by READER_PACE: most take 0.01 s."""
 READER_PACE = 2.0**19
 """Slowest pace at which a library may read, bytes per s: workbooks, the slowest, are read at 2 MB/s."""
 READER_MEMORY = 4 * 2**30

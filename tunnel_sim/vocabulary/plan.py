@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.between_runs import Repeatability, Scatter
 from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.quantities import Hertz, PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
 #: A number of one run, or of several, shape (runs,).
@@ -183,16 +184,12 @@ class CampaignPlan:
     repeatability: Repeatability | None = None
 
 
-# Waveforms of peak value 1 at the times of the samples.
+# Waveforms of peak value 1 at the times of the samples, from 0 on and evenly spaced. A band ends below half the
+# sample rate, and contains a multiple of one over the length of the record.
 
 
-def stepped_sine(time_s: Array, frequencies_hz: Sequence[float]) -> Array:
-    """A sine that dwells equally long at each frequency, without a jump of its phase; shape (n,).
-
-    Args:
-        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        frequencies_hz: in their order, Hz; a single one gives a plain sine.
-    """
+def stepped_sine(time_s: Times, frequencies_hz: Sequence[float]) -> PerSample:
+    """A sine that dwells equally long at each frequency, without a jump of its phase; a single one gives a sine."""
     rates = np.asarray(frequencies_hz, dtype=np.float64)
     dwell = time_s.size * (time_s[1] - time_s[0]) / rates.size
     ends = np.append(dwell * np.arange(rates.size), np.inf)
@@ -203,25 +200,15 @@ def stepped_sine(time_s: Array, frequencies_hz: Sequence[float]) -> Array:
     return values
 
 
-def chirp(time_s: Array, start_hz: float, end_hz: float) -> Array:
-    """A sine whose frequency changes linearly with time; shape (n,).
-
-    Args:
-        time_s: of the samples from 0 on, shape (n,), s.
-        start_hz, end_hz: frequencies at the first and the last sample, Hz.
-    """
+def chirp(time_s: Times, start_hz: Hertz, end_hz: Hertz) -> PerSample:
+    """A sine whose frequency changes linearly with time, from the first to the last sample."""
     slope = (end_hz - start_hz) / time_s[-1]
     values: Array = np.sin(2.0 * pi * (start_hz + 0.5 * slope * time_s) * time_s)
     return values
 
 
-def square(time_s: Array, frequency_hz: float) -> Array:
-    """A square wave that begins with 1; shape (n,).
-
-    Args:
-        time_s: of the samples from 0 on, shape (n,), s.
-        frequency_hz: Hz.
-    """
+def square(time_s: Times, frequency_hz: Hertz) -> PerSample:
+    """A square wave that begins with 1."""
     half_cycles = np.floor(2.0 * frequency_hz * time_s + 1e-9)  # a sample may be rounded to before its edge
     return 1.0 - 2.0 * (half_cycles % 2.0)
 
@@ -239,12 +226,12 @@ def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> 
     return np.arange(max(first, 1.0), min(last, (size - 1) // 2) + 1.0)
 
 
-def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Generator | None = None) -> Array:
-    """Cosines of equal amplitude at all multiples of one over the record's length within a band; shape (n,).
+def multisine(
+    time_s: Times, low_hz: Hertz, high_hz: Hertz, rng: np.random.Generator | None = None
+) -> PerSample:
+    """Cosines of equal amplitude at all multiples of one over the record's length within a band.
 
     Args:
-        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line is in between.
         rng: draws the phases; None: Schroeder's phases, −π k (k − 1)/N of the k-th of N lines, which keep the peak
             low (doi:10.1109/TIT.1970.1054411).
     """
@@ -254,13 +241,8 @@ def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Gener
     return _of_lines(time_s.size, lines, np.exp(1j * phases))
 
 
-def band_noise(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Generator) -> Array:
-    """Gaussian noise that is white within a band and absent outside it; shape (n,).
-
-    Args:
-        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line is in between.
-    """
+def band_noise(time_s: Times, low_hz: Hertz, high_hz: Hertz, rng: np.random.Generator) -> PerSample:
+    """Gaussian noise that is white within a band and absent outside it."""
     lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
     return _of_lines(
         time_s.size, lines, rng.standard_normal(lines.size) + 1j * rng.standard_normal(lines.size)

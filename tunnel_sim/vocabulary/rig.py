@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, inf, pi, radians, sin, tan
+from math import atan2, cos, hypot, inf, pi, radians, sin, tan
 
 import numpy as np
 
@@ -94,6 +94,13 @@ class JointLaw:
         of_angle = {term.expression: term.coefficient for term in self.terms if "r" not in term.expression}
         sine = of_angle.pop("sin(b)-b", 0.0)
         return sine > 0.0 and not of_angle and abs(sine - self.stiffness) <= 1e-6 * sine
+
+    @property
+    def weight(self) -> tuple[float, float]:
+        """Greatest moment of gravity, N m, and the displacement from rest at which it vanishes, rad."""
+        of_angle = {term.expression: term.coefficient for term in self.terms}
+        sine, cosine = of_angle.get("sin(b)-b", 0.0), of_angle.get("cos(b)-1", 0.0)
+        return hypot(sine, cosine), atan2(-cosine, sine)
 
     @property
     def held(self) -> dict[str, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.quantities import Angles, PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
 LEAST = 6
@@ -22,35 +23,29 @@ class TurningPoints:
 
     Args:
         name: of the file or run.
-        time_s: shape (n,), s, increasing.
-        angle_rad: shape (n,), rad.
-        time_std: standard deviation of the times as stated, s, shape (n,); None where it is not stated.
-        angle_std: standard deviation of the angles as stated, rad, shape (n,); None where it is not stated.
+        time_s: increasing.
+        time_std: standard deviation of the times as stated; None where it is not stated.
+        angle_std: standard deviation of the angles as stated; None where it is not stated.
         said: how they were read.
     """
 
     name: str
-    time_s: Array
-    angle_rad: Array
-    time_std: Array | None = None
-    angle_std: Array | None = None
+    time_s: Times
+    angle_rad: Angles
+    time_std: Times | None = None
+    angle_std: Angles | None = None
     said: tuple[str, ...] = ()
 
     @property
-    def half_periods(self) -> Array:
-        """The number of half periods from the first turning point to each, shape (n,)."""
+    def half_periods(self) -> PerSample:
+        """The number of half periods from the first turning point to each."""
         steps = np.diff(self.time_s)
         counted: Array = np.concatenate([[0.0], np.cumsum(np.round(steps / np.median(steps)))])
         return counted
 
 
-def are_turning_points(time_s: Array, angle: Array) -> bool:
-    """Whether every reading of a table is on the opposite side of the previous one, as with turning points.
-
-    Args:
-        time_s: not decreasing, shape (n,), s.
-        angle: shape (n,).
-    """
+def are_turning_points(time_s: Times, angle: PerSample) -> bool:
+    """Whether every reading of a table is on the opposite side of the previous one, as with turning points."""
     if time_s.size < LEAST:
         return False
     swings, steps = np.diff(angle), np.diff(time_s)

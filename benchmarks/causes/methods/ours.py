@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.causes.entry import KINDS, About, answer_of, main
-from diagnosis.blind.cases import SCATTERING
+from tunnel_lab.experiments.blind.cases import SCATTERING
 
 ABOUT = About("tunnel diagnose", "as delivered, no option")
 

@@ -16,6 +16,7 @@ from identification.examination.self_excited import Swing
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.shapes import Angles
 
 _WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
 _FEWEST = 6  # phases of a run
@@ -30,16 +31,14 @@ class _Phase:
     """The phase of a run relative to a constant frequency, at the middle of windows, and its possible changes.
 
     Args:
-        phase: shape (n,), rad.
-        std: shape (n,), rad.
         drift: phase by a clock whose rate changes by 1 over the run, shape (n,), rad.
         amplitude: phases by amplitudes to the powers, shape (n, powers), rad.
         free: constant and slope, shape (n, 2).
     """
 
     run: str
-    phase: Array
-    std: Array
+    phase: Angles
+    std: Angles
     drift: Array
     amplitude: Array
     free: Array

@@ -98,7 +98,8 @@ static void check_models_on_one_data(void) {
             "", ""),
       model(twisting, steady, "<numeric name='drive' data='0.1 -0.2 0.3'/><numeric name='drive_interval' data='0.01'/>"
             "<numeric name='drive_held' data='1'/><numeric name='drive_on_end' data='1'/>", "", ""),
-      model("<config key='joint' value='twist'/>", steady, "<numeric name='friction_moment' data='0.02'/>", "", ""),
+      model("<config key='joint' value='twist'/>", steady,
+            "<numeric name='friction_load' data='0.2'/><numeric name='gravity_stiffness' data='0.1'/>", "", ""),
   };
   enum { kCount = sizeof(models) / sizeof(models[0]) };
   for (int first = 0; first < kCount; first++) {

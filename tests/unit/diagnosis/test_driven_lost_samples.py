@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.likelihood.per_run import skip
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
 from tunnel_sim.effects.chain import read_motion

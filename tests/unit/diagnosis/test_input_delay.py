@@ -92,7 +92,8 @@ def test_it_is_named_beside_another_cause() -> None:
     assert abs(own.value - 0.015) < 3.0 * own.std
 
 
-@pytest.mark.parametrize("cubic", [0.0, pytest.param(2.0, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("cubic", [0.0, 2.0])
 def test_it_is_not_named_where_there_is_none(cubic: float) -> None:
     assert diagnose(campaign(cubic=cubic)).causes == (("cubic_stiffness",) if cubic else ())
 

@@ -171,7 +171,7 @@ FAULTS: dict[str, tuple[Callable[[Estimate, Campaign], Any], str]] = {
     "silent": (silent, "neither a frequency nor a status that says why"),
     "an exception": (
         falls_on_silence,
-        r"exception with .* do not move: ZeroDivisionError: no swing, test_check_e",
+        r"exception with .* do not move: ZeroDivisionError: no swing, test_checking\.py line",
     ),
     "never fails": (
         never_fails,

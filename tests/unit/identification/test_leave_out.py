@@ -63,7 +63,8 @@ def test_an_estimate_is_that_of_the_other_runs_and_says_so(spoilt: tuple[Campaig
 def test_a_diagnosis_is_that_of_the_other_runs_and_says_so(spoilt: tuple[Campaign, Campaign]) -> None:
     good, whole = spoilt
     last, kinds = whole.runs[-1].id, (effect_class("coulomb_friction"),)
-    found = diagnose(whole, leave_out=(last,), kinds=kinds).to_json_dict()
+    answer = diagnose(whole, leave_out=(last,), kinds=kinds)
+    found = answer.to_json_dict()
     expected = diagnose(good, kinds=kinds).to_json_dict()
     assert found["provenance"].pop("left_out") == [last]
     assert expected["provenance"].pop("left_out") == []
@@ -72,5 +73,5 @@ def test_a_diagnosis_is_that_of_the_other_runs_and_says_so(spoilt: tuple[Campaig
     for document in (found, expected):
         document.pop("seconds")
     assert found | {"remarks": others} == expected
-    shown = str(diagnose(whole, leave_out=(last,), kinds=kinds))
+    shown = str(answer)
     assert f"run {last}: left out on request" in shown

@@ -1,23 +1,19 @@
-"""Clean-up of times and readings; every change is reported."""
+"""Clean-up of the times and readings of a record: rows out of order, repeated, missing, jittered; all reported."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, log10, pi
+from math import floor, log10
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.errors import TunnelError, counted
+from tunnel_sim.vocabulary.quantities import PerSample, Readings, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
 
-_COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
-_TURNS = (2.0 * pi, 360.0)
-_NEAR_END = 4.0  # other steps: a jump leads from one end of the range to the other
-_MOST_JUMPS = 10  # least number of samples per jump
-_NEARLY = 0.75  # of a counter's range: a step this long between two samples is an overflow
-_SMALL = 0.25  # of the range: no other step is longer
 _COARSE = 0.1  # share of samples with the stamp of the previous one, above which the stamps are too coarse
 _UNEVEN = 0.01  # of a step
 _FINEST = 1e-12  # s
@@ -32,52 +28,25 @@ class Cleaned:
     """Times and readings without unusable samples.
 
     Args:
-        time_s: shape (n,), s, increasing, from zero on.
-        reading: shape (n,).
-        first_s: time of the first sample by the file's clock, s.
+        time_s: increasing, from zero on.
+        rows: the row of each sample in the record as it was, shape (n,).
+        first_s: time of the first sample by the file's clock.
     """
 
-    time_s: Array
-    reading: Array
+    time_s: Times
+    reading: Readings
+    rows: NDArray[np.intp]
     said: tuple[str, ...]
-    first_s: float = 0.0
+    first_s: Seconds = 0.0
 
     @property
-    def file_time_s(self) -> Array:
-        """Times by the file's clock, shape (n,), s: the clock of ``--start``, of pictures, tables and notes."""
+    def file_time_s(self) -> Times:
+        """Times by the file's clock: the clock of ``--start``, of pictures, tables and notes."""
         return self.time_s + self.first_s
 
 
-def without_overflow(values: Array, said: list[str]) -> Array:
-    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are reported.
-
-    Args:
-        values: as recorded, shape (n,); NaN where there is no number.
-    """
-    known = np.flatnonzero(np.isfinite(values))
-    numbers = values[known]
-    steps = np.diff(numbers)
-    longest = float(np.abs(steps).max(initial=0.0))
-    counts = longest >= _NEARLY * _COUNTERS[0] and bool((numbers == np.round(numbers)).all())
-    for full in (*_TURNS, *(_COUNTERS if counts else ())):
-        if not _NEARLY * full < longest <= full or np.ptp(numbers) > full:
-            continue
-        jumps = np.abs(steps) > _NEARLY * full
-        if _MOST_JUMPS * jumps.sum() > jumps.size:
-            continue
-        others = float(np.abs(steps[~jumps]).max())
-        if others > _SMALL * full or (full - np.abs(steps[jumps]) > _NEAR_END * others).any():
-            continue
-        said.append(f"{counted(int(jumps.sum()), 'jump')} by {full:.6g} taken out (overflow of the counter)")
-        turns = np.concatenate([[0.0], np.cumsum(np.where(jumps, -np.sign(steps), 0.0))])
-        result = values.copy()
-        result[known] = numbers + full * turns
-        return result
-    return values
-
-
-def restarts(time: Array) -> list[int]:
-    """Indices where the times, shape (n,), restart because another run follows; empty: nowhere."""
+def restarts(time: Times) -> list[int]:
+    """Indices where the times restart because another run follows; empty: nowhere."""
     with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
         back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if not back.size or back.size > max(1.0, _RESTARTS * time.size):
@@ -89,24 +58,18 @@ def restarts(time: Array) -> list[int]:
     return back.tolist() if all(early) else []
 
 
-def cleaned(time: Array, reading: Array) -> Cleaned:
-    """Times and readings in the form of a campaign.
-
-    Args:
-        time: as recorded, shape (n,), s.
-        reading: shape (n,), in radians or the unit of the sensor.
-    """
+def cleaned(time: Times, reading: Readings) -> Cleaned:
+    """Times and readings as recorded in the form of a campaign."""
     said: list[str] = []
-    good = np.isfinite(time) & np.isfinite(reading)
-    if not good.all():
-        known = np.flatnonzero(good)
-        inside = int(known[-1] - known[0] + 1 - known.size) if known.size else 0
+    rows = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
+    if rows.size < time.size:
+        inside = int(rows[-1] - rows[0] + 1 - rows.size) if rows.size else 0
         if inside:
             said.append(f"{counted(inside, 'sample')} without a number left out")
-        time, reading = time[good], reading[good]
+        time, reading = time[rows], reading[rows]
     if (np.diff(time) < 0.0).any():
         order = np.argsort(time, kind="stable")
-        time, reading = time[order], reading[order]
+        rows, time, reading = rows[order], time[order], reading[order]
         said.append("rows out of order sorted by time")
     same = np.diff(time) == 0.0
     repeated = same & (np.diff(reading) == 0.0)
@@ -125,7 +88,7 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
             else ""
         )
         said.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
-        time, reading = time[keep], reading[keep]
+        rows, time, reading = rows[keep], time[keep], reading[keep]
     first = float(time[0]) if time.size else 0.0
     if first != 0.0:
         said.append(
@@ -145,16 +108,16 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         if spread > _UNEVEN * usual:
             share = f"{100.0 * spread / usual:.0f} % of a step"
             said.append(f"time stamps differ from an even clock by up to {share}; kept")
-    return Cleaned(time, reading, tuple(said), first)
+    return Cleaned(time, reading, rows, tuple(said), first)
 
 
-def clock_text(time: float) -> str:
-    """A time by the file's clock, s, to a millisecond: ``34200``, or ``14.275``."""
+def clock_text(time: Seconds) -> str:
+    """A time by the file's clock to a millisecond: ``34200``, or ``14.275``."""
     return f"{time:.3f}".rstrip("0").rstrip(".")
 
 
-def from_zero(time: Array) -> Array:
-    """Times from the first sample on, shape (n,), s, without the extra digits of a subtraction."""
+def from_zero(time: Times) -> Times:
+    """Times from the first sample on, without the extra digits of a subtraction."""
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
@@ -163,14 +126,8 @@ def from_zero(time: Array) -> Array:
     return counted
 
 
-def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: str) -> Array:
-    """A reading without its value at rest.
-
-    Args:
-        reading: of a run, shape (n,), in the unit.
-        rest: as stated, in the unit.
-        unit: of the reading.
-    """
+def from_rest(reading: PerSample, rest: float, unit: str, said: list[str], where: str) -> PerSample:
+    """A reading without its value at rest as stated, both in the unit."""
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
         raise TunnelError(
@@ -182,8 +139,8 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
     return reading - rest
 
 
-def resolution(readings: Sequence[Array]) -> float | None:
-    """The step of a sensor whose readings, each of shape (n,), are on evenly spaced levels; None: they are not."""
+def resolution(readings: Sequence[PerSample]) -> float | None:
+    """The step of a sensor whose readings are on evenly spaced levels; None: they are not."""
     some = np.concatenate([reading[:_LEVELS_OF] for reading in readings])
     levels = np.unique(some)
     if not 3 <= levels.size <= min(_MOST_LEVELS, some.size // 2):

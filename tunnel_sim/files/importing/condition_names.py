@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from tunnel_sim.files.importing.units import UNITS, kind_of, squeezed
 from tunnel_sim.files.scatter_tables import SPREAD, Spread
@@ -102,3 +103,29 @@ def in_si(key: str, unit: str) -> float | None:
 def units_of(key: str) -> str:
     """The units in which a condition or size may be stated, for a message."""
     return ", ".join(UNITS[_KINDS[key]] if key in _KINDS else _SIZES.get(key, {"1": 1.0}))
+
+
+@dataclass(frozen=True)
+class Hint:
+    """Content that resembles a condition and is not used as one.
+
+    Args:
+        key: of `Conditions`.
+        value: in SI units if it is that condition; NaN if its unit is not known.
+        what: its description in the file or its name, for a message.
+        why: the reason for not using it.
+        use: the option that uses or states it.
+        symbol: whether only a column's letter suggests it, which in a robot's log is a command or a velocity.
+    """
+
+    key: str
+    value: float
+    what: str
+    why: str
+    use: str
+    symbol: bool = False
+
+    @property
+    def words(self) -> str:
+        """The whole hint in a line."""
+        return f"{self.what} is left out: {self.why}; {self.use}"

@@ -1,245 +1,271 @@
-"""A user's statements about files, and the conditions of runs: from tables, names of files, or the files."""
+"""Step 3 of an import: find the conditions of runs, stated in numbers, columns and names, and by the user."""
 
 from __future__ import annotations
 
 import re
-import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
-from pydantic import Field
+import numpy as np
+from numpy.typing import NDArray
 
-from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.condition_names import (
+    OF_CAMPAIGN,
     RUN_KEYS,
     Conditions,
+    Hint,
     condition_of,
     in_si,
     resembles,
     units_of,
 )
-from tunnel_sim.files.importing.tables import names_runs
-from tunnel_sim.files.importing.text import read_cells
-from tunnel_sim.files.importing.units import split_unit
-from tunnel_sim.files.toml_input import (
-    OneLine,
-    Positive,
-    SampleRate,
-    StrictModel,
-    optional,
-    read_document,
-    validate,
-)
-from tunnel_sim.vocabulary.drive import Hold
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, one_of, shown
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
+from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.tables import Channel, Table
+from tunnel_sim.files.importing.units import claims, split_unit
+from tunnel_sim.files.plausible import plausible_values
+from tunnel_sim.files.toml_input import validate
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
+
+_OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
+_EVEN = 1e-9  # of a value: a column that varies less is constant
+_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
 class Unstated(TunnelError):
     """A condition of a run that only the user can state, even beside other sources."""
 
 
-class StatedBy(StrictModel):
-    """``[choices.stated_by]``: the names of columns or numbers of the files that state a condition."""
+@dataclass(frozen=True, eq=False)
+class Stated:
+    """The statements of the table of a record.
 
-    wind_speed: OneLine | None = optional("the name of a column or number")
-    spring_stiffness: OneLine | None = optional("the name of a column or number")
-    air_density: OneLine | None = optional("the name of a column or number")
-    release_angle: OneLine | None = optional("the name of a column or number")
+    Args:
+        numbers: conditions and sizes by key of `Conditions`, in its units.
+        columns: columns of conditions by key, with the rows of the record.
+        named: conditions in the name of the file, by key.
+        hints: unused numbers of the file.
+        like: unused columns that resemble conditions, with their hints.
+    """
 
+    numbers: Mapping[str, float]
+    columns: Mapping[str, Channel]
+    named: Mapping[str, float] = field(default_factory=dict)
+    hints: tuple[Hint, ...] = ()
+    like: tuple[tuple[Channel, Hint], ...] = ()
 
-class Stretch(StrictModel):
-    """``[[choices.stretches]]``: start and end of a run in its record, and its reading at rest; None: as found."""
+    def of_rows(self, rows: NDArray[np.bool_] | slice) -> Stated:
+        """The statements in some rows."""
+        return replace(
+            self,
+            columns={key: replace(c, values=c.values[rows]) for key, c in self.columns.items()},
+            like=tuple((replace(c, values=c.values[rows]), hint) for c, hint in self.like),
+        )
 
-    file: OneLine = Field(description="the name of the file")
-    run: OneLine = Field(description="the name of the run")
-    start: float | None = optional("the time of the release by the file's clock, in s")
-    end: float | None = optional("the time at which the run ends by the file's clock, in s")
-    rest: float | None = optional("the reading at rest in rad, to be subtracted")
+    def measured(self, rows: NDArray[np.bool_], said: list[str]) -> dict[str, float]:
+        """Conditions stated by columns in some rows."""
+        found = {
+            key: value
+            for key, column in self.columns.items()
+            if (value := from_column(key, column, rows, said)) is not None
+        }
+        names = [(key, self.columns[key].name) for key in found]
+        if names:
+            listed = ", ".join(
+                key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names
+            )
+            said.append(f"from columns: {listed}")
+        return found
 
-
-class ImportChoices(StrictModel):
-    """How files are read; None: found from the files."""
-
-    time: OneLine | None = optional("the name or number of the column of times")
-    angle: tuple[OneLine, ...] = Field(
-        default=(), strict=False, description="a list of names or numbers of columns"
-    )
-    unit: OneLine | None = optional("the unit of the angle, such as 'deg'")
-    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'")
-    rate: SampleRate | None = optional("a positive number in Hz")
-    counts_per_turn: Positive | None = optional("a positive number")
-    calibration: OneLine | None = optional(
-        "a formula such as '0.1 + 20*V', or the name of a table of two columns"
-    )
-    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional("'tab', ';', ',', '|' or 'blank'")
-    decimal: Literal[".", ","] | None = optional("'.' or ','")
-    start: float | None = optional("a time of the file in s: earlier samples are left out")
-    end: float | None = optional("a time of the file in s: later samples are left out")
-    rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
-    input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
-    input_as: InputColumn | None = optional(one_of([f"'{name}'" for name in INPUT_COLUMNS]))
-    input_hold: Hold | None = optional("'zero' or 'linear'")
-    leave_out: tuple[OneLine, ...] = Field(
-        default=(), strict=False, description="a list of names of runs or files"
-    )
-    cut: bool = Field(default=True, description="false to keep records whole")
-    stretches: tuple[Stretch, ...] = Field(
-        default=(),
-        strict=False,
-        description="[[choices.stretches]] tables with file, run, start, end and rest",
-    )
-    name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
-    conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
-    stated_by: StatedBy = Field(default=StatedBy(), description="a [choices.stated_by] table")
-
-    def stretch_of(self, file: str, run: str) -> Stretch:
-        """The statement on start, end and rest of a run in its file."""
-        found = (one for one in self.stretches if (one.file, one.run) == (file, run))
-        # A file may have a name that a recipe cannot express: there is then no statement about it.
-        return next(found, Stretch.model_construct(file=file, run=run))
+    def unused(self, rows: NDArray[np.bool_]) -> list[Hint]:
+        """Unused content that resembles a condition in some rows; a column about zero does not."""
+        found = [*self.hints]
+        for column, hint in self.like:
+            value = from_column(hint.key, replace(column, unit=""), rows, [])
+            if value is not None and np.isfinite(value):
+                found.append(replace(hint, value=value))
+        return found
 
 
-class OriginalTable(StrictModel):
-    """``[[originals]]``."""
+def find_conditions(
+    table: Table,
+    beside: Sequence[Channel | None],
+    choices: ImportChoices,
+    said: list[str],
+    where: str,
+) -> Stated:
+    """The statements of a table on the conditions of its runs; ``beside``: the columns used otherwise."""
+    claimed = choices.stated_by.model_dump(exclude_none=True)
+    numbers, hints = from_facts(table.facts, claimed, said, where)
+    columns: dict[str, Channel] = {}
+    like = []
+    for channel in table.channels:
+        if any(channel is one for one in beside):
+            continue
+        key = next((key for key, text in claimed.items() if claims(text, channel.name, channel.unit)), None)
+        key = key or condition_of(channel.name, channel.unit)
+        if key is not None and in_si(key, channel.unit) is not None:
+            columns.setdefault(key, channel)  # the first of several that state the same
+        elif hint := _hint(channel.name, channel.unit, key, float("nan")):
+            like.append((channel, hint))
+    known = {**table.facts, **{channel.name: 0.0 for channel in table.channels}}
+    for key, text in claimed.items():
+        if key not in numbers and key not in columns:
+            what = f"no column or number '{one_line(text, 40)}' that states {key}"
+            raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
+    return Stated(numbers, columns, hints=tuple(hints), like=tuple(like))
 
-    file: OneLine = Field(description="the name of the file")
-    sha256: OneLine = Field(description="the SHA-256 of its content")
-    said: tuple[OneLine, ...] = Field(default=(), strict=False, description="a list of texts")
 
+def from_facts(
+    facts: Mapping[str, float], claimed: Mapping[str, str], said: list[str], where: str
+) -> tuple[dict[str, float], list[Hint]]:
+    """Conditions and sizes stated by numbers of a file, each reported, and numbers that only resemble one.
 
-class Recipe(StrictModel):
-    """The whole of ``import.toml``."""
+    Args:
+        claimed: by key, the names of numbers that the user has declared to state a condition.
 
-    schema_version: Literal[1] = Field(description="1")
-    choices: ImportChoices = Field(default=ImportChoices(), description="a [choices] table")
-    originals: tuple[OriginalTable, ...] = Field(default=(), strict=False, description="[[originals]] tables")
-
-
-def read_recipe(path: Path) -> ImportChoices:
-    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder with it."""
-    path = path / IMPORT_RECIPE if path.is_dir() else path
-    missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
-    return read_document(Recipe, path, missing=missing).choices
-
-
-def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
-    """Conditions from ``key=value``, separated by commas; a value is a number, or a name in the files."""
-    numbers: dict[str, float] = {}
+    Returns:
+        Values by key of `Conditions`, in its units, and hints.
+    """
+    found: dict[str, float] = {}
     names: dict[str, str] = {}
-    for part in text.split(","):
-        key, _, value = (piece.strip() for piece in part.partition("="))
-        try:
-            numbers[key] = float(value)
-        except ValueError:
-            if not value:
-                what = f"'{part.strip()}' is not of the form key=number"
-                remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
-                raise TunnelError(what, where=where, remedy=remedy) from None
-            names[key] = value
-    return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))
+    hints = []
+    for heading, value in facts.items():
+        name, unit = split_unit(heading)
+        key = next((key for key, text in claimed.items() if claims(text, name, unit)), None)
+        sure = key is not None
+        key = key or condition_of(name, unit, alone=True)
+        if key is not None and (factor := in_si(key, unit)) is not None:
+            if sure or names.get(key) not in claimed.values():
+                found[key], names[key] = float(value) * factor, name
+        elif sure:
+            what = f"'{one_line(heading, 60)}' is not in a unit of {key} ({units_of(key or '')})"
+            raise TunnelError(what, where=where, remedy=f"give --set {key}=NUMBER")
+        elif hint := _hint(name, unit, key, float(value)):
+            hints.append(hint)
+    symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
+    # A density is stated for the wind alone: the only symbol of a speed beside it means the wind.
+    if "air_density" in found and "wind_speed" not in found and len(symbols) == 1:
+        found["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
+        hints.remove(symbols[0])
+    for key, value in found.items():
+        named = "" if names[key] == key else f" ({names[key]})"
+        said.append(f"{key} = {value:g} from the file{named}")
+    return found, hints
 
 
-_ALIASES = {
-    "spring": "spring_stiffness",
-    "speed": "wind_speed",
-    "density": "air_density",
-    "angle": "release_angle",
-}
-_NUMBER = r"[+-]?\d+(?:[.,p]\d+)?"
+def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
+    """The hint of an unused column or number; ``key``: the condition stated by its name."""
+    shown_name = one_line(name, 60)
+    number = "" if np.isnan(value) else f" = {value:g}"
+    if key is not None:
+        why = f"its unit is not one of {units_of(key)}"
+        what = (
+            f"'{shown_name}'{number}" if unit in shown_name else f"'{shown_name}' in '{one_line(unit, 20)}'"
+        )
+        return Hint(key, float("nan"), what, why, f"--set {key}=NUMBER states it")
+    key = resembles(name, unit)
+    if key is None:
+        return None
+    use = f'--set {key}="{shown_name}" uses it' if " " in shown_name else f"--set {key}={shown_name} uses it"
+    if key == "wind_speed" and not unit and np.isnan(value) and len(name.strip()) == 1:
+        use = f"{use}, --input {shown_name} if it drives the body"
+        return Hint(
+            key,
+            value,
+            f"'{shown_name}'",
+            "it may be wind_speed or an input, but has no unit",
+            use,
+            symbol=True,
+        )
+    if unit:
+        value = value * (in_si(key, unit) or 1.0)
+        return Hint(
+            key, value, f"'{shown_name}'{number} in {unit}", "its name is not that of a condition", use
+        )
+    return Hint(key, value, f"'{shown_name}'{number}", f"it may be {key}, but has no unit", use)
 
 
-def name_pattern(text: str) -> re.Pattern[str]:
-    """The regular expression of a pattern such as ``S{spring}_V{wind_speed}_*``; ``*`` stands for anything."""
-    parts = re.split(r"(\{\w*\}|\*)", text)
-    expression = ""
-    for part in parts:
-        key = part[1:-1]
-        if part == "*":
-            expression += ".*"
-        elif part.startswith("{"):
-            known = _ALIASES.get(key, key)
-            if known not in RUN_KEYS or f"<{known}>" in expression:
-                what = f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice"
-                remedy = did_you_mean(key, (*_ALIASES, *RUN_KEYS))
-                raise TunnelError(what, where=f"--name {one_line(text, 60)}", remedy=remedy)
-            expression += f"(?P<{known}>{_NUMBER})"
-        else:
-            expression += re.escape(part)
-    return re.compile(expression + r"(?:\.\w+)?$")
+def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
+    """The condition of a run stated by a column, in the unit of `Conditions`; None if it does not state one."""
+    values = column.values[rows]
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    factor = in_si(key, column.unit) or 1.0
+    low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
+    if high - low <= _EVEN * abs(middle):
+        return middle * factor
+    off = key == "wind_speed" and low <= 0.0 and middle < _OFF * (high - low)
+    said.append(
+        f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
+        + ("zero, about which it lies" if off else f"its median, {middle * factor:.6g}")
+    )
+    return 0.0 if off else middle * factor
 
 
-def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
-    """Conditions in the name of a file, which must match the pattern where there is one."""
-    if pattern is None:
-        return {}
-    found = pattern.match(path.name)
-    if found is None:
-        remedy = "correct the pattern, or rename the file"
-        raise TunnelError("the name does not match --name", where=shown(path), remedy=remedy)
-    return {key: float(re.sub("[,p]", ".", text)) for key, text in found.groupdict().items()}
+def of_short_table(table: Table) -> list[Hint]:
+    """Apparent statements on the runs in a table too short for a record."""
+    found = []
+    for channel in table.channels:
+        key = condition_of(channel.name, channel.unit) or resembles(channel.name, channel.unit)
+        values = channel.values[np.isfinite(channel.values)]
+        if key is None or not values.any():
+            continue
+        what = f"'{one_line(channel.name, 60)}' of {counted(values.size, 'value')}"
+        part = f" in '{one_line(table.part, 40)}'" if table.part else ""
+        why = f"it may state {key}, but not of which run"
+        found.append(Hint(key, float("nan"), what + part, why, "--conditions RUNS.csv states it run by run"))
+    return found
 
 
-def _same(name: str) -> str:
-    """A name for comparison: some systems decompose the accents of file names."""
-    return unicodedata.normalize("NFC", name).lower()
+def conditions_of(
+    stated: Stated,
+    file: Path,
+    run: str,
+    rows: NDArray[np.bool_],
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    said: list[str],
+    where: str,
+) -> tuple[dict[str, float], dict[str, float]]:
+    """The conditions of the run in some rows, and the sizes stated beside them, by key."""
+    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
+    in_table = {} if table is None else table.of(file, run)
+    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
+    found = {**stated.numbers, **stated.measured(rows, said), **stated.named, **in_table, **given}
+    sizes = {key: found.pop(key) for key in OF_CAMPAIGN if key in found}
+    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
+    validate(Conditions, found | sizes, file)
+    plausible_values(found | sizes, where)
+    return found, sizes
 
 
-_OF_FILES = re.compile(r"(?i)(file|datei)(_? ?name)?|sheet|blatt|tabelle|id")
-
-
-class ConditionTable:
-    """A table of conditions in a text file, one row for each file or run, with the names that files use too."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        names, rows = read_cells(path)
-        split = [split_unit(name) for name in names]
-        keys = [condition_of(*heading, alone=True) or resembles(*heading) for heading in split]
-        self._key = next((i for i, name in enumerate(names) if _names_a_run(name)), None)
-        used = {key: i for i, key in enumerate(keys) if key in RUN_KEYS}
-        if self._key is None or not used:
-            wanted = "file or run" if self._key is None else "of conditions"
-            what = f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})"
-            remedy = f"name the columns file (or run) and {', '.join(RUN_KEYS)}"
-            raise TunnelError(what, where=shown(path), remedy=remedy)
-        factors = {key: in_si(key, split[i][1]) for key, i in used.items()}
-        for key in (key for key, factor in factors.items() if factor is None):
-            what = f"the column '{one_line(names[used[key]], 40)}' is not in a unit of {key}"
-            raise TunnelError(what, where=shown(path), remedy=f"use one of {units_of(key)}")
-        self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and i not in used.values())
-        self.said = [
-            f"{path.name}: {key} from '{names[i]}'"
-            for key, i in used.items()
-            if key and names[i].strip().lower() != key
-        ]
-        self._rows: dict[str, dict[str, float]] = {}
-        for row in rows:
-            name = row[self._key].strip()
-            if _same(name) in self._rows:
-                remedy = "leave one out"
-                raise TunnelError(f"'{one_line(name)}' occurs twice", where=shown(path), remedy=remedy)
-            values = {}
-            for key, text in ((key, row[i]) for key, i in used.items() if row[i].strip()):
-                try:
-                    values[key] = float(text.replace(",", ".")) * (factors[key] or 1.0)
-                except ValueError:
-                    raise TunnelError(
-                        f"{key} = '{one_line(text, 30)}' is not a number",
-                        where=f"{shown(path)}, '{one_line(name)}'",
-                        remedy="give a number",
-                    ) from None
-            validate(Conditions, values, path)
-            self._rows[_same(name)] = values
-
-    def of(self, path: Path, run: str) -> dict[str, float]:
-        """Conditions of a run, by its name or the name of its file."""
-        for name in (run, path.name, path.stem):
-            if _same(name) in self._rows:
-                return self._rows[_same(name)]
-        what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
-        raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")
-
-
-def _names_a_run(heading: str) -> bool:
-    return names_runs(heading) or _OF_FILES.fullmatch(heading.strip()) is not None
+def check_wind(
+    conditions: Mapping[str, float],
+    hints: Sequence[Hint],
+    file: Path,
+    run: str,
+    said: list[str],
+    where: str,
+    *,
+    driven: bool,
+) -> None:
+    """Report unused content that resembles a condition; refuse to assume wind-off where a wind is suggested."""
+    open_ones = [hint for hint in hints if hint.key not in conditions]
+    said += [hint.words for hint in open_ones]
+    if "wind_speed" in conditions:
+        return
+    wind_off = "--set wind_speed=0 states wind-off"
+    for hint in open_ones:
+        letter = hint.symbol and driven  # beside a command it is a velocity or another command
+        if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
+            what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
+            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
+    if _WIND_ON.search(f"{file.stem} {run}"):
+        what = "the name says that the wind is on, but not how fast"
+        remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
+        raise Unstated(what, where=where, remedy=remedy)
+    if not driven:
+        said.append("wind_speed is not stated: wind-off is assumed")

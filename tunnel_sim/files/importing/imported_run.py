@@ -1,31 +1,28 @@
-"""A run of an import: its part of a record, and its conditions, stated or still open."""
+"""Step 4 of an import: a run, cut from its record, with its conditions, stated or still open."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import clock_text, from_rest, from_zero
-from tunnel_sim.files.importing.condition_names import OF_CAMPAIGN, RUN_KEYS, Conditions
-from tunnel_sim.files.importing.conditions import ConditionTable, ImportChoices, Unstated
+from tunnel_sim.files.importing.condition_names import Hint
+from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.conditions import Unstated, check_wind, conditions_of
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
-from tunnel_sim.files.importing.stated import Hint
-from tunnel_sim.files.plausible import checked_record, plausible_values
-from tunnel_sim.files.toml_input import shown, validate
+from tunnel_sim.files.plausible import checked_record
+from tunnel_sim.files.toml_input import shown
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import INPUTS
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.quantities import Readings
+from tunnel_sim.vocabulary.record import Record
 
 _JUDGED = 500_000  # samples for counting the cycles of a long record
-_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +47,8 @@ class ImportedRun:
     without_density: bool = False
 
     @property
-    def reading(self) -> Array:
-        """Reading of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
+    def reading(self) -> Readings:
+        """Reading of the run, before its rest is subtracted."""
         return self.raw.cleaned.reading[self.piece.first : self.piece.last]
 
 
@@ -95,12 +92,10 @@ def imported_run(
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
         reading = from_rest(reading, rest, sensor.unit, said, where)
-    stated, hints = _stated(raw, raw.rows(float(time[0]), float(time[-1])), name, choices, table, said)
-    sizes = {key: stated.pop(key) for key in OF_CAMPAIGN if key in stated}
-    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
-    validate(Conditions, stated | sizes, raw.source)
-    plausible_values(stated | sizes, where)
-    _check_wind(raw, name, stated, [*hints, *named], said, where)
+    rows = raw.rows(float(time[0]), float(time[-1]))
+    stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, said, where)
+    hints = [*raw.stated.unused(rows), *named]
+    check_wind(stated, hints, raw.source, name, said, where, driven=raw.input is not None)
     rig = choices.conditions
     scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     held: dict[str, float] = {}
@@ -128,53 +123,6 @@ def imported_run(
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes, held, windy)
-
-
-def _stated(
-    raw: RawRecord,
-    rows: NDArray[np.bool_],
-    run: str,
-    choices: ImportChoices,
-    table: ConditionTable | None,
-    said: list[str],
-) -> tuple[dict[str, float], list[Hint]]:
-    """Conditions and sizes of a run, by key, and unused content of the file that resembles them.
-
-    Args:
-        rows: which rows of the record belong to the run, shape (n,).
-    """
-    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
-    in_table = {} if table is None else table.of(raw.source, run)
-    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
-    found = {**raw.stated.numbers, **raw.stated.measured(rows, said), **raw.named, **in_table, **given}
-    return found, raw.stated.unused(rows)
-
-
-def _check_wind(
-    raw: RawRecord,
-    run: str,
-    stated: Mapping[str, float],
-    hints: Sequence[Hint],
-    said: list[str],
-    where: str,
-) -> None:
-    """Report unused content that resembles a condition; refuse to assume wind-off where a wind is suggested."""
-    open_ones = [hint for hint in hints if hint.key not in stated]
-    said += [hint.words for hint in open_ones]
-    if "wind_speed" in stated:
-        return
-    wind_off = "--set wind_speed=0 states wind-off"
-    for hint in open_ones:
-        letter = hint.symbol and raw.input is not None  # beside a command it is a velocity or another command
-        if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
-            what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
-            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
-    if _WIND_ON.search(f"{raw.source.stem} {run}"):
-        what = "the name says that the wind is on, but not how fast"
-        remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
-        raise Unstated(what, where=where, remedy=remedy)
-    if raw.input is None:
-        said.append("wind_speed is not stated: wind-off is assumed")
 
 
 def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:

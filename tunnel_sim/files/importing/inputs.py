@@ -1,4 +1,4 @@
-"""The input of a driven run: its column, found by name, unit and correlation with the motion."""
+"""The input of a driven run: its column, found by name and unit, and by a test that it drives the motion."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.files.importing.columns import stated_input
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.column_names import named
 from tunnel_sim.files.importing.condition_names import condition_of
-from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, is_input
 from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
+from tunnel_sim.vocabulary.record import Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +26,12 @@ class RunInput:
 
     Args:
         channel: its column.
-        values: in the unit of ``column``, shape (n,).
+        values: in the unit of ``column``.
     """
 
     column: InputColumn
     channel: Channel
-    values: Array
+    values: Rows
 
 
 _NAMES = re.compile(
@@ -38,41 +39,47 @@ _NAMES = re.compile(
     r"tau|effort|u|base|root)(?![a-z])",
     re.IGNORECASE,
 )
-_CORRELATED = 0.3  # greatest correlation at any lag, from which a column drives the motion
+_FALSE_ALARM = 1e-5  # chance that a column without effect on the motion is taken for its input
+_PAST = 12  # earlier readings that predict a free motion, in which the noise is as good as white
+_INPUTS = 4  # readings of an input, the present and earlier ones: inertia, damping, stiffness and a lag
+_PER_CYCLE = 30  # means that the test takes of a cycle: of more, each hardly differs from its neighbours
+_SINGULAR = 1e-9  # of the largest singular value: a smaller one is rounding
+_LEAST_MEANS = 2000  # of a record that has as many samples, whatever its cycle seems to be
+
+
+def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel | None:
+    """The column stated as the input, by name, with or without its unit, or by number; None: there is none."""
+    found = [] if choices.input is None else named(channels, choices.input)
+    return found[0] if found else None
 
 
 def find_input(
     channels: Sequence[Channel],
     beside: Sequence[Channel | None],
-    reading: Array,
+    reading: Rows,
     choices: ImportChoices,
     said: list[str],
     where: str,
 ) -> RunInput | None:
-    """The input of a run; None for a free decay.
-
-    Args:
-        beside: the columns of times and reading.
-        reading: shape (n,), rad, rad/s or rad/s².
-    """
+    """The input of a run; None for a free decay. ``beside`` are the columns of times and reading."""
     if choices.input == "none":
         return None
     others = [channel for channel in channels if all(channel is not one for one in beside)]
     if choices.input is not None:
-        named = stated_input(channels, choices)
-        if named is not None and all(named is not one for one in others):
-            use = "times are" if named is beside[0] else "angle is"
-            column = f"'{one_line(choices.input, 40)}' is the column '{one_line(named.name, 40)}'"
+        stated = stated_input(channels, choices)
+        if stated is not None and all(stated is not one for one in others):
+            use = "times are" if stated is beside[0] else "angle is"
+            column = f"'{one_line(choices.input, 40)}' is the column '{one_line(stated.name, 40)}'"
             what = f"{column}, from which the {use} read"
             remedy = (
                 "give --input with the name or number of another column, or --angle with that of the angle"
             )
             raise TunnelError(what, where=where, remedy=remedy)
-        if named is None:
+        if stated is None:
             what = f"no column '{one_line(choices.input, 40)}' for the input"
             remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
             raise TunnelError(what, where=where, remedy=remedy)
-        return _as_input(named, reading, choices, said)
+        return _as_input(stated, reading, choices, said)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
     found = exact
@@ -83,9 +90,9 @@ def find_input(
         if conditional or not plausible or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
-        with suppress(TunnelError):  # it correlates with the motion, but is not the motion itself
+        with suppress(TunnelError):  # it is not the motion itself
             checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
-            if correlation(channel.values, reading)[0] >= _CORRELATED:
+            if chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
                 found.append(channel)
     if len(found) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
@@ -94,7 +101,7 @@ def find_input(
     return _as_input(found[0], reading, choices, said) if found else None
 
 
-def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: list[str]) -> RunInput:
+def _as_input(channel: Channel, reading: Rows, choices: ImportChoices, said: list[str]) -> RunInput:
     column = choices.input_as or _claimed(channel) or "drive"
     kind = INPUTS[column]
     size, lag = correlation(channel.values, reading)
@@ -110,15 +117,35 @@ def _claimed(channel: Channel) -> InputColumn | None:
     return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
 
 
-def correlation(values: Array, reading: Array) -> tuple[float, int]:
-    """The greatest correlation of an input with a later reading, from 0 to 1, and its lag in samples.
+def chance_without_effect(values: PerSample, reading: PerSample) -> Share:
+    """The chance that an input without effect predicts the motion as well, beside the motion's own past.
 
-    The lag is at most a quarter of the record.
-
-    Args:
-        values: of the input, any unit, shape (n,).
-        reading: shape (n,), any unit.
+    An F test of two fits: each reading by the ones before it, as in a free motion; and by the input, too.
     """
+    from scipy.special import fdtrc  # only here: slow to load
+
+    cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(reading - reading.mean())[1:])))
+    block = max(1, reading.size // max(_PER_CYCLE * cycles, _LEAST_MEANS))
+    count = reading.size // block - _PAST
+    free = count - 1 - _PAST - _INPUTS  # degrees of freedom
+    if free < _PAST:
+        return 1.0
+    means = (x[: (count + _PAST) * block].reshape(-1, block).mean(axis=1) for x in (values, reading))
+    u, y = (x / (np.abs(x).max() or 1.0) for x in (x - x.mean() for x in means))
+    past = [y[_PAST - lag :][:count] for lag in range(1, _PAST + 1)]
+    own, _ = np.linalg.qr(np.stack([np.ones(count), *past], axis=1))
+    given = np.stack([u[_PAST - lag :][:count] for lag in range(_INPUTS)], axis=1)
+    residual, beside = y[_PAST:] - own @ (own.T @ y[_PAST:]), given - own @ (own.T @ given)
+    forms, sizes, _ = np.linalg.svd(beside, full_matrices=False)
+    explained = (forms[:, sizes > _SINGULAR * max(sizes[0], _SINGULAR)].T @ residual) ** 2
+    unexplained = float(residual @ residual - explained.sum())
+    if not explained.size or not unexplained > 0.0:
+        return 1.0
+    return float(fdtrc(explained.size, free, explained.mean() * free / unexplained))
+
+
+def correlation(values: Rows, reading: Rows) -> tuple[Share, int]:
+    """The greatest correlation of an input with a later reading, and its lag, at most a quarter of the samples."""
     good = np.isfinite(values) & np.isfinite(reading)
     x, y = values[good] - values[good].mean(), reading[good] - reading[good].mean()
     scale = float(np.sqrt((x @ x) * (y @ y)))
@@ -128,21 +155,3 @@ def correlation(values: Array, reading: Array) -> tuple[float, int]:
     lags = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(y, size), size)[: max(1, x.size // 4)]
     best = int(np.argmax(np.abs(lags)))
     return float(min(1.0, abs(lags[best]) / scale)), best
-
-
-def at_times(values: Array, time: Array, reading: Array, kept: Array) -> Array:
-    """The input at the times kept by the clean-up of a record: its value in the nearest row, shape (n,).
-
-    Args:
-        values: of the input at every row, shape (m,).
-        time: of the rows, shape (m,), s.
-        reading: of the rows, shape (m,).
-        kept: times from the first sample on, shape (n,), s, increasing.
-    """
-    good = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
-    order = good[np.argsort(time[good], kind="stable")]
-    if order.size == kept.size:
-        return values[order]
-    since = time[order] - time[order[0]]
-    after = np.clip(np.searchsorted(since, kept), 1, since.size - 1)
-    return values[order[np.where(kept - since[after - 1] < since[after] - kept, after - 1, after)]]

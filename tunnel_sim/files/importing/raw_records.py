@@ -1,4 +1,4 @@
-"""From the tables of a file to records of times and angles, cleaned but not yet cut, and their inputs."""
+"""Steps 2 to 4 for one file: its columns, its conditions, and its records, cleaned but not yet cut."""
 
 from __future__ import annotations
 
@@ -11,24 +11,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts, without_overflow
-from tunnel_sim.files.importing.columns import (
-    Calibration,
-    ColumnPair,
-    find_pairs,
-    in_radians,
-    in_seconds,
-)
-from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.inputs import at_times, find_input
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
+from tunnel_sim.files.importing.column_numbers import Calibration
+from tunnel_sim.files.importing.columns import RunColumns, find_columns
+from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table
 from tunnel_sim.files.importing.source import Source
-from tunnel_sim.files.importing.stated import Stated, of_short_table, stated_in
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 from tunnel_sim.vocabulary.inputs import InputColumn
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 
 _STD = re.compile(
@@ -44,9 +38,9 @@ class RawRecord:
 
     Args:
         stated: the conditions stated in the file, in numbers and in the rows of the record.
-        clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
+        clock: of these rows, from the first sample on, s; NaN where there is no time.
         whole: whether the file itself states that it is one run.
-        input: of a driven record: its kind, and its values at the cleaned times, shape (n,); None for free decays.
+        input: of a driven record: its kind, and its values at the cleaned times; None for free decays.
         input_facts: the order of its hold (0 or 1) and its gain in N m per unit, by key of the format.
     """
 
@@ -57,20 +51,14 @@ class RawRecord:
     quantity: Quantity
     unit: str
     stated: Stated
-    named: dict[str, float]
     said: tuple[str, ...]
-    clock: Array
+    clock: Rows
     whole: bool
-    input: tuple[InputColumn, Array] | None = None
+    input: tuple[InputColumn, PerSample] | None = None
     input_facts: Mapping[str, float] = field(default_factory=dict)
 
-    def rows(self, first: float, last: float) -> NDArray[np.bool_]:
-        """Which rows of the record belong to a run, shape (n,).
-
-        Args:
-            first: time of its first sample, s.
-            last: time of its last sample, s.
-        """
+    def rows(self, first: Seconds, last: Seconds) -> NDArray[np.bool_]:
+        """Which rows of the record belong to a run from its first to its last sample."""
         return (self.clock >= first) & (self.clock <= last)
 
 
@@ -82,94 +70,106 @@ def raw_records(
     *,
     several: bool,
 ) -> list[RawRecord]:
-    """The records of a file; ``several``: ids must name the file, because there are others."""
+    """The records of a file, with the conditions in its name; ``several``: ids must name the file among others."""
     # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
     for table in long or source.tables:
         where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
-        facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
-        for pair in find_pairs(table, choices, where):
-            said = [*pair.said]
-            time = in_seconds(pair, table.facts, choices, said, where)
-            reading = replace(pair.reading, values=without_overflow(pair.reading.values, said))
-            readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
-            kept = np.ones(time.shape, dtype=bool)
-            if choices.start is not None or choices.end is not None:
-                first = -np.inf if choices.start is None else choices.start
-                last = np.inf if choices.end is None else choices.end
-                # Stamps are decimals: a start at one of them includes it.
-                slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
-                kept = (time >= first - slack) & (time <= last + slack)
-                said.append(f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end")
-            driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
-            time, readings = time[kept], readings[kept]
-            beside = (pair.time, pair.reading, None if driven is None else driven.channel)
-            stated = stated_in(table, beside, kept, choices, said, where)
-            stated = replace(stated, hints=(*stated.hints, *short))
-            file = source.path.stem if several or not (table.part or pair.run) else ""
-            name = one_line("-".join(part for part in (file, table.part, pair.run) if part))
+        for columns in find_columns(table, choices, calibration, where):
+            said = [*columns.said]
+            kept = _from_start_to_end(columns.time, choices, said)
+            stated = find_conditions(table, columns.used, choices, said, where).of_rows(kept)
+            stated = replace(stated, named=named, hints=(*stated.hints, *short))
+            run = columns.pair.run
+            file = source.path.stem if several or not (table.part or run) else ""
+            name = one_line("-".join(part for part in (file, table.part, run) if part))
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
-            starts = [0, *restarts(time), time.size]
-            if len(starts) > 2:
-                said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
-            for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
-                clean = cleaned(time[a:b], readings[a:b])
-                if quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
-                    rows = np.flatnonzero(kept)[a:b]
-                    raise HoldsTurningPoints(
-                        _turning_points(name, table, pair, rows, clean, unit, said, choices), where
-                    )
-                if clean.time_s.size < 2:
-                    raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
-                given = None
-                if driven is not None:
-                    values = at_times(driven.values[kept][a:b], time[a:b], readings[a:b], clean.time_s)
-                    missing = int(np.count_nonzero(~np.isfinite(values)))
-                    if missing:
-                        raise TunnelError(
-                            f"the input {driven.column} has no number at {missing} of {values.size} samples",
-                            where=where,
-                            remedy="give one value for each sample of the reading, on the same clock, "
-                            "or --input none",
-                        )
-                    given = driven.column, values
-                found.append(
-                    RawRecord(
-                        id=name if len(starts) == 2 else f"{name}-{place}",
-                        source=source.path,
-                        column=pair.reading.name,
-                        cleaned=clean,
-                        quantity=quantity,
-                        unit=unit,
-                        stated=stated.of_rows(a, b),
-                        named=named,
-                        said=(*said, *clean.said),
-                        clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
-                        whole=table.named and len(starts) == 2,
-                        input=given,
-                        input_facts=facts,
-                    )
+            found += _records(name, source.path, table, columns, kept, stated, choices, said, where)
+    return found
+
+
+def _from_start_to_end(time: Rows, choices: ImportChoices, said: list[str]) -> NDArray[np.bool_]:
+    """Which rows of a table are used."""
+    if choices.start is None and choices.end is None:
+        return np.ones(time.shape, dtype=bool)
+    first = -np.inf if choices.start is None else choices.start
+    last = np.inf if choices.end is None else choices.end
+    # Stamps are decimals: a start at one of them includes it.
+    slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
+    kept: NDArray[np.bool_] = (time >= first - slack) & (time <= last + slack)
+    said.append(f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end")
+    return kept
+
+
+def _records(
+    name: str,
+    path: Path,
+    table: Table,
+    columns: RunColumns,
+    kept: NDArray[np.bool_],
+    stated: Stated,
+    choices: ImportChoices,
+    said: list[str],
+    where: str,
+) -> list[RawRecord]:
+    """The cleaned records of the columns of a run: one, or one from each start of the clock."""
+    found = []
+    driven = columns.input
+    time, readings = columns.time[kept], columns.reading[kept]
+    facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
+    starts = [0, *restarts(time), time.size]
+    if len(starts) > 2:
+        said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
+    for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
+        clean = cleaned(time[a:b], readings[a:b])
+        rows = np.flatnonzero(kept)[a:b]
+        if columns.quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
+            raise HoldsTurningPoints(_turning_points(name, table, columns, rows, clean, said, choices), where)
+        if clean.time_s.size < 2:
+            raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
+        given = None
+        if driven is not None:
+            values = driven.values[rows[clean.rows]]
+            missing = int(np.count_nonzero(~np.isfinite(values)))
+            if missing:
+                raise TunnelError(
+                    f"the input {driven.column} has no number at {missing} of {values.size} samples",
+                    where=where,
+                    remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )
+            given = driven.column, values
+        found.append(
+            RawRecord(
+                id=name if len(starts) == 2 else f"{name}-{place}",
+                source=path,
+                column=columns.pair.reading.name,
+                cleaned=clean,
+                quantity=columns.quantity,
+                unit=columns.unit,
+                stated=stated.of_rows(slice(a, b)),
+                said=(*said, *clean.said),
+                clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
+                whole=table.named and len(starts) == 2,
+                input=given,
+                input_facts=facts,
+            )
+        )
     return found
 
 
 def _turning_points(
     name: str,
     table: Table,
-    pair: ColumnPair,
+    columns: RunColumns,
     rows: NDArray[np.intp],
     clean: Cleaned,
-    unit: str,
     said: Sequence[str],
     choices: ImportChoices,
 ) -> TurningPoints:
-    """The turning points in a table, with the standard deviations in its columns.
-
-    Args:
-        unit: of the angle, for a column of uncertainties without a known unit.
-    """
+    """The turning points in some rows of a table, with the standard deviations in its columns."""
+    pair, unit = columns.pair, columns.unit  # the unit also of uncertainties without a known one
     time, said = clean.time_s, [*table.said, *said]
     if pair.time is not None and not pair.time.unit and choices.time_unit is None:
         # The step of a clock is short, and half a period of a swing is not.
@@ -178,7 +178,7 @@ def _turning_points(
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
         said = [line for line in said if "no unit of the times" not in line]
         said.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
-    found: dict[str, Array] = {}
+    found: dict[str, PerSample] = {}
     for channel in table.channels:
         mark = _STD.match(channel.name)
         values = channel.values[rows]

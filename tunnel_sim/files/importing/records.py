@@ -1,35 +1,28 @@
-"""From files to the runs of a campaign, and to its folder, with unknown properties as comments."""
+"""Steps 1 to 4 of an import: from files to the runs of a campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
-from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, write_campaign
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import resolution
-from tunnel_sim.files.importing.columns import read_calibration, stem
+from tunnel_sim.files.importing.column_names import stem
+from tunnel_sim.files.importing.column_numbers import read_calibration
 from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
     OF_REPEATABILITY,
     RIG_KEYS,
     SPREAD_KEYS,
 )
-from tunnel_sim.files.importing.conditions import (
-    ConditionTable,
-    ImportChoices,
-    from_name,
-    name_pattern,
-)
-from tunnel_sim.files.importing.imported_run import ImportedRun as ImportedRun
-from tunnel_sim.files.importing.imported_run import imported_run
+from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
+from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.source import Source, read_source
-from tunnel_sim.files.importing.stated import name_hints
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.toml_input import one_line, shown
@@ -212,114 +205,3 @@ def _campaign(
         one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
         repeatability=Repeatability(**spread) if spread else None,
     )
-
-
-_AS_TEXT = 1_000_000  # samples: a larger campaign is written as Parquet
-_RIG = {
-    "frontal_area": "m2: needed for Cnβ and Cnr",
-    "reference_length": "m: needed for Cnβ and Cnr",
-    "yaw_inertia": "kg m2, nominal Izz of model and support; optional",
-    "width": "m, for Strouhal numbers; optional",
-}
-_REPEATABILITY = (
-    "# [repeatability]   # optional: wind_speed, spring_stiffness and mechanical_damping, each as one standard\n"
-    "#                   # deviation between runs, relative, such as 0.003\n"
-)
-_RUN = {
-    "spring_stiffness": "N m/rad: needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
-    "air_density": "kg/m3: needed for Cnβ and Cnr",
-    "release_angle": "rad, nominal; optional",
-}
-_OF_INPUT = {
-    "drive_gain": "N m per unit of a column drive; estimated where it is not stated",
-    "drive_hold": "'zero' if a controller holds each command, 'linear' if the input moves between samples; "
-    "linear is assumed where it is not stated",
-}
-_RIG_OF_JOINT = {"yaw_inertia": "kg m2, nominal inertia about the joint; optional"}
-_RUN_OF_JOINT = {
-    "spring_stiffness": "N m/rad: 0 for a joint without a spring",
-    **_OF_INPUT,
-}
-"""Of driven runs in still air: no coefficient of the wind is sought in them."""
-ORIGINAL = "# Original: "
-_RUNS_HEAD = "# What the files do not say about the runs: fill it in, and remove the # before it."
-
-
-def import_records(
-    files: Sequence[Path | str],
-    folder: Path | str,
-    choices: ImportChoices = ImportChoices(),  # noqa: B008 - frozen
-    *,
-    conditions: Path | None = None,
-    overwrite: bool = False,
-    picture: Callable[[Imported], bytes] | None = None,
-) -> Imported:
-    """Read files as instruments write them, and write them as a campaign: completely, or not at all.
-
-    Args:
-        files: one or more, of any known format.
-        picture: draws the records, as PNG; None: no picture.
-    """
-    name = one_line(Path(folder).resolve().name)
-    imported = read_records([Path(path) for path in files], choices, conditions=conditions, name=name)
-    write_imported(imported, folder, overwrite=overwrite, picture=picture)
-    return imported
-
-
-def write_imported(
-    imported: Imported,
-    folder: Path | str,
-    *,
-    overwrite: bool = False,
-    picture: Callable[[Imported], bytes] | None = None,
-) -> None:
-    """Write the imported runs as a campaign, with its recipe; arguments as in `import_records`."""
-    samples = sum(run.record.time_s.size for run in imported.campaign.runs)
-    driven = {run.id for run in imported.campaign.runs if run.drive is not None}
-    recipe = {
-        "schema_version": 1,
-        "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
-        "originals": [
-            {"file": one_line(s.path.name), "sha256": s.sha256, "said": imported.remarks(s.path)}
-            for s in imported.sources
-        ],
-    }
-    beside = {IMPORT_RECIPE: tomli_w.dumps(recipe).encode()}
-    if picture is not None:
-        beside[IMPORT_PICTURE] = picture(imported)
-    write_campaign(
-        imported.campaign,
-        folder,
-        run_format="csv" if samples <= _AS_TEXT else "parquet",
-        overwrite=overwrite,
-        text=lambda document: campaign_text(document, originals(imported), driven),
-        beside=beside,
-        checked=True,
-    )
-
-
-def originals(imported: Imported) -> list[str]:
-    """Comments that name the files, with their SHA-256."""
-    return [f"{ORIGINAL}{one_line(s.path.name)}, SHA-256 {s.sha256}" for s in imported.sources]
-
-
-def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven: Collection[str]) -> str:
-    """``campaign.toml`` after comments on its originals; keys that are not stated are also comments.
-
-    Args:
-        driven: ids of the driven runs.
-    """
-    tables = {key: value for key, value in document.items() if key != "runs"}
-    rig = tables.pop("rig", {})
-    joint = all(run["id"] in driven and not run.get("wind_speed") for run in document["runs"])
-    unknown = [
-        f"# {key} =   # {why}" for key, why in (_RIG_OF_JOINT if joint else _RIG).items() if key not in rig
-    ]
-    head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
-    head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
-    blocks = []
-    for run in document["runs"]:
-        wanted = _RUN_OF_JOINT if joint else _RUN | (_OF_INPUT if run["id"] in driven else {})
-        unknown = [f"# {key} =   # {why}" for key, why in wanted.items() if key not in run]
-        blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
-    return "\n".join([*originals, *head, *blocks])

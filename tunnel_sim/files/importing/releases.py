@@ -13,9 +13,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.conditions import Stretch
+from tunnel_sim.files.importing.choices import Stretch
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.quantities import Angles, PerSample, Rates, Times
 
 _BAND = 0.05  # of the largest excursion: a smaller one counts as rest
 _NOISES = 5.0  # standard deviations: smaller excursions are noise
@@ -38,12 +38,10 @@ class RecordPiece:
     last: int
 
 
-def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordPiece]:
+def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[RecordPiece]:
     """The runs of a record: one for each release; the whole record if no hand is detected in it.
 
     Args:
-        time_s: increasing, shape (n,), s.
-        reading: shape (n,).
         drift: greatest drift of its centre, in the unit of the reading.
     """
     whole = [RecordPiece(0, reading.size)]
@@ -103,13 +101,8 @@ def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordP
     return pieces or whole
 
 
-def find_runs_of_rate(time_s: Array, rate: Array) -> list[RecordPiece]:
-    """The runs of a record of rates: from the largest rate after each release, which cannot be due to a hand.
-
-    Args:
-        time_s: increasing, shape (n,), s.
-        rate: shape (n,), rad/s.
-    """
+def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
+    """The runs of a record of rates: from the largest rate after each release, which cannot be due to a hand."""
     whole = [RecordPiece(0, rate.size)]
     noise = _noise_of(rate)
     centred = _centred(rate, noise)
@@ -138,12 +131,8 @@ def find_runs_of_rate(time_s: Array, rate: Array) -> list[RecordPiece]:
     return found
 
 
-def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
-    """A run with stated start and end; refused if fewer than two samples are in between.
-
-    Args:
-        time_s: of the record, shape (n,), s.
-    """
+def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
+    """A run with stated start and end; refused if fewer than two samples are in between."""
     if stated.start is None and stated.end is None:
         return found
     start = time_s[found.first] if stated.start is None else stated.start
@@ -157,11 +146,10 @@ def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str)
     return RecordPiece(first, last)
 
 
-def _without_drift(time_s: Array, angle: Array, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """An angle integrated from rates without the drift due to the sensor's bias, shape (n,).
+def _without_drift(time_s: Times, angle: Angles, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Angles:
+    """An angle integrated from rates without the drift due to the sensor's bias.
 
-    Args:
-        starts: of the excursions of the rate, between which the body turns; ``ends`` are after their last samples.
+    The body turns between the excursions of the rate, from their starts to their ends.
     """
     at = (ends[:-1] + starts[1:]) // 2
     if at.size < _LEAST_HALVES:
@@ -171,19 +159,19 @@ def _without_drift(time_s: Array, angle: Array, starts: NDArray[np.intp], ends: 
     centres, times = 0.25 * (turns[:-2] + 2.0 * turns[1:-1] + turns[2:]), time_s[at[1:-1]]
     half = times.size // 2
     slopes = (centres[half:] - centres[: times.size - half]) / (times[half:] - times[: times.size - half])
-    drifted: Array = angle - float(np.median(slopes)) * time_s
+    drifted: Angles = angle - float(np.median(slopes)) * time_s
     return drifted
 
 
-def _noise_of(reading: Array) -> float:
+def _noise_of(reading: PerSample) -> float:
     """A bound of the noise, by fourth differences, which hardly contain a swing."""
     some = np.abs(np.diff(reading[:_NOISE_OF], 4))
     return _NOISES * (float(np.median(some)) / (0.6745 * sqrt(70.0))) if some.size else 0.0
 
 
-def _centred(reading: Array, noise: float) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]] | None:
-    """A reading relative to its centre, shape (n,), and its excursions; None if it has too few."""
-    away: Array = reading - np.median(reading)
+def _centred(reading: PerSample, noise: float) -> tuple[PerSample, NDArray[np.intp], NDArray[np.intp]] | None:
+    """A reading relative to its centre, and its excursions; None if it has too few."""
+    away: PerSample = reading - np.median(reading)
     for _ in range(_CENTRED):
         starts, ends = _excursions(away, noise)
         if starts.size < _LEAST_HALVES:
@@ -196,7 +184,7 @@ def _centred(reading: Array, noise: float) -> tuple[Array, NDArray[np.intp], NDA
     return None if starts.size < _LEAST_HALVES else (away, starts, ends)
 
 
-def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _excursions(away: PerSample, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The stretches of one sign outside the band around the centre: first samples, and indices after the last."""
     outside = np.flatnonzero(np.abs(away) > max(_BAND * float(np.abs(away).max()), noise))
     change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
@@ -205,7 +193,7 @@ def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np
     return outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
 
 
-def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:
+def _without_long_rest(time_s: Times, first: int, end: int, *, clear: bool) -> int:
     """The end of a record that rests for longer than it moves: as much rest as motion is kept."""
     if not clear:  # the motion continues in the noise
         return time_s.size

@@ -1,196 +1,66 @@
-"""From a file to its tables: its reader is chosen, and runs in a process with limits.
-
-A damaged file may block a parser for ever, make it request all memory, or end the process. One process
-serves one file after another; if it exceeds a limit, another one replaces it.
-"""
+"""Step 1 of an import: read the tables of a file, by the reader of its format, in a process with limits."""
 
 from __future__ import annotations
 
-import atexit
 import hashlib
-import json
-import math
-import os
 import pkgutil
-import signal
-import subprocess
-import sys
 import threading
-import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.formats.text import TEXT, read_text_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
-from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import check_count, is_blank, read_regular
+from tunnel_sim.sandbox import LimitReached, Message, Sandbox
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
-_SERVE = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from tunnel_sim.files.importing.source import serve; serve()"
-)
-_LATEST = 3.0  # times the allowed time
-_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status where Linux or macOS ended it for its time
-_DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
-_kept: list[_Server] = []
+_kept: list[Sandbox] = []
 
 
 def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
-    """The tables of a file by the reader at ``module:name``, read in a process with limits."""
+    """The tables of a file by the reader at ``module:name``, read in a process that is kept for the next file."""
+    seconds = limits.READER_SECONDS + len(content) / limits.READER_PACE
     with _lock:
-        if _kept and not _kept[0].usable():
+        if _kept and not _kept[0].usable:
             _kept.pop().end()
         if not _kept:
-            _kept.append(_Server())
+            _kept.append(Sandbox(_prepare, limits.READER_MEMORY, files=True))
         try:
-            return _kept[0].read(reader, content, where)
-        except BaseException as error:
-            # An unread reply would be mistaken for the next one.
-            if not isinstance(error, TunnelError) or not _kept[0].usable():
-                _kept.pop().end()
-            raise
+            found, arrays = _kept[0].do(_read, {"reader": reader, "where": where}, [content], seconds)
+        except LimitReached as error:
+            remedy = "split it if it is large; if it is damaged, export it again, or as text"
+            raise TunnelError(f"reading it {error}", where=where, remedy=remedy) from None
+        except TunnelError as error:
+            raise TunnelError(error.what, where=where, remedy=error.remedy) from None
+    values = (np.frombuffer(array) for array in arrays)
+    tables = []
+    for table in found["tables"]:
+        channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
+        tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
+    return tables
 
 
-class _Server:
-    """The process, seen by its client."""
-
-    def __init__(self) -> None:
-        from multiprocessing.spawn import get_executable  # a program that embeds Python may have set it
-
-        from tunnel_sim.processes import ONE_THREAD
-
-        self._process = subprocess.Popen(
-            [os.fsdecode(get_executable()), "-W", "ignore", "-c", _SERVE, json.dumps([*map(str, sys.path)])],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-        )
-        self._asked, self._answers = cast(BinaryIO, self._process.stdin), cast(BinaryIO, self._process.stdout)
-        self._owner = os.getpid()
-        atexit.register(self.end)
-
-    def usable(self) -> bool:
-        """Whether the process runs and belongs to this one: a fork must not use its parent's pipes."""
-        return self._owner == os.getpid() and self._process.poll() is None
-
-    def end(self) -> None:
-        """End the process at once."""
-        atexit.unregister(self.end)
-        if self._owner == os.getpid():
-            self._process.kill()
-            self._process.wait()
-        for stream in (self._asked, self._answers):
-            with suppress(OSError):  # unsent data cannot be sent
-                stream.close()
-
-    def read(self, reader: str, content: bytes, where: str) -> list[Table]:
-        """The tables of a file, as in `read_guarded`."""
-        allowed = limits.READER_SECONDS + len(content) / limits.READER_PACE
-        late = threading.Event()
-
-        def stop() -> None:
-            late.set()
-            self._process.kill()
-
-        watch = threading.Timer(allowed, stop)
-        watch.daemon = True
-        watch.start()
-        try:
-            request = {"reader": reader, "where": where, "seconds": allowed, "sizes": [len(content)]}
-            _send(self._asked, request, [content])
-            answer, arrays = _received(self._answers)
-        except (EOFError, OSError):
-            status = self._process.wait()
-            too_long = late.is_set() or status == _OUT_OF_TIME
-            ended = f"ends the program that reads it (exit status {status})"
-            what = f"takes longer than {allowed:.3g} s to read" if too_long else ended
-            raise TunnelError(what, where=where, remedy=f"it may be damaged: {_DAMAGED}") from None
-        finally:
-            watch.cancel()
-        if "last" in answer:
-            self._process.wait()
-        if "error" in answer:
-            raise TunnelError(answer["error"], where=where, remedy=answer["remedy"])
-        values = (np.frombuffer(array) for array in arrays)
-        tables = []
-        for table in answer["tables"]:
-            channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
-            tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
-        return tables
+def _prepare() -> None:
+    """Load what every reader needs: this module."""
 
 
-def serve() -> None:
-    """Read files for another process, until it closes the pipe."""
-    asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the output of a library is not an answer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the client ends this process
-    _limit("RLIMIT_AS", limits.READER_MEMORY)
-    with suppress(EOFError):
-        while True:
-            request, content = _received(asked)
-            # The client ends this process earlier, unless it has been killed itself.
-            # The limit counts whole seconds.
-            _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
-            try:
-                tables = pkgutil.resolve_name(request["reader"]).read_tables(content.pop(), request["where"])
-                columns = [
-                    np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels
-                ]
-                described = [
-                    {field.name: getattr(table, field.name) for field in fields(Table)}
-                    | {"channels": [(c.name, c.unit) for c in table.channels]}
-                    for table in tables
-                ]
-                head = {"tables": described, "sizes": [c.nbytes for c in columns]}
-                _send(answers, head, [c.data for c in columns])
-            except TunnelError as error:
-                _send(answers, {"error": error.what, "remedy": error.remedy, "sizes": []}, [])
-            except MemoryError:
-                what = f"needs more than {limits.READER_MEMORY / 2**30:g} GiB of memory to be read"
-                remedy = f"split it; if it is damaged, {_DAMAGED}"
-                _send(answers, {"error": what, "remedy": remedy, "sizes": [], "last": True}, [])
-                return  # the next file gets a fresh process
-
-
-def _limit(name: str, most: int) -> None:
-    """Bound a resource of this process where the system can: Linux all, macOS the processor's time."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        kind = getattr(resource, name)
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-
-
-def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memoryview]) -> None:
-    """Send a line of JSON, and the parts whose sizes it states."""
-    stream.write(json.dumps(head).encode() + b"\n")
-    for part in parts:
-        stream.write(part)
-    stream.flush()
-
-
-def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """The data sent by `_send`; EOFError where the other process has ended."""
-    line = stream.readline()
-    if not line.endswith(b"\n"):
-        raise EOFError
-    head = json.loads(line)
-    parts = [stream.read(size) for size in head["sizes"]]
-    if [len(part) for part in parts] != head["sizes"]:
-        raise EOFError
-    return head, parts
+def _read(request: dict[str, str], contents: list[bytes]) -> Message:
+    """The tables of a file, as JSON and the values of all columns."""
+    tables = pkgutil.resolve_name(request["reader"]).read_tables(contents.pop(), request["where"])
+    described = [
+        {field.name: getattr(table, field.name) for field in fields(Table)}
+        | {"channels": [(channel.name, channel.unit) for channel in table.channels]}
+        for table in tables
+    ]
+    columns = [np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels]
+    return {"tables": described}, [column.data for column in columns]
 
 
 @dataclass(frozen=True, eq=False)

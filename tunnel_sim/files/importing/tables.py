@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.units import UNITS as UNITS
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import DRIVE_KEYS, HOLDS
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.quantities import Rows
 from tunnel_sim.vocabulary.text_cells import from_text_cell
 
 if TYPE_CHECKING:
@@ -37,12 +36,12 @@ class Channel:
     """One column of a table.
 
     Args:
-        values: shape (n,), in the unit of the file; NaN where there is no number.
-        unit: one of `UNITS`, another text, or empty where none is stated.
+        values: in the unit of the file; NaN where there is no number.
+        unit: one of `units.UNITS`, another text, or empty where none is stated.
     """
 
     name: str
-    values: Array
+    values: Rows
     unit: str = ""
 
     def __post_init__(self) -> None:

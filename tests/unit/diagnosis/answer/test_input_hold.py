@@ -17,8 +17,8 @@ from diagnosis.words.verdict import headline, next_steps
 from identification import identify
 from tests.unit.diagnosis.test_input_delay import DELAY, campaign
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.records import import_records
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.record import Record

@@ -72,3 +72,15 @@ def test_a_parameter_that_single_runs_show_costs_nothing_for_being_compared() ->
     gain = np.log((accuracy**2 + most**2) / (accuracy**2 + found.widths[0] ** 2))
     assert free - given == pytest.approx(gain, rel=1e-6)
     assert gain > 5.0
+
+
+def test_parameters_that_the_runs_do_not_determine_cost_nothing_when_given() -> None:
+    """Two equal columns and one of no change cost as one column does, but for slightly other widths."""
+    one = columns(0.03 * WIDTH)
+    none = [np.zeros_like(part) for part in one.common]
+    common = [np.hstack([part, part, zero]) for part, zero in zip(one.common, none, strict=True)]
+    found = RunColumns(one.bases, one.deviations, common, one.seen).likeliest(PRIOR)
+    known, both = one.products.own, np.array([True, True, True])
+    assert found.cost(known, both) == pytest.approx(
+        one.likeliest(PRIOR).cost(known, np.array([True])), abs=0.5
+    )

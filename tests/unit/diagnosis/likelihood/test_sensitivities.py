@@ -11,7 +11,10 @@ from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
 NOMINAL = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, "cn_r": -0.11, "zero": 0.004}
 #: Parameters that take finite differences: a law, or samples of the wind, that exist on one side only.
-BY_DIFFERENCES = {"coulomb_friction": {"exponent", "saturation", "peak"}, "wind_speed_drift": {"settling"}}
+BY_DIFFERENCES = {
+    "coulomb_friction": {"exponent", "saturation", "peak", "load"},
+    "wind_speed_drift": {"settling"},
+}
 #: A rod that twists, and readings at times of their own: all parameters take differences.
 READ_BY_DIFFERENCES = {"rod_flexibility", "dropped_samples"}
 
@@ -52,7 +55,9 @@ def test_these_parameters_and_no_others_take_finite_differences(data, kind):
     assert without_derivative(problem, point) == expected
 
 
-@pytest.mark.parametrize("form", [{"presliding": 0.01}, {"exponent": 0.5}], ids=["presliding", "root"])
+@pytest.mark.parametrize(
+    "form", [{"presliding": 0.01}, {"exponent": 0.5}, {"load": 0.1}], ids=["presliding", "root", "load"]
+)
 def test_friction_without_derivatives_takes_finite_differences(data, form):
     problem, point = at_example(data, effect_class("coulomb_friction"), form)
     common = point.common.copy()

@@ -6,7 +6,6 @@ The truth is simulated by MuJoCo's own steps with the control of its actuator (`
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,10 +13,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from diagnosis import diagnose, read_model, vocabulary
+from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import refuse_undiagnosable
 from diagnosis.model.joint import with_law
-from diagnosis.result import Diagnosis
 from tests.marks import slow
 from tests.reference.robot_joints import (
     GEAR,
@@ -30,33 +28,13 @@ from tests.reference.robot_joints import (
     robot,
     robot_campaign,
 )
-from tunnel_sim.engine.joint_model import JointModel
+from tests.support.robots import KINDS, RUBS, TRUE, inertia, near, own_model
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 
 pytestmark = pytest.mark.usefixtures("models_in_this_process")
-
-TRUE = 'armature="0.05" damping="0.4"'
-RUBS = f'{TRUE} frictionloss="0.6" solreffriction="0.002 1"'
-KINDS = ("coulomb_friction", "quadratic_damping", "gravity_stiffness", "input_delay")
-
-
-def own_model(
-    folder: Path, data: Campaign, xml: str, free: Sequence[str] | None = None, **rest
-) -> JointModel:
-    path = folder / "robot.xml"
-    path.write_text(xml)
-    return read_model(path, "elbow", data, free, **rest)
-
-
-def inertia(xml: str) -> float:
-    model = mujoco.MjModel.from_xml_string(xml)
-    data, full = mujoco.MjData(model), np.zeros((1, 1))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, full)
-    return float(full[0, 0])
 
 
 @pytest.fixture(scope="module")
@@ -203,13 +181,6 @@ def left_by_plain_mujoco(xml: str, data: Campaign, key: bool, column: str = "dri
     return max(found)
 
 
-def near(answer: Diagnosis, name: str, truth: float, extra: float = 0.0) -> bool:
-    """Whether a coefficient or parameter is within three of its standard deviations; extra: of its value."""
-    given = {**answer.coefficients.after, **answer.candidates[0].parameters}[name]
-    assert given.std is not None
-    return abs(given.value - truth) < 3.0 * given.std + extra * truth
-
-
 @pytest.mark.parametrize("hold", ["zero", pytest.param("linear", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("axis", "start"), [pytest.param(UPRIGHT, 0.0, marks=pytest.mark.slow), (LEVEL, math.pi / 2)]
@@ -241,7 +212,7 @@ SERVO = '<position name="motor" joint="elbow" kp="60" kv="4"/>'
     ("axis", "start", "actuators", "peaks", "damping"),
     [
         pytest.param(UPRIGHT, 0.0, MOTOR, (0.3, 0.2, 0.25), 0.4, marks=pytest.mark.slow),
-        slow(LEVEL, math.pi / 2, MOTOR, (0.3, 0.2, 0.25), 0.4),  # test_cli_own_model.py has it, too
+        slow(LEVEL, math.pi / 2, MOTOR, (0.3, 0.2, 0.25), 0.4),  # so has test_diagnose_own_model.py
         pytest.param(LEVEL, 0.0, SERVO, (0.8, 0.5, 0.6), 4.4, marks=pytest.mark.slow),
     ],
 )

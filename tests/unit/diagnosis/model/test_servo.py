@@ -9,12 +9,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from diagnosis import Diagnosis, diagnose, read_model, vocabulary
+from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for, refuse_undiagnosable
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.servo import Servo, ServoPerInertia
 from identification import identify
 from tests.reference.robot_joints import LEVEL, UPRIGHT, robot, robot_campaign
+from tests.support import robots
+from tests.support.robots import RUBS, TRUE, near, own_model
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
@@ -23,11 +25,9 @@ from tunnel_sim.vocabulary.errors import TunnelError
 pytestmark = pytest.mark.usefixtures("models_in_this_process")
 
 KP, KV, DAMPING = 60.0, 4.0, 0.4
+KINDS = vocabulary(robots.KINDS)
 SERVO = f'<position name="motor" joint="elbow" kp="{KP:g}" kv="{KV:g}"/>'
-TRUE = f'armature="0.05" damping="{DAMPING:g}"'
-RUBS = f'{TRUE} frictionloss="0.6" solreffriction="0.002 1"'
 PEAKS = (0.8, 0.5, 0.6)  # rad
-KINDS = vocabulary(("coulomb_friction", "quadratic_damping", "gravity_stiffness", "input_delay"))
 
 
 def commanded(
@@ -50,18 +50,7 @@ def known() -> Campaign:
 
 @pytest.fixture(scope="module")
 def inertia() -> float:
-    model = mujoco.MjModel.from_xml_string(robot(TRUE, actuators=SERVO))
-    data, full = mujoco.MjData(model), np.zeros((1, 1))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, full)
-    return float(full[0, 0])
-
-
-def near(answer: Diagnosis, name: str, truth: float, extra: float = 0.0) -> bool:
-    """Whether a coefficient or parameter is within three of its standard deviations; extra: of its value."""
-    given = {**answer.coefficients.after, **answer.candidates[0].parameters}[name]
-    assert given.std is not None
-    return abs(given.value - truth) < 3.0 * given.std + extra * truth
+    return robots.inertia(robot(TRUE, actuators=SERVO))
 
 
 def test_with_stated_gains_a_servo_has_no_gap_and_shows_inertia_and_damping(
@@ -106,11 +95,10 @@ def test_identify_takes_commands(known: Campaign, inertia: float) -> None:
 def test_a_kp_of_the_model_that_is_off_is_fitted_and_written(tmp_path: Path) -> None:
     wrong = SERVO.replace(f'kp="{KP:g}"', 'kp="50"')
     data = commanded(axis=LEVEL, kp=None, kv=None)
-    path = tmp_path / "robot.xml"
-    path.write_text(robot('damping="0.4"', axis=LEVEL, actuators=wrong))
-    held = diagnose(data, kinds=KINDS, model=read_model(path, "elbow", data))
+    xml = robot('damping="0.4"', axis=LEVEL, actuators=wrong)
+    held = diagnose(data, kinds=KINDS, model=own_model(tmp_path, data, xml))
     free = ("inertia", "damping", "rest", "gain")
-    fitted = diagnose(data, kinds=KINDS, model=read_model(path, "elbow", data, free))
+    fitted = diagnose(data, kinds=KINDS, model=own_model(tmp_path, data, xml, free))
     assert held.causes != ()
     assert fitted.causes == ()
     assert near(fitted, "servo_kp", KP)
@@ -183,7 +171,5 @@ def test_what_is_no_campaign_of_one_servo_is_refused_in_one_line(
 def test_gains_that_cannot_be_had_are_refused_in_one_line(
     tmp_path: Path, known: Campaign, actuators: str, free: tuple[str, ...] | None, said: str
 ) -> None:
-    path = tmp_path / "robot.xml"
-    path.write_text(robot(TRUE, actuators=actuators))
     with pytest.raises(TunnelError, match=said):
-        diagnose(known, kinds=KINDS, model=read_model(path, "elbow", known, free))
+        diagnose(known, kinds=KINDS, model=own_model(tmp_path, known, robot(TRUE, actuators=actuators), free))

@@ -63,7 +63,7 @@ def test_a_hum_is_found_and_taken_out_whole(frequency):
     assert find_hum(nominal(cleaned)) is None
 
 
-@pytest.mark.parametrize("frequency", [49.1, 50.4, 59.2, 60.0, 60.9])
+@pytest.mark.parametrize("frequency", [49.1, slow(50.4), slow(59.2), slow(60.0), 60.9])
 def test_a_hum_is_found_wherever_grids_wander(frequency):
     found = nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS)
     assert found.prepared.hum is not None
@@ -73,7 +73,7 @@ def test_a_hum_is_found_wherever_grids_wander(frequency):
     assert not found.gap.test.detected
 
 
-@pytest.mark.parametrize("frequency", [44.0, 55.0, 65.0, 72.0])
+@pytest.mark.parametrize("frequency", [44.0, slow(55.0), slow(65.0), 72.0])
 def test_a_line_elsewhere_is_not_a_hum(frequency):
     assert nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS).prepared.hum is None
 

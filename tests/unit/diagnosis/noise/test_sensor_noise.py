@@ -8,8 +8,10 @@ from scipy.stats import binom, chi2
 
 from diagnosis.facts.found import Fact
 from diagnosis.noise.sensor_noise import (
+    LEAST_SAMPLES,
     accuracy,
     campaign_noise,
+    driven_variance,
     estimate_variance,
     floor_periodogram,
     noise_trend,
@@ -17,6 +19,7 @@ from diagnosis.noise.sensor_noise import (
     trend_statistics,
 )
 from diagnosis.settings import Settings
+from identification.signal.forcing import driven_rows
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
@@ -248,3 +251,16 @@ def test_records_of_a_few_windows_have_no_trend():
     runs = [replace(r, record=Record(r.record.time_s[:40], r.record.yaw_rad[:40])) for r in long.runs]
     assert noise_trend(long).judged
     assert not noise_trend(replace(long, runs=tuple(runs))).judged
+
+
+def test_the_noise_of_the_shortest_record_is_that_which_was_added() -> None:
+    omega, step, found = 2.0 * np.pi * 1.6, 0.01, []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time, given = step * np.arange(LEAST_SAMPLES), rng.normal(size=LEAST_SAMPLES)
+        response = driven_rows(time, given, 0.025 * omega, omega**2, held=False)[0]
+        level = 1e-3 * response.std()
+        variance, relative = driven_variance(response + level * rng.normal(size=time.size), given, 0.6)
+        found.append((variance / level**2 - 1.0) / relative)
+    # the mean of 40 values of unit variance: beyond this once in ten thousand
+    assert abs(np.mean(found)) < 3.9 / np.sqrt(40.0)

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from diagnosis import read_model
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import with_law
@@ -17,6 +16,7 @@ from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.patched_model import found_law
 from tests.reference.robot_joints import MOTOR, NOISE, TIME, multisine, robot, robot_campaign
+from tests.support.robots import own_model
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
@@ -40,12 +40,6 @@ SERVO = '<position name="motor" joint="elbow" kp="60" kv="4"/>'
 @pytest.fixture(scope="module")
 def swung() -> Campaign:
     return robot_campaign(robot(TRUE))
-
-
-def own_model(folder: Path, data: Campaign, xml: str) -> JointModel:
-    path = folder / "robot.xml"
-    path.write_text(xml)
-    return read_model(path, "elbow", data)
 
 
 def moved(model: JointModel, patch: ActuatorPatch | None, drive: DriveMoment) -> Motion:

@@ -174,6 +174,10 @@ def test_a_steady_line_is_no_random_moment() -> None:
     assert process.spectrum[0].centre == pytest.approx(7.0, rel=0.02)  # it would take it up
     assert is_a_line(base, process)
     assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
+
+
+@pytest.mark.slow
+def test_a_random_moment_about_a_frequency_is_no_steady_line() -> None:
     (answer,) = answers(shaken(of(STILL), STILL, moment=0.02, centre=7.0))
     assert answer.effects == ("ambient_vibration",)
 

@@ -102,12 +102,12 @@ def test_a_blow_to_every_run_accuses_none() -> None:
 )
 def test_what_acts_in_all_runs_accuses_none(name: str, values: dict[str, float]) -> None:
     effect: Effect = effect_from(name, values)
-    for seed in (1, 2):
-        assert accused(campaign(effect, seed=seed)) == ()
+    assert accused(campaign(effect, seed=1)) == ()
 
 
-def test_runs_without_a_gap_accuse_none() -> None:
-    for seed in range(8):
+@pytest.mark.parametrize("seeds", [range(2), slow(range(2, 8))])
+def test_runs_without_a_gap_accuse_none(seeds: range) -> None:
+    for seed in seeds:
         assert accused(campaign(seed=seed, duration=6.0)) == ()
 
 
@@ -189,7 +189,7 @@ def test_a_blow_is_not_taken_for_a_clock_that_drifts() -> None:
 
 
 def test_without_a_cause_there_is_no_gap_beside_the_blow() -> None:
-    found = diagnose(with_blow(campaign(), 5e-3, 4.0, "r2")).to_json_dict()
+    found = diagnose(with_blow(campaign(), 5e-3, 4.0, "r2"), kinds=FEW).to_json_dict()
     assert found["causes"] == []
     assert headline(found) == ("No gap; run r2 disturbed", "none")
     assert not found["gap"]["detected"]

@@ -194,7 +194,7 @@ def test_a_fit_that_ends_worse_than_without_the_effect_starts_again_nearby(monke
     assert within_noise(grow(whole_runs(base, [kind]))[0].fit)
 
 
-@pytest.mark.parametrize("offset", [-13.0, 6.0])
+@pytest.mark.parametrize("offset", [-13.0, slow(6.0)])
 def test_an_offset_of_most_of_the_wind_is_found(offset):
     """The slowest wind is 15 m/s."""
     kind = effect_class("wind_speed_offset")
@@ -259,8 +259,8 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
     ("form", "freed"),
     [
         ({"exponent": 0.3}, ("exponent",)),
-        ({"saturation": 0.4}, ("saturation",)),
-        ({"peak": 1.0, "peak_rate": 0.4}, ("peak", "peak_rate")),
+        slow({"saturation": 0.4}, ("saturation",)),
+        slow({"peak": 1.0, "peak_rate": 0.4}, ("peak", "peak_rate")),
         ({"presliding": 0.02}, ("presliding",)),
     ],
     ids=lambda given: next(iter(given)),

@@ -1,20 +1,14 @@
-"""The settings: each has an origin and one decision that reads it, and the copy given decides.
-
-The weights are those of the formula in decision 0007, written out here.
-"""
+"""The settings: each has an origin and one decision that reads it, and the copy given decides."""
 
 import ast
 from dataclasses import fields
-from math import exp, log
+from functools import cache
 from typing import get_args
 
-import numpy as np
 import pytest
 
-from diagnosis import Settings, diagnose
-from diagnosis.likelihood.residuals import ChannelMisfit
+from diagnosis import Settings, diagnose, vocabulary
 from diagnosis.search.investigate import investigate
-from diagnosis.search.weigh import FittedSet, weigh
 from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
 from diagnosis.words.numbers import part
@@ -65,12 +59,15 @@ KNOWN_IN_SEVERAL = {
 VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py"}
 
 
+@cache
 def sources():
-    """Every module that may read a setting, by its path."""
-    for package in ("diagnosis", "tunnel_lab"):
-        for path in sorted((settings_page.ROOT / package).rglob("*.py")):
-            if path.parent.name != "settings":
-                yield path, ast.parse(path.read_text("utf-8"))
+    """Every module that may read a setting, with its path."""
+    return [
+        (path, ast.parse(path.read_text("utf-8")))
+        for package in ("diagnosis", "tunnel_lab")
+        for path in sorted((settings_page.ROOT / package).rglob("*.py"))
+        if path.parent.name != "settings"
+    ]
 
 
 def reads(tree, names, owner=""):
@@ -149,74 +146,10 @@ def test_the_settings_given_decide_and_are_in_the_document():
     )  # the tests share it, and no p-value is above 1
     assert investigate(data, (), settings=everything).gap.test.detected
     given = {"words.runs_without_caution": len(data.runs) + 1}
-    usual, changed = (diagnose(data, settings=Settings().changed(one)).to_json_dict() for one in ({}, given))
+    kinds = vocabulary(["quadratic_damping"])
+    usual, changed = (
+        diagnose(data, kinds=kinds, settings=Settings().changed(one)).to_json_dict() for one in ({}, given)
+    )
     assert (usual["provenance"]["settings"], changed["provenance"]["settings"]) == ({}, given)
     assert not any(said.startswith("There are") for said in usual["cautions"])
     assert any(said.startswith(f"There are {len(data.runs)} runs only") for said in changed["cautions"])
-
-
-COUNT = np.array([100.0, 100.0, 10.0, 10.0, 110.0, 10_000.0])
-GAP = np.array([3e5, 1e3, 2e3, 50.0, 4e4, 1e4])
-SETS = {
-    ("a",): (np.array([2e3, 100.0, 40.0, -5.0, 4e4, 200.0]), 0),
-    ("a", "b"): (np.array([1e3, 80.0, 30.0, -6.0, 300.0, -80.0]), 0),
-    ("b", "c"): (np.array([500.0, 80.0, 30.0, 4.0, 100.0, 100.0]), 2),
-}
-
-
-def misfit(left, scales, chosen, leaking=6):
-    """Sum of logarithms over the channels, with the leak between the first few of them."""
-    above = [max(x, 0.0) for x in left]
-    leaked = [sum(above[:leaking]) - x for x in above[:leaking]] + [0.0] * (6 - leaking)
-    return sum(log(1.0 + (x + chosen.leak * y) / s) for x, y, s in zip(above, leaked, scales, strict=True))
-
-
-#: Every setting of the weighing of its own.
-MOVED = {
-    "steepness": 1.0, "set_price": 2.0, "form_price": 1.5, "model_error": 2e-3, "form_error": 0.05, "leak": 0.05,
-    "needless_chi2": 12.0, "chance_stds": 3.0, "unknown_at": 0.4, "unknown_gap": 0.3, "unknown_left": 1.5,
-    "least_closed": 0.03, "even_share": 0.06,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("moved", [{}, MOVED])
-@pytest.mark.parametrize("motion", [4e7, 4e10])
-def test_the_probabilities_are_those_of_the_decision(motion, moved):
-    chosen = Settings().changed({f"weighing.{name}": value for name, value in moved.items()}).weighing
-    least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
-    common = max(min(left[c] for left, _ in SETS.values()) for c in range(6))
-    gap_by_channel = [x + chosen.leak * (sum(GAP) - x) for x in GAP]
-    errors = [
-        min(max(chosen.form_error**2 * x, common), chosen.model_error**2 * motion) for x in gap_by_channel
-    ]
-    scale = [chosen.needless_chi2 + error for error in errors]
-    weights = {
-        key: exp(
-            -chosen.steepness
-            * misfit(left - least, scale, chosen, leaking=4)  # damping and frequency, and of runs
-            - chosen.set_price * len(key)
-            - chosen.form_price * numbers
-        )
-        for key, (left, numbers) in SETS.items()
-    }
-    by_chance = [
-        chosen.chance_stds * (2.0 * n) ** 0.5 + error for n, error in zip(COUNT, errors, strict=True)
-    ]
-    gap = misfit(GAP, by_chance, chosen)
-    odds = {}
-    for key, (left, _) in SETS.items():
-        remains = misfit(left, by_chance, chosen)
-        closed = log(max(1.0 - remains / gap, 0.0) + chosen.least_closed)
-        odds[key] = exp(
-            chosen.unknown_at + chosen.unknown_gap * gap - chosen.unknown_left * (log(1.0 + remains) - closed)
-        )
-    total = sum(weights.values())
-    against = sum(weights[key] * odds[key] for key in SETS) / total
-    even, own = chosen.even_share / 4, 1.0 - chosen.even_share
-    expected = {
-        key: own * against / (1.0 + against) * weight / total + even for key, weight in weights.items()
-    }
-    expected[("unknown",)] = own / (1.0 + against) + even
-    sets = [FittedSet(key, 0.1, left, numbers) for key, (left, numbers) in SETS.items()]
-    found = weigh(sets, ChannelMisfit(COUNT + GAP, COUNT, motion), chosen)
-    assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)

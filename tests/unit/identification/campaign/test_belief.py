@@ -135,7 +135,7 @@ def test_the_prior_of_a_fit_is_worth_its_information():
     reading = Reading.from_record(found.runs[0].record)
     own = identify_run(found.runs[0], found.sensor).fit
     free = fit_decays([reading], [np.eye(2)], np.array([own.decay.rate, own.decay.stiffness]))
-    information, _ = free.runs[0].reduced()
+    information, _ = free.runs[0].reduced("shared")
     known = information[:2, :2]
     away = np.linalg.cholesky(np.linalg.inv(known)) @ np.array([NOISE, -NOISE])
     pulled = fit_decays(

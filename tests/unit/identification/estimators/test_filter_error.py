@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from identification import identify
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.inputs import InputColumn

@@ -15,9 +15,9 @@ from identification.estimators import (
     Estimator,
     estimators_of_driven_runs,
 )
-from identification.estimators.bayesian import Bayesian, Forced
+from identification.estimators.bayesian import Bayesian, InputResponse
 from identification.estimators.frequency_response import FrequencyResponse
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from identification.signal.free_decay import Decay
 from tests.marks import slow
 from tests.reference.rigs import rig
@@ -27,7 +27,6 @@ from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import integrate
 from tunnel_reference.severity import Simulated
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 RIG = replace(
@@ -54,12 +53,12 @@ WAVES = {
 
 
 @cache
-def driven(kind: str, column: str = "moment_nm", *, held: bool = False, gain: float = 1.0) -> Campaign:
+def driven(kind: str, column: str = "moment_nm", *, held: bool = False) -> Campaign:
     """Four runs without noise, their input scaled to move the rig by about 0.1 rad."""
     rng = np.random.default_rng(2)
     values = np.stack([WAVES[kind](rng) for _ in range(4)], axis=1)
-    values *= {"moment_nm": 0.3, "drive": 0.3 / gain, "base_rad": 0.01}[column] / values.std()
-    given = Input(column, values, np.full(4, held), np.full(4, 0.1), gain)
+    values *= {"moment_nm": 0.3, "base_rad": 0.01}[column] / values.std()
+    given = Input(column, values, np.full(4, held), np.full(4, 0.1))
     c = replace(RIG, drive=given)
     (motion,) = integrate([c], [[]], substeps=8)
     draw = CampaignDraw("none", c, (), 0)
@@ -69,8 +68,8 @@ def driven(kind: str, column: str = "moment_nm", *, held: bool = False, gain: fl
 @pytest.mark.parametrize(
     ("kind", "held"),
     [
-        ("multisine", True),
-        slow("multisine", False),
+        ("multisine", False),
+        slow("multisine", True),
         *(slow(kind, held) for kind in ("chirp", "square", "random") for held in (False, True)),
     ],
 )
@@ -81,15 +80,13 @@ def test_coefficients_of_a_linear_rig_are_found(kind: str, held: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    "estimator", [slow(e) if e == "output_error" else e for e in estimators_of_driven_runs()]
+    "estimator", [e if e == "frequency_response" else slow(e) for e in estimators_of_driven_runs()]
 )
-@pytest.mark.parametrize(("column", "gain"), [("drive", 2.5), slow("base_rad", 1.0)])
-def test_an_unknown_gain_and_a_moving_root_are_taken(column: str, gain: float, estimator: str) -> None:
-    given = driven("multisine", column, gain=gain)
-    found = identify(given, estimator)
+def test_a_moving_root_does_not_act_through_the_air(estimator: str) -> None:
+    found = identify(driven("multisine", "base_rad"), estimator)
     for name, true in TRUTH.items():
         assert getattr(found, name).value == pytest.approx(true, rel=1e-4), name
-    stiffness = RIG.true_stiffness - RIG.air_stiffness  # of the air too, which no motion of the root moves
+    stiffness = RIG.true_stiffness - RIG.air_stiffness
     for run, true in zip(found.runs, stiffness, strict=True):
         assert run.omega_n.value == pytest.approx(np.sqrt(true / 0.1), rel=1e-4)
 
@@ -128,16 +125,6 @@ def test_lines_that_something_else_shakes_are_left_out() -> None:
     assert abs(kept - true) < 0.2 * abs(all_lines - true)
 
 
-def test_what_has_no_frequency_response_is_refused_in_one_line() -> None:
-    given = driven("chirp")
-    free = replace(given, runs=(replace(given.runs[0], drive=None), *given.runs[1:]))
-    with pytest.raises(TunnelError, match=r"is a free decay, which has no frequency response.*output_error"):
-        identify(free, "frequency_response")
-    loose = replace(given, runs=(replace(given.runs[0], spring_stiffness=0.0), *given.runs[1:]))
-    with pytest.raises(TunnelError, match="has no spring, and so no resonance"):
-        identify(loose, "frequency_response")
-
-
 def test_it_is_not_among_the_estimators_of_free_decays() -> None:
     assert DRIVEN_ONLY == ("frequency_response",)
     assert not set(DRIVEN_ONLY) & set(ALL_ESTIMATORS)
@@ -145,23 +132,14 @@ def test_it_is_not_among_the_estimators_of_free_decays() -> None:
 
 def test_the_response_over_the_grid_of_a_posterior_is_that_of_its_points() -> None:
     """Seven standard deviations to either side, of a record of noise 1e-3."""
-    run = driven("random").runs[0]
+    run = driven("multisine").runs[0]
     assert run.drive is not None
     centre, scale, axis = np.array([0.06, 210.0]), np.diag([4e-3, 0.12]), np.linspace(-7.0, 7.0, 15)
 
     def rows(decay: Decay) -> np.ndarray:
         return driven_rows(TIME, run.drive.values, decay.rate, decay.stiffness, held=False)
 
-    found = Forced(rows, known=None).over(centre, scale, axis).reshape(15, 15, 3, -1)
+    found = InputResponse(rows, known=None).over(centre, scale, axis).reshape(15, 15, 3, -1)
     for i, j in ((0, 0), (3, 11), (7, 7), (14, 2)):
         exact = rows(Decay(*(centre + scale @ axis[[i, j]])))
         assert np.max(np.abs(found[i, j] - exact) / np.max(np.abs(exact), axis=1, keepdims=True)) < 1e-3
-
-
-def test_a_body_without_a_spring_has_no_posterior_of_its_stiffness() -> None:
-    given = driven("random")
-    loose = replace(
-        given, runs=tuple(replace(run, spring_stiffness=0.0, wind_speed=0.0) for run in given.runs)
-    )
-    with pytest.raises(TunnelError, match="no stiffness to find"):
-        identify(loose, "bayesian")

@@ -19,17 +19,21 @@ from tunnel_sim.vocabulary.record import Record
 
 
 def refused(data) -> Remark:
-    """The one remark, which refuses the campaign in both commands alike."""
+    """The one remark, which refuses the campaign."""
     (remark,) = examine(data).remarks
     assert remark.outcome is Outcome.REFUSED
-    said = []
+    return remark
+
+
+def test_both_commands_refuse_alike():
+    data = stated(grid((16.0, 35.0), (0.0, 20.0)), "k16-v0", wind_speed=20.0, air_density=1.2)
+    data, said = stated(data, "k16-v20", wind_speed=0.0), []
     for command in (lambda: identify(data, throw=False), lambda: diagnose(data)):
         with pytest.raises(TunnelError) as caught:
             command()
         said.append(str(caught.value))
     assert said[0] == said[1]
-    assert remark.what in said[0]
-    return remark
+    assert refused(data).what in said[0]
 
 
 def test_a_good_campaign_goes_through_as_it_is():

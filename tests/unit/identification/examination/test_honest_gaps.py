@@ -31,7 +31,7 @@ def test_no_effect_is_taken_for_a_slip(kind: type[Effect]):
 def test_no_scatter_is_taken_for_a_slip(kind: type[Effect]):
     """Of five times the typical width, which is 1.5 % of the speed and 5 % of the damping, and so of less."""
     info, paper = kind.parameters()[0], paper_plan()
-    short = tuple(replace(one, duration=min(one.duration, 10.0)) for one in paper.conditions)
+    short = tuple(replace(one, duration=min(one.duration, 5.0)) for one in paper.conditions)
     for seed in range(4):
         wide = EffectSetting(kind.name, {info.name: 5.0 * info.scale})
         plan = replace(paper, seed=seed, conditions=short, effects=(wide,))

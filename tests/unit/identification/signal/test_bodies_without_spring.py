@@ -8,11 +8,10 @@ import pytest
 
 from identification import Estimate, identify
 from identification.estimate import Status
-from identification.signal.driven import driven_rows, driven_start
+from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.record import Record
 
@@ -149,10 +148,3 @@ def test_a_record_that_the_input_does_not_explain_is_a_status(what: str) -> None
     found = identify(campaign(replace(loose(3), record=Record(TIME, reading))), throw=False)
     json.dumps(found.to_json_dict(), allow_nan=False)
     assert found.status.failed or found.status is Status.MODEL_DEPARTS
-
-
-def test_the_root_of_a_spring_that_is_not_there_is_refused() -> None:
-    run = loose(1)
-    assert run.drive is not None
-    with pytest.raises(TunnelError, match="the motion of the root acts through the spring"):
-        identify(campaign(replace(run, drive=Drive("base_rad", run.drive.values))))

@@ -1,19 +1,16 @@
 """The motion of a driven run against closed forms, and what output error finds in driven and mixed campaigns."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from identification import identify
-from identification.estimators import ALL_ESTIMATORS, estimators_of_driven_runs
-from identification.signal.driven import driven_rows, driven_start
+from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
@@ -133,61 +130,6 @@ def test_the_start_is_near_the_truth() -> None:
     assert start[2] == pytest.approx(10.0, rel=0.05)
 
 
-def run(name: str, spring: float, column: str | None, seed: int, hold: Hold = "linear") -> Run:
-    values = excitation(seed) * (0.1 if column == "base_rad" else 1.0)
-    factor = {"moment_nm": 1.0, "drive": 2.5, "base_rad": spring, None: 0.0}[column] / INERTIA
-    reading = damped_cosine(TIME, DAMPING / INERTIA, spring / INERTIA, 0.1, 0.2) + 0.01
-    stiffness = spring / INERTIA
-    reading = reading + factor * driven_rows(TIME, values, A, stiffness, held=hold == "zero")[0]
-    reading = reading + NOISE * np.random.default_rng([seed, 1]).standard_normal(TIME.size)
-    drive = None if column is None else Drive(column, values, hold)  # type: ignore[arg-type]
-    return Run(name, Record(TIME, reading), 0.0, spring, drive=drive)
-
-
-def campaign(columns: tuple[str | None, ...], hold: Hold = "linear", seed: int = 0) -> Campaign:
-    springs = (16.0, 36.0)
-    runs = tuple(
-        run(f"r{i}", springs[i % 2], column, 100 * seed + i, hold) for i, column in enumerate(columns)
-    )
-    return Campaign("driven", RigProperties(), SensorProperties(RATE, None, NOISE), runs)
-
-
-@pytest.mark.parametrize("hold", ["linear", "zero"])
-@pytest.mark.parametrize(
-    "columns",
-    [
-        ("moment_nm", "moment_nm"),
-        ("drive", "drive"),
-        ("base_rad", "base_rad"),
-        ("moment_nm", None),
-        (None, "drive"),
-        ("moment_nm",),
-    ],
-)
-def test_output_error_finds_inertia_and_damping(columns: tuple[str | None, ...], hold: Hold) -> None:
-    found = identify(campaign(columns, hold))
-    assert found.yaw_inertia is not None
-    assert found.mechanical_damping is not None
-    for quantity, truth in ((found.yaw_inertia, INERTIA), (found.mechanical_damping, DAMPING)):
-        assert abs(quantity.value - truth) < 4.5 * quantity.std
-        assert quantity.std < 2e-3 * truth
-    gained = any("gain of the input" in str(remark) for remark in found.remarks)
-    assert gained == ("drive" in columns)
-
-
-@pytest.mark.slow
-def test_its_standard_deviations_are_those_of_the_scatter() -> None:
-    scores = []
-    for seed in range(40):
-        found = identify(campaign(("moment_nm", None), seed=seed + 1))
-        assert found.yaw_inertia is not None
-        assert found.mechanical_damping is not None
-        scores.append((found.yaw_inertia.value - INERTIA) / found.yaw_inertia.std)
-        scores.append((found.mechanical_damping.value - DAMPING) / found.mechanical_damping.std)
-    # χ² of 80 values: outside this range once in ten thousand campaigns of campaigns
-    assert 40.0 < float(np.sum(np.square(scores))) < 137.0
-
-
 @pytest.mark.parametrize("seed", [4, 7, 12, 18, 19])
 def test_a_resonance_above_half_the_sample_rate_is_no_estimate(seed: int) -> None:
     # a moment on the body, said to be the angle of the root: without a limit these fits end at 1e7 rad/s and more
@@ -199,22 +141,19 @@ def test_a_resonance_above_half_the_sample_rate_is_no_estimate(seed: int) -> Non
         identify(Campaign("wrong", RigProperties(), SensorProperties(), (wrong,)))
 
 
-def test_a_run_without_a_spring_stated_gives_frequency_and_damping() -> None:
-    free = campaign(("drive",))
-    bare = replace(free, runs=(replace(free.runs[0], spring_stiffness=None),))
-    estimate = identify(bare)
-    said = next(str(remark) for remark in estimate.remarks if "gain of the input" in str(remark))
-    gain, std = (float(word) for word in said.split("is ")[1].split(" rad")[0].split(" ± "))
-    assert abs(gain - 2.5 / INERTIA) < 4.5 * std
-    found = estimate.runs[0]
-    assert found.omega_n is not None
-    assert abs(found.omega_n.value - np.sqrt(K)) < 4.5 * found.omega_n.std
+@pytest.mark.parametrize("held", [True, False])
+def test_the_rate_is_the_slope_of_the_angle(held: bool) -> None:
+    fine = np.arange(10 * TIME.size) / (10.0 * RATE)
+    values = np.repeat(excitation(0), 10) if held else np.interp(fine, TIME, excitation(0))
+    rows = [driven_rows(fine, values, 0.25, 160.0, held=held, derivative=d) for d in (0, 1)]
+    slopes = (rows[0][:, 2:] - rows[0][:, :-2]) / (fine[2:] - fine[:-2])
+    for slope, rate in zip(slopes, rows[1][:, 1:-1], strict=True):
+        assert np.max(np.abs(slope - rate)) < 2e-3 * np.max(np.abs(rate))
 
 
-@pytest.mark.parametrize("name", [name for name in ALL_ESTIMATORS if name not in estimators_of_driven_runs()])
-def test_other_estimators_refuse_driven_runs_in_one_line(name: str) -> None:
-    with pytest.raises(
-        TunnelError, match=f"run 'r0': the run is driven, and {name} takes free decays only"
-    ) as caught:
-        identify(campaign(("moment_nm", None)), name)
-    assert "\n" not in str(caught.value)
+def test_the_spectra_give_decay_stiffness_and_gain_of_a_rate() -> None:
+    values = excitation(3)
+    reading = 10.0 * driven_rows(TIME, values, 0.25, 160.0, held=False, derivative=1)[0]
+    found = driven_start(TIME, reading, values, derivative=1)
+    assert found is not None
+    assert found == pytest.approx((0.25, 160.0, 10.0), rel=0.02)

@@ -10,7 +10,7 @@ import pytest
 
 from docs.studies.planned_drives import compare
 from identification import identify
-from identification.signal.driven import driven_rows
+from identification.signal.forcing import driven_rows
 from identification.uncertainty.cramer_rao import campaign_bound
 from identification.uncertainty.drive_design import (
     Goal,

@@ -22,7 +22,7 @@ from tunnel_lab.bench.workspace import Session
 from tunnel_lab.terminal.inputs import file_hashes
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.importing.conditions import read_recipe
+from tunnel_sim.files.importing.choices import read_recipe
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES

@@ -13,7 +13,7 @@ from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.importing.conditions import read_recipe
+from tunnel_sim.files.importing.choices import read_recipe
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from diagnosis.blind import sets as answer
 from tests.support.own_effects import EFFECTS_FILE
+from tunnel_lab.experiments.blind import answers as answer
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 

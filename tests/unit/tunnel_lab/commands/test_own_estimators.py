@@ -16,12 +16,14 @@ from identification import estimators, identify, make_estimator, register_estima
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
+from tests.support.driven_runs import driven
 from tests.support.small_sweep import SMALL
-from tunnel_lab.experiments import breakdown, runner, score_trials
+from tunnel_lab.experiments import breakdown, runner
+from tunnel_lab.experiments.experiment import results_of, run_in
 from tunnel_lab.experiments.runner import processes
+from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import load_grid
-from tunnel_lab.experiments.sweep import run_sweep
-from tunnel_lab.experiments.sweep_cases import read_sweep
+from tunnel_lab.experiments.sweep import read_sweep
 from tunnel_sim import TunnelError
 
 ROOT = Path(__file__).parents[4]
@@ -218,7 +220,7 @@ def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
 def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Bare", "Mine")]
-    run_sweep(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
     status, out, err = tunnel("sweep", "--summary", "out")
     assert (status, err) == (0, "")
     assert "Not given by bare: ζ, zero.\n" in out
@@ -249,11 +251,12 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Mine", "Broken")]
     given = campaign(TWELVE[:4], noise=5e-4, duration=4.0, rate=200.0, rng=np.random.default_rng(1))
     case = breakdown.BiasCase("no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3))
-    rows = breakdown.break_down([case], names, 1, jobs=1)
-    mine, broken = ([row for row in rows if row["estimator"] == name] for name in names)
-    assert all(row["value"] is not None for row in mine)
-    assert {row["status"] for row in broken} == {"raised TypeError"}
-    said, traceback = score_trials.failure_lines(rows)
+    rows, outcome = results_of(breakdown.breakdown_of([case], tuple(names), 1), None, processes(1))
+    mine, broken = (rows.filter(pl.col("estimator") == name) for name in names)
+    assert mine["value"].null_count() == 0
+    assert set(broken["status"]) == {"raised TypeError"}
+    (failed,) = outcome.failed
+    said, traceback = failed.lines
     assert said == "broken raised an exception once; counted as failures. The first:"
     assert RAISED in traceback
 
@@ -274,10 +277,10 @@ def test_a_wrong_return_is_one_line_in_every_command(tunnel, tiny_campaign: Path
 def test_a_wrong_return_fails_a_sweep(folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("NotANumber", "Mine")]
-    outcome = run_sweep(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    store, outcome = run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
     (failed,) = outcome.failed
     assert (failed.status, failed.of_the_estimator) == ("wrong_return", True)
-    rows = outcome.store.scan().collect().filter(estimator="not_a_number")
+    rows = store.scan().collect().filter(estimator="not_a_number")
     assert (set(rows["status"]), failed.count) == ({"wrong_return"}, rows["case"].n_unique())
     assert "is nan ±" in rows["message"][0]
 
@@ -316,7 +319,7 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
 def test_sweep_prints_the_first_traceback(tunnel) -> None:
     status, _, err = tunnel("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Broken")
     assert status == 1
-    assert "estimates raised an exception: see status 'raised' in the results. The first:" in err
+    assert "broken raised an exception once; counted as failures. The first:" in err
     assert err.count("Traceback") == 1
     assert RAISED in err
 
@@ -350,14 +353,12 @@ def test_a_registered_class_is_known_by_its_name() -> None:
 def test_a_class_that_no_process_can_import_is_said(folder: Path) -> None:
     register_estimator(type("Local", (MatrixPencil,), {"name": "local"}))
     with pytest.raises(TunnelError, match=r"estimator local: other processes cannot import.*use 0 processes"):
-        score_trials.score_grid(load_grid(folder / "grid.toml"), ["local"], jobs=1)
-    rows = score_trials.score_grid(load_grid(folder / "grid.toml"), ["local"], jobs=0)
-    assert None not in {row["value"] for row in rows}
+        score_grid(load_grid(folder / "grid.toml"), ["local"], processes(1))
+    results, _ = score_grid(load_grid(folder / "grid.toml"), ["local"], processes(0))
+    assert results.table["value"].null_count() == 0
 
 
 def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
-    from tests.unit.identification.signal.test_driven import campaign as driven_campaign
-
     class Plain:
         name = "plain"
 
@@ -372,7 +373,7 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
         name = "driven"
         takes_driven = True
 
-    given = driven_campaign(("moment_nm", None))
+    given = driven("moment, then released")
     with pytest.raises(TunnelError, match=r"plain takes free decays only; .* states takes_driven = True"):
         identify(given, Plain())
     assert identify(given, Driven()).runs[0].omega_n is not None

@@ -17,7 +17,7 @@ from tests.reference.free_decays import Setting, campaign
 from tunnel_lab.commands import identify as command
 from tunnel_sim import TunnelError
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.importing.conditions import ConditionTable
+from tunnel_sim.files.importing.condition_table import ConditionTable
 
 ROOT = Path(__file__).parents[4]
 

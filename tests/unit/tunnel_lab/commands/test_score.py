@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import signal
 import subprocess
 import sys
@@ -79,7 +78,7 @@ def test_figures_come_with_their_sampling_errors_and_are_kept(
     assert (status, err) == (0, "")
     assert "Single decays (4 cells)" in out
     assert out.count("ζ 0.05, 3 Hz, S/A 0.5 %, 5 s") == 1
-    written = {"trials.parquet", "scores.parquet", "score.png", "score.pdf"}
+    written = {"trials.parquet", "scores.parquet", "score.png", "score.pdf", "index.html"}
     assert {path.name for path in folder.iterdir()} == written
     assert (folder / "score.png").read_bytes()[:4] == b"\x89PNG"
     frame = pl.read_parquet(folder / "scores.parquet")
@@ -198,19 +197,27 @@ def test_an_interrupted_score_keeps_what_is_done_and_goes_on(
         [sys.executable, "-m", "tunnel_lab.cli", *command], stderr=subprocess.PIPE, text=True
     ) as process:
         until = time.monotonic() + 120.0
-        while len(list(out.glob("parts/*.json"))) < 4 and time.monotonic() < until:
+        while len(list(out.glob("parts/results/*.parquet"))) < 4 and time.monotonic() < until:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert err.startswith("tunnel: interrupted")
-    kept = {path: path.read_bytes() for path in out.glob("parts/*")}
+    kept = list(out.glob("parts/results/*.parquet"))
     assert 4 <= len(kept) < 320
-    assert all(path.suffix == ".json" for path in kept)
-    changed = min(kept)
-    document = json.loads(kept[changed])
-    document["rows"][0]["value"] = 0.0101  # shows afterwards that it was not estimated again
-    changed.write_text(json.dumps(document))
+    times = pl.read_parquet(min(kept))["milliseconds"]
     assert tunnel(*command)[0] == 0
-    assert not (out / "parts").exists()
-    assert 0.0101 in pl.read_parquet(out / "trials.parquet")["value"].to_list()
+    assert not (out / "parts").exists()  # the times show that it was not estimated again
+    assert set(times) <= set(pl.read_parquet(out / "trials.parquet")["milliseconds"])
+
+
+def test_the_parts_of_an_earlier_version_are_refused_in_a_line(
+    tunnel: Tunnel, grid: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "scores" / "parts").mkdir(parents=True)
+    (tmp_path / "scores" / "parts" / "c0000-t00000.json").write_text("{}")
+    command = ("score", grid, *HERE, "--trials", "3", "--out", tmp_path / "scores")
+    status, out, err = tunnel(*command)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "the folder holds something else; name another --out, or add --overwrite" in err
+    assert tunnel(*command, "--overwrite")[0] == 0

@@ -8,6 +8,8 @@ import pytest
 
 from tunnel_lab.experiments import breakdown as view
 from tunnel_lab.experiments import breakdown as work
+from tunnel_lab.experiments.experiment import results_of
+from tunnel_lab.experiments.runner import processes
 
 NAMES = ("matrix_pencil", "conventional")
 EFFECTS = ("coulomb_friction", "sensor_drift")
@@ -20,7 +22,7 @@ def cases():
 
 @pytest.fixture(scope="module")
 def found(cases):
-    return work.biases(work.break_down(cases, NAMES, 1, jobs=0))
+    return work.breakdown_frame(results_of(work.breakdown_of(cases, NAMES, 1), None, processes(0))[0])
 
 
 @pytest.mark.slow
@@ -28,14 +30,14 @@ def test_effects_are_as_strong_as_they_should_be(cases):
     assert [case.effect for case in cases] == ["no effect"] * 2 + [name for name in EFFECTS for _ in "ab"]
     for case in cases:
         assert case.reached == pytest.approx(case.severity, rel=0.15, abs=0.05)
-    assert len({case.name for case in cases}) == len(cases)
+    assert len(set(map(work.case_name, cases))) == len(cases)
 
 
 def test_a_case_is_named_for_its_effect_and_severity(monkeypatch):
     monkeypatch.setattr(work, "size_effects", lambda draws, **_: draws)
     cases = work.make_cases(1, realisations=1, effects=EFFECTS[:1], severities=(10.0,), duration=0.2)
     assert [(case.effect, case.severity) for case in cases] == [("no effect", 0.0), (EFFECTS[0], 10.0)]
-    assert [case.name for case in cases] == ["no_effect-0-0", "coulomb_friction-10-0"]
+    assert list(map(work.case_name, cases)) == ["no_effect-0-0", "coulomb_friction-10-0"]
 
 
 @pytest.mark.slow
@@ -46,19 +48,22 @@ def test_realisations_differ_in_their_noise_only(cases):
 
 @pytest.mark.slow
 def test_friction_biases_damping_and_nothing_biases_none(found):
+    def expr(effect, quantity, name):
+        wanted = {"effect": effect, "quantity": quantity, "estimator": name}
+        return pl.all_horizontal(pl.col(key) == value for key, value in wanted.items())
+
     def bias(effect, quantity, name="matrix_pencil"):
-        (one,) = [b for b in found if (b.effect, b.quantity, b.estimator) == (effect, quantity, name)]
-        return one.score
+        return found.row(by_predicate=expr(effect, quantity, name), named=True)
 
     none, friction = bias("no effect", "mechanical_damping"), bias("coulomb_friction", "mechanical_damping")
-    assert abs(none.bias_in_stds.value) < 5.0
-    assert friction.relative_bias.value > 20.0 * abs(none.relative_bias.value)
-    assert friction.relative_bias.value > 0.0  # dry friction takes energy, as more damping would
+    assert abs(none["bias_in_stds"]) < 5.0
+    assert friction["bias_percent"] > 20.0 * abs(none["bias_percent"])
+    assert friction["bias_percent"] > 0.0  # dry friction takes energy, as more damping would
 
 
 @pytest.mark.slow
 def test_the_map_is_a_table_and_a_figure(found):
-    frame = work.breakdown_frame(found)
+    frame = found
     assert frame.height == 3 * 2 * 4
     assert frame["bias_percent"].is_finite().all()
     assert [one.row_count for one in view.breakdown_tables(found, "cn_r")] == [3]
@@ -70,14 +75,15 @@ def test_the_map_is_a_table_and_a_figure(found):
 
 @pytest.mark.slow
 def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
-    work.break_down(cases, NAMES, 1, jobs=0, parts=tmp_path)
-    (tmp_path / "sensor_drift-10-1.json").unlink()
+    experiment = work.breakdown_of(cases, NAMES, 1)
+    results_of(experiment, tmp_path, processes(0))
+    (tmp_path / "results" / "sensor_drift-10-1.parquet").unlink()
     asked = []
-    real = work.estimate_rows
-    monkeypatch.setattr(work, "estimate_rows", lambda name, *given: asked.append(name) or real(name, *given))
-    again = work.biases(work.break_down(cases, NAMES, 1, jobs=0, parts=tmp_path))
+    real = work.answer_rows
+    monkeypatch.setattr(work, "answer_rows", lambda name, *given: asked.append(name) or real(name, *given))
+    again = work.breakdown_frame(results_of(experiment, tmp_path, processes(0))[0])
     assert asked == list(NAMES)
-    assert again == found
+    assert again.equals(found)
 
 
 def test_all_effects_of_the_vocabulary_have_a_form_to_inject():

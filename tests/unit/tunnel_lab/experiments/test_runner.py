@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
-from tunnel_lab.experiments.runner import processes, run_tasks
+from tunnel_lab.experiments.experiment import Done, Experiment, run
+from tunnel_lab.experiments.runner import processes
 
 
-def squared(task: int) -> int:
-    return task * task
+def squared(task: int) -> Done:
+    return Done({"results": str(task * task).encode()})
 
 
-def test_the_rest_is_done_and_counted_by_its_size() -> None:
-    kept = {2: 4}
+class Kept(dict[str, Done]):
+    """A store in memory."""
+
+    def finished(self) -> set[str]:
+        return set(self)
+
+    def keep(self, name: str, done: Done) -> None:
+        self[name] = done
+
+
+def squares(*tasks: int) -> Experiment[int]:
+    return Experiment("squares", tasks, squared, str, {}, weight=lambda task: task)
+
+
+def test_the_rest_is_done_and_counted_by_its_weight() -> None:
+    kept = Kept({"2": squared(2)})
     seen: list[tuple[int, int]] = []
-    found = run_tasks(
-        squared,
-        [1, 2, 3],
-        processes(0),
-        finished=kept.__contains__,
-        keep=kept.__setitem__,
-        size=lambda task: task,
-        progress=lambda done, total: seen.append((done, total)),
-    )
-    assert (found, kept) == (1, {1: 1, 2: 4, 3: 9})
+    outcome = run(squares(1, 2, 3), kept, processes(0), lambda *now: seen.append(now))
+    assert outcome.found == 1
+    assert {name: done.files["results"] for name, done in kept.items()} == {"1": b"1", "2": b"4", "3": b"9"}
     assert seen == [(2, 6), (3, 6), (6, 6)]
 
 
-def test_nothing_is_started_for_finished_tasks() -> None:
-    def workers(*_: object) -> Iterator[tuple[int, int]]:
-        raise AssertionError
-
-    assert run_tasks(squared, [1, 2], workers, finished=lambda _: True, keep=print) == 2
-
-
+@pytest.mark.usefixtures("here")
 def test_workers_are_closed_when_a_result_cannot_be_kept() -> None:
     closed: list[bool] = []
 
@@ -46,9 +46,10 @@ def test_workers_are_closed_when_a_result_cannot_be_kept() -> None:
         finally:
             closed.append(True)
 
-    def full_disk(*_: object) -> None:
-        raise OSError
+    class Full(Kept):
+        def keep(self, name: str, done: Done) -> None:
+            raise OSError(name, done)
 
     with pytest.raises(OSError):  # noqa: PT011
-        run_tasks(squared, [1, 2], workers, finished=lambda _: False, keep=full_disk)
+        run(squares(1, 2), Full(), workers)
     assert closed == [True]

@@ -12,9 +12,9 @@ import pytest
 from identification.estimators import ALL_ESTIMATORS
 from tests.marks import slow
 from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packaged_breakdown
+from tunnel_lab.experiments.score import Results, packaged_baseline
 from tunnel_lab.experiments.score_drawing import cell_labels, score_figure
 from tunnel_lab.experiments.score_grid import Cell, Grid
-from tunnel_lab.experiments.score_trials import Results, packaged_baseline
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.effects import ALL_EFFECTS
 
@@ -98,7 +98,7 @@ def made(cells: list[Cell], given: dict[str, tuple[str, ...]]) -> Results:
         for name, some in given.items()
         for quantity in cell.quantities
     ]  # fmt: skip
-    return Results(grid, tuple(given), tuple(rows))
+    return Results(grid, tuple(given), pl.DataFrame(rows))
 
 
 @styled
@@ -151,7 +151,7 @@ def test_points_of_the_score_are_those_of_the_table() -> None:
     from identification.scoring import score
 
     results = packaged_baseline()
-    trials = results.trials()
+    trials = results.trials
     parts = score_figure(results).subfigs
     assert len(parts) == 4
     for part, covered in zip(parts[:2], (False, True), strict=True):

@@ -10,9 +10,11 @@ import pytest
 from identification import identify
 from identification.scoring import score
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.experiments import score_trials
+from tunnel_lab.experiments import experiment
+from tunnel_lab.experiments import score as score_trials
+from tunnel_lab.experiments.runner import processes
+from tunnel_lab.experiments.score import Unit, read_trials, write_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, effects_of, load_grid, packaged_grid
-from tunnel_lab.experiments.score_trials import Results, read_trials, write_trials
 from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -32,8 +34,8 @@ def small(tmp_path):
     return load_grid(path)
 
 
-def timeless(rows):
-    return [{name: value for name, value in row.items() if name != "milliseconds"} for row in rows]
+def timeless(results):
+    return results.table.drop("milliseconds").to_dicts()
 
 
 def test_every_combination_is_a_cell(small):
@@ -101,31 +103,34 @@ def test_the_bound_is_that_of_the_start_actually_released():
 def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little(
     small, tmp_path, monkeypatch
 ):
-    here = score_trials.score_grid(small, NAMES, jobs=0)
+    here, _ = score_trials.score_grid(small, NAMES, processes(0))
     reported = []
-    there = score_trials.score_grid(
-        small, NAMES, jobs=2, parts=tmp_path / "parts", progress=lambda *now: reported.append(now)
+    there, _ = score_trials.score_grid(
+        small, NAMES, processes(2), parts=tmp_path / "parts", progress=lambda *now: reported.append(now)
     )
     assert timeless(here) == timeless(there)
     assert reported[0] == (0, 16)
     assert reported[-1] == (16, 16)
-    # All is kept: going on estimates nothing again, unless the seed is another or a part was spoilt.
-    (tmp_path / "parts" / "c0001-t00000.json").write_text('{"fingerprint": ')
+    # All is kept: only a part that was damaged is estimated again, and other work is refused.
+    (tmp_path / "parts" / "results" / "c0001-t00000.parquet").write_text("PAR1")
     done = []
     real = score_trials.score_unit
-    monkeypatch.setattr(
-        score_trials, "score_unit", lambda *given: done.append(given[-1].name) or real(*given)
-    )
-    again = score_trials.score_grid(small, NAMES, jobs=0, parts=tmp_path / "parts")
+    monkeypatch.setattr(score_trials, "score_unit", lambda *given: done.append(given[-1]) or real(*given))
+    again, _ = score_trials.score_grid(small, NAMES, processes(0), parts=tmp_path / "parts")
     assert timeless(again) == timeless(here)
-    assert done == ["c0001-t00000"]
-    score_trials.score_grid(replace(small, seed=2), NAMES, jobs=0, parts=tmp_path / "parts")
-    assert len(done) == 5
+    assert done == [Unit(1, 0, 4)]
+    with pytest.raises(TunnelError, match=r"another score, whose seed differs; .* add --overwrite"):
+        score_trials.score_grid(replace(small, seed=2), NAMES, processes(0), parts=tmp_path / "parts")
+    monkeypatch.setattr(experiment, "_code", lambda: "changed")
+    with pytest.raises(TunnelError, match="the code has changed since the score was begun"):
+        score_trials.score_grid(small, NAMES, processes(0), parts=tmp_path / "parts")
 
 
 def test_slow_methods_see_the_first_trials(small):
-    rows = score_trials.score_grid(replace(small, trials_of=(("conventional", 2),)), NAMES, jobs=0)
-    assert {row["trial"] for row in rows} == {0, 1}
+    results, _ = score_trials.score_grid(
+        replace(small, trials_of=(("conventional", 2),)), NAMES, processes(0)
+    )
+    assert set(results.table["trial"]) == {0, 1}
 
 
 def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch):
@@ -135,23 +140,23 @@ def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch)
         raise np.linalg.LinAlgError("singular")
 
     monkeypatch.setattr(Conventional, "estimate", fall)
-    results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
-    said, traceback = score_trials.failure_lines(results.rows)
-    assert said.startswith("conventional raised an exception ")
+    results, (failed,) = score_trials.score_grid(small, NAMES, processes(0))
+    said, traceback = failed.lines
+    assert said.startswith("conventional raised an exception 16 times")
     assert traceback.endswith("numpy.linalg.LinAlgError: singular")
     assert f"{Path(__file__).name}" in traceback
-    assert {trials.failures for trials in results.trials().values()} == {4}
+    assert {trials.failures for trials in results.trials.values()} == {4}
     assert scores_frame(results)["failure_share"].to_list() == [1.0] * 12
 
 
 def test_trials_survive_the_disk(small, tmp_path):
-    results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
+    results, _ = score_trials.score_grid(small, NAMES, processes(0))
     again = read_trials(write_trials(tmp_path / "trials.parquet", results))
-    assert again.rows == results.rows
+    assert again.table.equals(results.table)
     assert (again.grid, again.estimators) == (small, NAMES)
     frame = scores_frame(results)
     assert frame.height == 2 * 2 + 2 * 4
-    for row, trials in zip(frame.iter_rows(named=True), results.trials().values(), strict=True):
+    for row, trials in zip(frame.iter_rows(named=True), results.trials.values(), strict=True):
         judged = score(trials)
         figures = {**vars(judged), "relative_bias_percent": judged.relative_bias}
         for name in ("bias", "relative_bias_percent", "bias_in_stds", "rmse", "rmse_over_bound"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.scoring import Trials, score
-from tunnel_lab.experiments.score_trials import packaged_baseline
+from tunnel_lab.experiments.score import packaged_baseline
 from tunnel_lab.experiments.score_view import cell_figures, lines_below, pooled_figures, summary_tables
 
 

@@ -1,282 +1,219 @@
-"""A sweep on disk: killed, interrupted, resumed, refused. The shards themselves are done in this process where that
-is not the point."""
+"""Which cases a sweep file stands for, and that their seeds depend on what they hold. Truth: counts by hand."""
 
 from __future__ import annotations
 
-import json
-import os
-import re
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
+from collections import Counter
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
+import tomli_w
 
-from tests.support.killed import names_of_the_dead
-from tests.support.small_sweep import SMALL, contents
-from tunnel_lab.experiments import sweep as engine
-from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
+from tests.support.small_sweep import SMALL
+from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep_view import lines_of
+from tunnel_lab.experiments.sweep_work import run_shard
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.errors import TunnelError
 
-ROOT = Path(__file__).parents[4]
-PATIENCE_S = 120.0
+
+def variant(folder: Path, *changes: tuple[str, str]) -> Sweep:
+    text = SMALL
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "variant.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_sweep(path)
 
 
-def started(file: Path, out: Path) -> subprocess.Popen[str]:
-    """``tunnel sweep`` on two processes, once its first shard is finished."""
-    words = [sys.executable, "-m", "tunnel_lab.cli", "sweep", str(file), "--out", str(out), "--jobs", "2"]
-    process = subprocess.Popen(
-        words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
+def seeds(sweep: Sweep) -> list[int]:
+    return [sweep.case(index).plan.seed for index in range(sweep.size)]
+
+
+def test_every_combination_once(sweep: Sweep) -> None:
+    assert (sweep.size, sweep.runs, sweep.shards) == (12, 24, 12)
+    found = Counter(
+        (
+            case.plan.sensor.noise_std,
+            case.plan.effects[0].parameters["friction_moment"] if case.plan.effects else 0.0,
+        )
+        for case in map(sweep.case, range(sweep.size))
     )
-    until = time.monotonic() + PATIENCE_S
-    while not list(out.glob("results/part-*")):
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    return process
+    assert found == dict.fromkeys(product((0.0002, 0.002), (0.0, 0.002, 0.02)), 2)
+    assert len(set(seeds(sweep))) == 12
 
 
-def running(group: int) -> bool:
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
+def test_all_axes_multiply(tmp_path: Path) -> None:
+    sweep = variant(
+        tmp_path,
+        ("cn_beta = 0.495", "cn_beta = [0.3, 0.4, 0.5]"),
+        ("duration = 2.0", "duration = [2.0, 3.0]"),
+        ("[conditions]", '[[rig]]\nname = "a"\n[[rig]]\nname = "b"\n'
+         "changes = { dynamics = { yaw_inertia = 0.2 } }\n[conditions]"),
+    )  # fmt: skip
+    assert sweep.size == 2 * 2 * 2 * 3 * 3 * 2
+    inertia = {case.rig_name: case.plan.truth.yaw_inertia for case in map(sweep.case, range(sweep.size))}
+    assert inertia == {"a": load_rig().dynamics.yaw_inertia, "b": 0.2}
 
 
-def test_killed_and_resumed_is_the_same_to_the_bit(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
-    """Against a sweep that nobody disturbed, in one process and in another order."""
-    run_sweep(sweep, tmp_path / "whole", here)
-    process = started(small, tmp_path / "killed")
-    process.kill()
-    process.communicate()
-    finished = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed").glob("results/part-*")}
-    assert 0 < len(finished) < sweep.shards, "killed too late to say anything"
-    outcome = run_sweep(sweep, tmp_path / "killed", here)
-    assert outcome.found == len(finished)
-    assert {path: path.stat().st_mtime_ns for path in finished} == finished  # nothing was done twice
-    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
-    cases = open_store(tmp_path / "killed").scan().select("case").collect()["case"]
-    assert cases.is_sorted()
-    assert cases.unique().to_list() == list(range(12))
-    until = time.monotonic() + PATIENCE_S
-    while running(process.pid) and time.monotonic() < until:
-        time.sleep(0.01)
-    assert not running(process.pid)  # its workers ended with it
+def test_shards_hold_every_case_once_in_order(tmp_path: Path) -> None:
+    sweep = variant(tmp_path, ("cases_per_shard = 1", "cases_per_shard = 5"))
+    assert sweep.shards == 3
+    assert [case.index for index in range(3) for case in sweep.shard(index)] == list(range(12))
+
+
+def test_a_shard_holds_a_few_seconds_of_work(tmp_path: Path) -> None:
+    sweep = variant(tmp_path, ("cases_per_shard = 1\n", ""), ("duration = 2.0", "duration = 10.0"))
+    assert sweep.cases_per_shard == 25  # of two runs of 10,000 steps: 500,000 steps
+
+
+def test_seeds_hang_on_what_a_case_holds_not_on_its_place(sweep: Sweep, tmp_path: Path) -> None:
+    wider = variant(tmp_path, ("noise_std = [0.0002, 0.002]", "noise_std = [0.001, 0.0002, 0.002]"))
+    other = variant(tmp_path, ('"conventional"', '"output_error"'), ('name = "small"', 'name = "other"'))
+    assert set(seeds(sweep)) < set(seeds(wider))
+    assert seeds(other) == seeds(sweep)
+    assert not set(seeds(sweep)) & set(seeds(variant(tmp_path, ("seed = 1", "seed = 2"))))
+    assert not set(seeds(sweep)) & set(seeds(variant(tmp_path, ("cn_r = -0.114", "cn_r = -0.115"))))
+
+
+def test_the_sweep_survives_its_way_to_a_worker(sweep: Sweep) -> None:
+    there = Sweep.from_json(sweep.to_json())
+    assert there.to_json() == sweep.to_json()
+    assert there.case(7).plan == sweep.case(7).plan
+
+
+def test_a_case_can_be_simulated_by_itself(sweep: Sweep, tmp_path: Path) -> None:
+    """Its description as a plan gives the record that the sweep keeps, to the bit."""
+    case = sweep.case(5)
+    (tmp_path / "plan.toml").write_text(tomli_w.dumps(dict(case.document)), encoding="utf-8")
+    campaign = simulate_campaign(load_plan(tmp_path / "plan.toml"))
+    kept = pl.read_parquet(run_shard(sweep, 5).files["records"])
+    for run, (name, yaw) in zip(campaign.runs, kept.select("run", "yaw_rad").iter_rows(), strict=True):
+        assert run.id == name
+        assert np.array_equal(run.record.yaw_rad, np.array(yaw))
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_what_is_finished(small: Path, tmp_path: Path) -> None:
-    process = started(small, tmp_path / "out")
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers, too
-    _, said = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 130
-    assert said.count("\n") == 1
-    assert "interrupted" in said
-    assert open_store(tmp_path / "out").finished()
+def test_threads_and_company_leave_the_bits_alone(tmp_path: Path, sweep: Sweep) -> None:
+    together = variant(tmp_path, ("cases_per_shard = 1", "cases_per_shard = 12"))
+    one, two = (run_shard(together, 0, nthread=n) for n in (1, 2))
+    assert (one.results, one.records) == (two.results, two.records)
+    alone = [pl.read_parquet(run_shard(sweep, index).files["results"]) for index in (0, 7, 11)]
+    whole = pl.read_parquet(one.results)
+    for part, index in zip(alone, (0, 7, 11), strict=True):
+        assert part.equals(whole.filter(pl.col("case") == index), null_equal=True)
 
 
-@pytest.mark.slow
-def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "whole", here)
-    said: list[str] = []
-    killed: list[int] = []
-
-    def kill_one(done: int, total: int) -> None:
-        del total
-        if done and not killed:
-            mine = [p.name for p in Path("/proc").iterdir() if p.name.isdecimal() and _is_worker(p)]
-            killed.append(int(mine[0]))
-            os.kill(killed[0], signal.SIGKILL)
-
-    run_sweep(sweep, tmp_path / "out", processes(2, said.append), kill_one)
-    assert said == ["a worker process was lost; its tasks are repeated"]
-    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+@pytest.mark.parametrize(("speed", "name"), [(0.0, "s8-v0-a20"), (15.0, "s8-v15-a20")])
+def test_the_truth_of_a_run_is_the_nominal_models(sweep: Sweep, speed: float, name: str) -> None:
+    """Against the equation of motion written out; stiffness, inertia and damping by hand from rig and file."""
+    rig = load_rig()
+    q = 0.5 * rig.air.density * rig.body.frontal_area * rig.body.length
+    stiffness = 44.84 - q * speed**2 * 0.495
+    damping = rig.dynamics.mechanical_damping + q * speed * rig.body.length * 0.114
+    omega_n = (stiffness / rig.dynamics.yaw_inertia) ** 0.5
+    rows = pl.read_parquet(run_shard(sweep, 0).files["results"]).filter(pl.col("run") == name)
+    truths = dict(rows.select("quantity", "truth").iter_rows())
+    assert truths["omega_n"] == pytest.approx(omega_n, rel=1e-12)
+    assert truths["zeta"] == pytest.approx(damping / (2.0 * rig.dynamics.yaw_inertia * omega_n), rel=1e-12)
 
 
-def _is_worker(process: Path) -> bool:
-    """Whether it is a worker that this process started."""
-    try:
-        parent = (process / "stat").read_text().rpartition(")")[2].split()[1]
-        return parent == str(os.getpid()) and b"spawn_main" in (process / "cmdline").read_bytes()
-    except OSError:
-        return False
-
-
-@pytest.mark.parametrize("step", range(5))
-def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
-    step: int, sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    left = [step]
-
-    def failing(write):
-        def tried(*given):
-            left[0] -= 1
-            if left[0] < 0:
-                raise TunnelError("cannot be written (no space left on device)")
-            return write(*given)
-
-        return tried
-
-    with monkeypatch.context() as patch:
-        for name in ("output_folder", "write_json"):
-            patch.setattr(engine, name, failing(getattr(engine, name)))
-        with pytest.raises(TunnelError, match="no space left"):
-            begin(sweep, tmp_path / "out")
-    store = begin(sweep, tmp_path / "out")
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
-        ["sweep.json", "results", "records", "checksums"]
-    )
-    assert store.finished() == []
-
-
-def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: Sweep, tmp_path: Path) -> None:
-    for name in ("results", "records"):
-        (tmp_path / "out" / name).mkdir(parents=True)
-    begin(sweep, tmp_path / "out")
-    (tmp_path / "other" / "results").mkdir(parents=True)
-    (tmp_path / "other" / "results" / "mine.txt").write_text("")
-    with pytest.raises(TunnelError, match="the folder holds something else"):
-        begin(sweep, tmp_path / "other")
-
-
-def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
-    store = run_sweep(sweep, tmp_path / "out", here).store
-    whole = contents(tmp_path / "out")
-    part = tmp_path / "out" / "results" / "part-00004.parquet"
-    part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
-    names_of_the_dead(part.with_name("part-00005.parquet"))[0].write_bytes(b"PAR1")
-    assert 4 not in store.finished()
-    assert run_sweep(sweep, tmp_path / "out", here).found == 11
-    assert contents(tmp_path / "out") == whole
-
-
-def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "out", here)
-    before = contents(tmp_path / "out")
-    for text, said in (
-        (SMALL.replace("seed = 1", "seed = 2"), "whose seed differs from the file's"),
-        (SMALL.replace("0.02]", "0.03]"), "whose effects differs from the file's"),
-    ):
-        (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
-        with pytest.raises(TunnelError, match=said):
-            run_sweep(read_sweep(tmp_path / "changed.toml"), tmp_path / "out", here)
-    (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
-    assert run_sweep(read_sweep(tmp_path / "same.toml"), tmp_path / "out", here).found == 12
-    assert contents(tmp_path / "out") == before
-
-
-def test_other_versions_are_refused(
-    sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(engine, "made_with", lambda: {"numpy": "1.0"})
-        run_sweep(sweep, tmp_path / "old", lambda *_: iter(()))
-    with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
-        run_sweep(sweep, tmp_path / "old", here)
-    monkeypatch.setenv("OMP_NUM_THREADS", "4")
-    with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep uses 1"):
-        run_sweep(sweep, tmp_path / "new", here)
-    assert open_store(tmp_path / "new").finished() == []
-
-
-def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, here) -> None:
-    """At 60 m/s the air's moment is stronger than this spring: the motion grows without bound."""
-    text = (
-        SMALL.partition("[[effects]]")[0]
-        .replace("[0.0, 15.0]", "[0.0, 60.0]")
-        .replace("= 0.495", "= [0.1, 5.0]")
-    )
-    text = text.replace("replicates = 2", "replicates = 1").replace("per_shard = 1", "per_shard = 24")
-    (tmp_path / "wild.toml").write_text(text, encoding="utf-8")
-    rows = run_sweep(read_sweep(tmp_path / "wild.toml"), tmp_path / "out", here).store.scan().collect()
-    failed = rows.filter(pl.col("status") == "not_simulated")
-    assert set(failed["cn_beta"]) == {5.0}
-    assert failed["value"].null_count() == len(failed)
-    assert "grows without bound" in failed["message"][0]
-    assert rows.filter(cn_beta=0.1, quantity="omega_n")["value"].null_count() == 0
-
-
-def test_an_estimator_that_crashes_is_a_status(
-    sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Broken:
-        name = "conventional"
-
-        def estimate(self, _campaign):
-            raise ZeroDivisionError("planted")
-
-    monkeypatch.setattr(engine, "_estimator", lambda _: Broken())
-    outcome = run_sweep(sweep, tmp_path / "out", here)
-    (failed,) = outcome.failed
-    assert (failed.status, failed.count) == ("raised", 12)
-    rows = outcome.store.scan().collect()
-    assert set(rows["status"]) == {"raised"}
-    (message,) = set(rows["message"])
-    assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep_engine\.py line \d+", message)
-    assert failed.first.startswith("Traceback (most recent call last):")
-    assert failed.first.endswith("ZeroDivisionError: planted")
-
-
-def damages(first: Path, second: Path) -> Iterator[None]:
-    """A part damaged in its middle, swapped for another, and gone."""
-    content = bytearray(first.read_bytes())
-    content[len(content) // 2] ^= 1
-    first.write_bytes(bytes(content))
-    yield
-    first.write_bytes(second.read_bytes())
-    yield
-    first.unlink()
-    yield
-
-
-@pytest.mark.slow
-def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
-    """Not only where its end is missing: a disk may lose a block in the middle."""
-    store = run_sweep(sweep, tmp_path / "out", here).store
-    whole = contents(tmp_path / "out")
-    for dataset in ("results", "records", "checksums"):
-        for _ in damages(*sorted((tmp_path / "out" / dataset).iterdir())[:2]):
-            assert store.finished() == list(range(1, sweep.shards))
-            assert run_sweep(sweep, tmp_path / "out", here).found == sweep.shards - 1
-            assert contents(tmp_path / "out") == whole
-
-
-def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "out", here)
-    names = [f"checksums/{path.name}" for path in (tmp_path / "out" / "checksums").iterdir()]
-    done = subprocess.run(
-        ["sha256sum", "--check", *names], cwd=tmp_path / "out", capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0
-    assert done.stdout.count("OK") == 2 * sweep.shards
-
-
-@pytest.mark.parametrize("key", ["sweep", "made_with", "schema_version"])
-@pytest.mark.parametrize(
-    "value", [None, [], {}, 1, "x", "gone", {"document": {}}, {"document": {}, "rigs": [[]]}]
+SCATTER = (
+    '[scatter]\nwind_speed = [0.0, 0.003, 0.01]\nspring_stiffness_drift = -0.02\n[[effects]]\nname = "none"'
 )
-def test_a_sweep_json_that_is_incomplete_is_one_line(
-    sweep: Sweep, tmp_path: Path, key: str, value: object
-) -> None:
-    begin(sweep, tmp_path / "out")
-    path = tmp_path / "out" / "sweep.json"
-    document = json.loads(path.read_text(encoding="utf-8"))
-    if value == "gone":
-        del document[key]
-    else:
-        document[key] = value
-    if (key, value) == ("schema_version", engine.SCHEMA_VERSION) or (
-        key == "made_with" and isinstance(value, dict)
-    ):
-        return  # still what a folder may hold
-    path.write_text(json.dumps(document), encoding="utf-8")
-    for read in (open_store, lambda folder: begin(sweep, folder)):
-        with pytest.raises(TunnelError, match=r"the sweep as JSON|sweep\.json"):
-            read(tmp_path / "out")
+
+
+def test_scatter_is_an_axis_whose_absence_keeps_the_seeds(sweep: Sweep, tmp_path: Path) -> None:
+    scattering = variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER))
+    assert scattering.size == 3 * sweep.size
+    found = Counter(case.plan.scatter for case in map(scattering.case, range(scattering.size)))
+    assert found == {
+        Scatter(wind_speed=width, spring_stiffness_drift=-0.02): sweep.size for width in (0.0, 0.003, 0.01)
+    }
+    assert not set(seeds(sweep)) & set(seeds(scattering))
+    alone = variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER.replace("= -0.02", "= 0.0")))
+    assert set(seeds(sweep)) < set(seeds(alone))
+    case = scattering.case(scattering.size - 1)
+    (tmp_path / "plan.toml").write_text(tomli_w.dumps(dict(case.document)), encoding="utf-8")
+    assert load_plan(tmp_path / "plan.toml").scatter == case.plan.scatter
+
+
+def test_scatter_is_in_the_results_and_an_axis_of_the_summary(tmp_path: Path) -> None:
+    text = SMALL.replace('[[effects]]\nname = "none"', SCATTER).replace("records = true", "records = false")
+    (tmp_path / "scatter.toml").write_text(text.replace("cases_per_shard = 1", "cases_per_shard = 50"))
+    sweep = read_sweep(tmp_path / "scatter.toml")
+    rows = pl.read_parquet(run_shard(sweep, 0).files["results"])
+    assert set(rows["scatter_wind_speed"]) == {0.0, 0.003, 0.01}
+    assert set(rows["scatter_spring_stiffness_drift"]) == {-0.02}
+    assert set(rows["scatter_zero"]) == {0.0}
+    lines = lines_of(rows.filter(pl.col("quantity") == "cn_r"), "conventional", "cn_r")
+    along = [line for line in lines if line.axis == "scatter_wind_speed"]
+    assert [(line.at, line.score.count) for line in along] == [(0.0, 4), (0.003, 4), (0.01, 4)]
+    again = lines_of(rows.filter(pl.col("quantity") == "cn_r"), "conventional", "cn_r")
+    assert [line.score.count for line in again if line.axis == "noise_std"] == [6, 6]
+
+
+def test_a_number_that_scatters_twice_is_refused(tmp_path: Path) -> None:
+    twice = ('name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }',
+             'name = "wind_speed_scatter"\nparameters = { spread = 0.01 }')  # fmt: skip
+    with pytest.raises(TunnelError, match="wind_speed scatters twice"):
+        variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER), twice)
+
+
+LONG = """
+name = "long"
+seed = 3
+replicates = 1
+estimators = ["matrix_pencil"]
+cases_per_shard = 20
+[conditions]
+springs = [8]
+wind_speeds = [0.0, 15.0]
+release_angles_deg = [20.0]
+duration = 45.0
+[truth]
+cn_beta = 0.495
+cn_r = -0.114
+[sensor]
+sample_rate = 50.0
+noise_std = [0.0, 0.001, 0.002]
+resolution = 0.0
+[scatter]
+wind_speed = [0.0, 0.01]
+[[effects]]
+name = "none"
+[[effects]]
+name = "coulomb_friction"
+parameters.friction_moment = 0.002
+"""
+
+
+def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
+    """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
+    (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
+    rows = pl.read_parquet(run_shard(read_sweep(tmp_path / "long.toml"), 0).files["results"])
+    still = rows.filter((pl.col("wind_speed") == 0.0) & pl.col("run").is_not_null())
+    assert set(rows.filter(pl.col("noise_std") == 0.0)["bound"]) == {None}
+    for noise in (0.001, 0.002):
+        part = still.filter(pl.col("noise_std") == noise)
+        truths, bounds = (dict(part.select("quantity", name).iter_rows()) for name in ("truth", "bound"))
+        rate = truths["zeta"] * truths["omega_n"]
+        relative = 4.0 * noise / np.radians(20.0) * np.sqrt(rate / 50.0)
+        assert bounds["zeta"] / truths["zeta"] == pytest.approx(relative, rel=0.05)
+        assert bounds["omega_n"] / truths["omega_n"] == pytest.approx(truths["zeta"] * relative, rel=0.05)
+    # the same whatever effect acts; that of the coefficients grows with the noise and with the scatter
+    by_effect = rows.group_by("noise_std", "scatter_wind_speed", "run", "quantity").agg(
+        pl.col("bound").n_unique()
+    )
+    assert set(by_effect["bound"]) == {1}
+    known = rows.filter((pl.col("quantity") == "cn_beta") & (pl.col("effect") == "none"))
+    bounds = {(n, s): b for n, s, b in known.select("noise_std", "scatter_wind_speed", "bound").iter_rows()}
+    assert bounds[0.002, 0.0] == pytest.approx(2.0 * bounds[0.001, 0.0], rel=1e-9)
+    # an error of the speed of 1 % is one of 2 % in the only wind-on run
+    assert bounds[0.001, 0.01] == pytest.approx(np.hypot(0.02 * 0.495, bounds[0.001, 0.0]), rel=0.01)

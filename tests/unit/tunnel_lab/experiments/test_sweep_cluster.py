@@ -14,9 +14,9 @@ import pytest
 
 from tests.support.small_sweep import contents
 from tunnel_lab.cli import main
+from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.runner import on_cluster
-from tunnel_lab.experiments.sweep import run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep import Sweep
 
 ROOT = Path(__file__).parents[4]
 WORKERS = 3
@@ -58,7 +58,7 @@ def worker(address: str) -> subprocess.Popen[bytes]:
 def test_workers_missing_and_lost_are_survived(
     sweep: Sweep, here, tmp_path: Path, address: str, processes: list[subprocess.Popen[bytes]]
 ) -> None:
-    run_sweep(sweep, tmp_path / "alone", here)
+    run_in(sweep.experiment, tmp_path / "alone", here)
     said: list[str] = []
     killed: list[int] = []
 
@@ -72,12 +72,14 @@ def test_workers_missing_and_lost_are_survived(
             processes[1].kill()
             killed.append(done)
 
-    outcome = run_sweep(sweep, tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one)
+    store, _ = run_in(
+        sweep.experiment, tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one
+    )
     assert said[0].startswith("no worker is connected to tcp://")
     assert killed
     assert killed[0] < sweep.size
     assert contents(tmp_path / "cluster") == contents(tmp_path / "alone")
-    assert outcome.store.finished() == list(range(sweep.shards))
+    assert len(store.finished()) == sweep.shards
 
 
 def test_a_scheduler_that_goes_away_is_one_line(
@@ -98,11 +100,11 @@ def test_a_scheduler_that_goes_away_is_one_line(
         status = main(["sweep", str(small), "--out", str(tmp_path / "out"), "--scheduler", address])
     said = capsys.readouterr().err.splitlines()
     assert status == 2
-    assert said[-1].startswith("tunnel: the scheduler is gone; finished shards are kept")
+    assert said[-1].startswith("tunnel: the scheduler is gone; finished work is kept")
 
 
 def test_a_local_cluster_gives_the_same(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
-    run_sweep(sweep, tmp_path / "alone", here)
+    run_in(sweep.experiment, tmp_path / "alone", here)
     command = [
         sys.executable,
         "-m",

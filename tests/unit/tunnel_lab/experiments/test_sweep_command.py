@@ -8,8 +8,6 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import polars as pl
 import pytest
@@ -18,12 +16,12 @@ from tests.marks import slow
 from tests.support.gone_reader import unheard
 from tests.support.small_sweep import SMALL
 from tunnel_lab.cli import main
-from tunnel_lab.experiments import runner, sweep_summary
-from tunnel_lab.experiments.sweep import RESULT_COLUMNS, SCATTER_COLUMNS, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
-from tunnel_lab.experiments.sweep_summary import Line, lines_of, summarise
+from tunnel_lab.experiments import runner, sweep_view
+from tunnel_lab.experiments.experiment import run_in
+from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep_view import Line, lines_of, summarise
+from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS, SCATTER_COLUMNS
 from tunnel_lab.plotting.style import styled
-from tunnel_sim.vocabulary.errors import TunnelError
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
 
@@ -117,9 +115,9 @@ def test_the_file_in_the_help_is_read(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_the_summary_of_a_sweep(
     sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run_sweep(sweep, tmp_path / "out", here)
+    run_in(sweep.experiment, tmp_path / "out", here)
     assert unheard("sweep", "--summary", tmp_path / "out") == 0
-    assert len(list((tmp_path / "out" / "summary").iterdir())) == 7  # written before the first word
+    assert len(list((tmp_path / "out" / "summary").iterdir())) == 8  # written before the first word
     shutil.rmtree(tmp_path / "out" / "summary")
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
@@ -128,7 +126,7 @@ def test_the_summary_of_a_sweep(
     files = {path.name: path for path in (tmp_path / "out" / "summary").iterdir()}
     names = ("noise-std", "wind-speed", "coulomb-friction")
     drawn = {f"error-by-{name}.{form}" for name in names for form in ("png", "pdf")}
-    assert set(files) == {"summary.csv"} | drawn
+    assert set(files) == {"summary.csv", "index.html"} | drawn
     assert all(path.read_bytes()[:4] == b"\x89PNG" for name, path in files.items() if name.endswith("png"))
     table = pl.read_csv(files["summary.csv"])
     friction = table.filter((pl.col("axis") == "severity") & (pl.col("quantity") == "zeta"))
@@ -175,14 +173,14 @@ def test_the_title_says_that_cases_with_scatter_are_left_out() -> None:
     rows = hand_made([2.02, 1.98, 2.2, 2.2])
     scattered = rows.with_columns(scatter_wind_speed=pl.lit(0.01), value=pl.lit(3.0))
     mixed = list(lines_of(pl.concat([rows, scattered]), "e", "zeta"))
-    title = sweep_summary.overall_table(mixed).title
+    title = sweep_view.overall_table(mixed).title
     assert str(title) == "All cases without effects and without scatter"
     assert mixed[0].score.count == 4
     for alone in (rows, scattered):
-        title = sweep_summary.overall_table(lines_of(alone, "e", "zeta")).title
+        title = sweep_view.overall_table(lines_of(alone, "e", "zeta")).title
         assert str(title) == "All cases without effects"
     along = [line for line in mixed if line.axis == "scatter_wind_speed"]
-    assert str(sweep_summary.axis_table(along).columns[0].header) == "relative scatter of wind speed [1]"
+    assert str(sweep_view.axis_table(along).columns[0].header) == "relative scatter of wind speed [1]"
 
 
 def test_errors_about_a_truth_of_zero_are_in_its_unit() -> None:
@@ -211,7 +209,7 @@ def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
     values = {"zeta": [2.02, 1.98, 2.2, 2.2], "omega_n": [2.0, 2.02, 2.04, 2.08]}
     lines = [line for name, some in values.items() for line in lines_of(hand_made(some), "e", name)]
     along = [line for line in lines if line.axis == "noise_std"]
-    drawn = sweep_summary.error_figure(along)
+    drawn = sweep_view.error_figure(along)
     assert drawn is not None
     panels = [[line.get_ydata().tolist() for line in axes.get_lines()[:1]] for axes in drawn.axes]
     wanted = [[quantity, figure] for quantity in ("omega_n", "zeta") for figure in ("rmse", "bias")]
@@ -235,7 +233,7 @@ def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:
     rows = pl.concat(
         [hand_made([2.02, 1.98, 2.2, 2.3]).with_columns(noise_std=at) for at in map(pl.lit, noise)]
     )
-    drawn = sweep_summary.error_figure(
+    drawn = sweep_view.error_figure(
         [line for line in lines_of(rows, "e", "zeta") if line.axis == "noise_std"]
     )
     assert drawn is not None
@@ -256,7 +254,7 @@ def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:
     ] == []  # such as 10^-3.7
 
 
-def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tmp_path: Path) -> None:
+def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked() -> None:
     """Left out are rows without a truth, and values that the runs cannot give; any other status is a failure."""
     good, none = hand_made([2.02, 1.98]), hand_made([None, None], "no_wind_on")
     given = hand_made([2.2]).with_columns(pl.lit("no_wind_on").alias("status"))
@@ -274,26 +272,29 @@ def test_each_line_has_the_rows_of_one_estimator_and_quantity_that_were_asked(tm
         )
         for part in some
     ]
-    document = SimpleNamespace(estimators=["a", "b"])
-    store: Any = SimpleNamespace(
-        scan=lambda: pl.concat(parts).lazy(), sweep=SimpleNamespace(document=document), folder=tmp_path
-    )
     found = {
         (line.estimator, line.quantity): (line.score.count, line.score.failures.count)
-        for line in summarise(store)
+        for line in summarise(pl.concat(parts).lazy())
         if line.axis == "all"
     }
     assert found == {("a", "zeta"): (4, 1), ("a", "omega_n"): (2, 0), ("b", "zeta"): (4, 2)}
-    document.estimators = []
-    with pytest.raises(TunnelError, match="the sweep has no estimators"):
-        summarise(store)
+
+
+def test_a_sweep_without_estimators_has_no_summary(
+    here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = SMALL.replace('["conventional"]', "[]").replace("replicates = 2", "replicates = 1")
+    (tmp_path / "only.toml").write_text(text[: text.index("[[effects]]")], encoding="utf-8")
+    run_in(read_sweep(tmp_path / "only.toml").experiment, tmp_path / "out", here)
+    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
+    assert "the sweep has no estimators" in capsys.readouterr().err
 
 
 def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     """The conventional method estimates no zero: it has no line; wind-off runs give no Cnβ: nor has that."""
     text = SMALL.replace("[0.0, 15.0]", "[0.0]")
     (tmp_path / "off.toml").write_text(text[: text.index("[[effects]]")], encoding="utf-8")
-    lines = summarise(run_sweep(read_sweep(tmp_path / "off.toml"), tmp_path / "out", here).store)
+    lines = summarise(run_in(read_sweep(tmp_path / "off.toml").experiment, tmp_path / "out", here)[0].scan())
     assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
     assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
     assert all(line.score.failures.count == 0 for line in lines)
@@ -301,7 +302,7 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
     lines: list[Line] = [*lines_of(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
-    assert sweep_summary.error_figure(lines[1:]) is None
+    assert sweep_view.error_figure(lines[1:]) is None
     assert "noise_std" in RESULT_COLUMNS
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_lab.experiments.sweep import RESULT_COLUMNS, run_sweep
-from tunnel_lab.experiments.sweep_cases import read_sweep
+from tunnel_lab.experiments.experiment import run_in
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "sweep.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -33,7 +34,7 @@ def test_the_file_is_read_and_the_code_runs(here, tmp_path: Path, monkeypatch: p
         "coefficient = 0.002", "coefficient = [0.002, 0.003, 0.004, 0.005, 0.006]"
     )
     (tmp_path / "sweep.toml").write_text(small, encoding="utf-8")
-    store = run_sweep(read_sweep(tmp_path / "sweep.toml"), tmp_path / "results", here).store
+    store, _ = run_in(read_sweep(tmp_path / "sweep.toml").experiment, tmp_path / "results", here)
     monkeypatch.chdir(tmp_path)
     found: dict[str, object] = {}
     for code in blocks("python"):

@@ -167,8 +167,14 @@ def test_sliding_friction_depends_on_the_rate_and_is_tc_at_the_reference_rate(fo
 
 
 def test_friction_in_rows_is_that_of_each_run() -> None:
-    forms = [{}, {"presliding": 0.01}, *(form for form, _ in SLIDING.values()), {"exponent": 0.2}]
-    severities = [0.02] * 5 + [0.0]
+    forms = [
+        {},
+        {"presliding": 0.01},
+        *(form for form, _ in SLIDING.values()),
+        {"exponent": 0.2},
+        {"load": 0.1},
+    ]
+    severities = [0.02] * 5 + [0.0] * 2
     effects = [
         effect_from("coulomb_friction", {"friction_moment": severity, **form})
         for severity, form in zip(severities, forms, strict=True)
@@ -203,6 +209,7 @@ def test_friction_that_vanishes_at_rest_holds_nothing() -> None:
             {"peak": 0.5, "peak_rate": 0.1},
             "dry friction of 0.02 N m and up to 50 % more below a rate of 0.1 rad/s",
         ),
+        ({"load": 0.1}, "dry friction of 0.02 N m and 10 % of the moment carried by the joint"),
     ],
 )
 def test_the_form_of_friction_is_said(form: dict[str, float], said: str) -> None:

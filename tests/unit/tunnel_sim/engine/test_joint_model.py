@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Callable
@@ -17,7 +16,7 @@ from tunnel_sim.engine import joint_model
 from tunnel_sim.engine.joint_model import JointModel, Recorded, read_joint_model
 from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.expression import parse
-from tunnel_sim.processes import in_limited_process
+from tunnel_sim.sandbox import in_sandbox
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -33,7 +32,7 @@ BODY = '<body name="arm"><joint name="hinge" axis="0 1 0" {}/>{}</body>'
 def with_limits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is about the process with limits waits for it."""
     request.getfixturevalue("models_in_this_process")
-    monkeypatch.setattr(joint_model, "in_limited_process", in_limited_process)
+    monkeypatch.setattr(joint_model, "in_sandbox", in_sandbox)
 
 
 def model(
@@ -285,8 +284,9 @@ PENDULUM = f"<mujocoinclude><worldbody>{ARM.format(BOB)}</worldbody></mujocoincl
 @pytest.mark.usefixtures("with_limits")
 def test_the_law_from_the_process_with_limits_is_the_same(tmp_path: Path) -> None:
     found = model(tmp_path, 'stiffness="2 0.3" springref="0.5" frictionloss="0.002"')
-    request = b'["hinge", {"reach": 1.0}]\n' + found.files.to_bytes()
-    here = json.loads(joint_model.law_of_request(request))
+    names, contents = found.files.to_parts()
+    request = {"joint": "hinge", "recorded": {"reach": 1.0}, "names": names}
+    here, _ = joint_model.law_of_request(request, contents)
     assert (found.law.rest, found.law.stiffness) == (here["law"]["rest"], here["law"]["stiffness"])
     assert terms(found) == {term["expression"]: term["coefficient"] for term in here["law"]["terms"]}
     assert found.law.free == ("inertia", "damping", "stiffness", "rest")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tunnel_sim.files import campaign_folder
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.files.readers import read_table, table_bytes
+from tunnel_sim.files.run_files import read_table, table_bytes
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,

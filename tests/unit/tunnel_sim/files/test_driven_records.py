@@ -9,8 +9,10 @@ import pytest
 from tunnel_lab.terminal.outputs import parts_table
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.exporting import export_campaign
-from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.records import import_records, read_records
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.inputs import chance_without_effect, correlation
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -155,6 +157,30 @@ def test_import_takes_no_other_column_for_an_input(tmp_path: Path) -> None:
     stated = read_records([driven], ImportChoices(input="torque", input_as="drive")).campaign.runs[0].drive
     assert stated is not None
     assert stated.column == "drive"
+
+
+def test_a_chirp_through_the_resonance_is_an_input(tmp_path: Path) -> None:
+    chirp = np.sin(2.0 * np.pi * (0.3 + 0.5 * 0.6 * TIME) * TIME)
+    pole = np.exp((-0.24 + 12.0j) * 0.01)  # exact where the input is held
+    state = np.zeros(TIME.size, complex)
+    for k in range(1, TIME.size):
+        state[k] = pole * state[k - 1] + chirp[k - 1]
+    noise = np.random.default_rng(1).standard_normal(TIME.size)
+    response = 1e-3 * state.imag + 3e-4 * noise
+    assert correlation(chirp, response)[0] < 0.5
+    imported = read_records([log(tmp_path / "log.csv", "motor (V)", chirp, response)])
+    assert imported.campaign.runs[0].drive is not None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_unrelated_columns_of_a_free_decay_are_not_inputs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    white = rng.standard_normal((2, TIME.size))
+    reading = FREE + 1e-3 * white[0]
+    for values in (white[1], np.cumsum(white[1]), np.sin(7.0 * TIME), 1.0 * (TIME > 5.0), TIME):
+        assert chance_without_effect(values, reading) > 1e-5
+    assert chance_without_effect(TIME, np.zeros(TIME.size)) == 1.0
+    assert chance_without_effect(TIME[:20], reading[:20]) == 1.0  # too short to tell
 
 
 def test_an_input_on_another_clock_is_refused(tmp_path: Path) -> None:

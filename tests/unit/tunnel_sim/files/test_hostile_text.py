@@ -13,8 +13,8 @@ from tunnel_sim import TunnelError
 from tunnel_sim.files import import_records
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import split_unit
-from tunnel_sim.files.readers import read_table
 from tunnel_sim.files.reading import check_utf8
+from tunnel_sim.files.run_files import read_table
 from tunnel_sim.vocabulary import limits
 
 SIZE = 48_000_000

@@ -11,10 +11,11 @@ import pytest
 
 from tunnel_sim import TunnelError
 from tunnel_sim.files import readers
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.readers import FileTable, Reader, read_table
+from tunnel_sim.files.readers import FileTable, Reader
+from tunnel_sim.files.run_files import read_table
 
 
 def angles(content: bytes) -> list[float]:

@@ -11,21 +11,20 @@ import numpy as np
 import polars as pl
 import pytest
 
-from diagnosis.blind.sets import file_hash, read_hashes
 from identification.estimate import Estimate, Quantity, RunEstimate
 from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint
 from identification.uncertainty.budget import load_uncertainties
 from tunnel_lab.commands.paper import read_spring_table
+from tunnel_lab.experiments.blind.sets import file_hash, read_hashes
+from tunnel_lab.experiments.score import read_trials
 from tunnel_lab.experiments.score_grid import load_grid
-from tunnel_lab.experiments.score_trials import read_trials
-from tunnel_lab.experiments.sweep import open_store
-from tunnel_lab.experiments.sweep_cases import read_sweep
+from tunnel_lab.experiments.sweep import open_store, read_sweep
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
-from tunnel_sim.files.readers import read_table
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.run_files import read_table
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -15,7 +15,7 @@ from diagnosis.diagnosable import kinds_for
 from diagnosis.model.rig import Rig
 from tests.marks import slow
 from tests.reference.robot_joints import GEAR, robot, robot_campaign
-from tests.unit.diagnosis.model.test_robot_joints import TRUE, own_model
+from tests.support.robots import TRUE, own_model
 from tests.unit.diagnosis.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, RATE, SPRING, campaign
 from tunnel_reference.conditions import Actuator as Reference
 from tunnel_reference.inputs import exerted, finer

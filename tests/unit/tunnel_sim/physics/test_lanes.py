@@ -10,6 +10,7 @@ FORMS = {
     "linear": {},
     "friction": {"friction_moment": 0.01},
     "friction with a peak": {"friction_moment": 0.01, "friction_peak": 0.6, "friction_peak_rate": 0.5},
+    "friction with a load": {"friction_load": 0.05, "gravity_stiffness": 0.4, "gravity_angle": 0.1},
     "other powers": {"moment_cubic": -2.0, "moment_cubic_exponent": 2.5, "damping_quadratic": 3.0},
     "gravity": {"gravity_stiffness": 0.4, "gravity_angle": 0.1},
 }

@@ -15,9 +15,10 @@ from pathlib import Path
 import pytest
 
 from tests.support.small_sweep import SMALL
+from tunnel_lab.experiments.runner import processes
+from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
-from tunnel_lab.experiments.score_trials import score_grid
-from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import Sweep, read_sweep
 from tunnel_sim.engine.virtual_campaign import run_settings
 from tunnel_sim.files.plan_file import first_twice, load_plan, paper_plan
 from tunnel_sim.physics.run_settings import sampling
@@ -211,7 +212,7 @@ def test_the_trials_of_a_score_are_counted_first() -> None:
     """``--trials`` has no limit of its own."""
     grid = replace(packaged_grid(), trials=10**9, trials_of=())
     with cheap(), pytest.raises(TunnelError, match=r"rows .*, more than 1,000,000"):
-        score_grid(grid, ("conventional",), jobs=0)
+        score_grid(grid, ("conventional",), processes(0))
 
 
 def test_repeated_values_are_found_in_one_pass() -> None:

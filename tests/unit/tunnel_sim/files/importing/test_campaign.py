@@ -14,15 +14,11 @@ import pytest
 
 from tests.support.import_files import csv, decay, written
 from tunnel_sim import TunnelError, read_campaign
-from tunnel_sim.files.importing.columns import read_calibration
-from tunnel_sim.files.importing.conditions import (
-    Conditions,
-    ImportChoices,
-    Stretch,
-    parse_setting,
-    read_recipe,
-)
-from tunnel_sim.files.importing.records import import_records, read_records
+from tunnel_sim.files.importing.choices import ImportChoices, Stretch, parse_setting, read_recipe
+from tunnel_sim.files.importing.column_numbers import read_calibration
+from tunnel_sim.files.importing.condition_names import Conditions
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.writing import import_records
 
 WIND = Conditions(wind_speed=12.0, spring_stiffness=16.0, air_density=1.2, frontal_area=0.036)
 

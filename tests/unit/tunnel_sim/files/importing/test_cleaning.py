@@ -11,14 +11,9 @@ import numpy as np
 import pytest
 
 from tests.support.import_files import RATE, decay, written
-from tunnel_sim.files.importing.cleaning import (
-    cleaned,
-    from_zero,
-    resolution,
-    restarts,
-    without_overflow,
-)
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts
+from tunnel_sim.files.importing.column_numbers import without_overflow
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.releases import find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.columns import find_pairs, named_kind
-from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.column_names import named_kind
+from tunnel_sim.files.importing.columns import find_pairs
+from tunnel_sim.files.importing.formats.text import find_layout
 from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.text import find_layout
 
 TIME = 0.05 * np.arange(200)
 SWING = 0.3 * np.exp(-0.1 * TIME) * np.cos(4.0 * TIME)

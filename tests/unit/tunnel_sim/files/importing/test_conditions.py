@@ -10,8 +10,8 @@ import pytest
 
 from tests.support.import_files import decay, written
 from tunnel_sim import Repeatability, TunnelError
+from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
 from tunnel_sim.files.importing.condition_names import Conditions, condition_of, in_si
-from tunnel_sim.files.importing.conditions import ImportChoices, parse_setting
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.units import split_unit
 

@@ -10,7 +10,8 @@ import scipy.io
 
 from tests.support.import_files import csv, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.conditions import ImportChoices, Unstated, parse_setting
+from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
+from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import read_records
 
 TIME, ANGLE = decay()

@@ -10,8 +10,8 @@ import pytest
 
 from tests.support.import_files import decay
 from tunnel_sim.files.exporting import WRITERS, export_campaign
+from tunnel_sim.files.importing.formats.text import is_number
 from tunnel_sim.files.importing.records import read_records
-from tunnel_sim.files.importing.text import is_number
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

@@ -1,0 +1,176 @@
+"""The score of a blind set: counts, calibration, errors and its page. Truth: hand counts, published intervals."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from diagnosis import result
+from diagnosis.facts import closure
+from diagnosis.facts.closure import ON_RUNS
+from identification.statistics import Proportion
+from tunnel_lab.experiments.blind import page as blind
+from tunnel_lab.experiments.blind.cases import case
+from tunnel_lab.experiments.blind.score import Score, calibration
+
+
+def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
+    """A diagnosis with given causes, as its JSON."""
+    name = " + ".join(causes) or "none"
+    values = {
+        k: result.ParameterEstimate(v, s, "1/rad")
+        for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
+    }
+    return result.Diagnosis(
+        "c", tuple(causes),
+        result.GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
+        result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
+        result.Coefficients(values, values), closure.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        closure.NoiseSummary(5e-4, None, "estimated", ""),
+    ).to_json_dict()  # fmt: skip
+
+
+TRUTH = {"cn_beta": 0.45, "cn_r": -0.12, "severity": 4.0}
+SAID = [  # truth, answer, probability
+    (["coulomb_friction"], ["coulomb_friction"], 0.95),
+    (["coulomb_friction"], ["quadratic_damping"], 0.95),
+    (["free_play"], ["free_play"], 0.85),
+    (["free_play"], ["unknown"], 0.55),
+    (["free_play", "mains_hum"], ["free_play", "mains_hum"], 0.95),
+    (["free_play", "mains_hum"], ["free_play"], 0.95),
+    ([], [], 0.999),
+    ([], ["mains_hum"], 0.65),
+    (["unknown"], ["unknown"], 0.75),
+    (["sensor_drift"], [], 0.999),
+]
+
+
+@pytest.fixture
+def score():
+    cases = tuple(
+        case(f"c{i}", {**TRUTH, "effects": truth}, document(said, probability=p))
+        for i, (truth, said, p) in enumerate(SAID)
+    )
+    return Score(cases, (), "k", "a", {}, True)
+
+
+def test_counts_are_those_made_by_hand(score):
+    exact = score.exact()
+    assert exact["single"] == exact["single, 1 to 10"] == Proportion(2, 5)
+    assert exact["pair"] == Proportion(1, 2)
+    assert exact["none"] == Proportion(1, 2)
+    assert exact["outside"] == Proportion(1, 1)
+    assert exact["all"] == Proportion(5, 10)
+    assert score.false_alarms() == Proportion(1, 2)
+    assert score.missed() == Proportion(1, 8)
+    assert score.pairs()["both"] == 1
+    assert score.pairs()["one of them"] == 1
+    assert score.confusion() == {
+        "coulomb_friction": {"coulomb_friction": 1, "quadratic_damping": 1},
+        "free_play": {"free_play": 1, "unknown": 1},
+        "two or more": {"two or more": 1, "free_play": 1},
+        "none": {"none": 1, "mains_hum": 1},
+        "unknown": {"unknown": 1},
+        "sensor_drift": {"none": 1},
+    }
+    assert score.closure()[0] == Proportion(3, 3)
+
+
+def test_calibration_error_is_that_made_by_hand(score):
+    # 0.9 to 1: six answers, three right. Alone in their bins: 0.85 and 0.75 right, 0.65 and 0.55 wrong.
+    mean = (4 * 0.95 + 2 * 0.999) / 6
+    expected = (6 * abs(0.5 - mean) + 0.15 + 0.25 + 0.65 + 0.55) / 10
+    error, bins = score.calibration()
+    assert math.isclose(error, expected, rel_tol=1e-12)
+    assert sum(b.right.total for b in bins) == 10
+
+
+def test_a_calibrated_answerer_has_no_calibration_error_but_chance():
+    rng = np.random.default_rng(1)
+    p = rng.uniform(0.5, 1.0, 20000)
+    assert calibration(p, rng.random(p.size) < p)[0] < 0.02
+    assert calibration(p, rng.random(p.size) < p - 0.1)[0] > 0.07
+    assert calibration([], []) == (0.0, ())
+
+
+def test_wilsons_interval_is_the_published_one():
+    # R. G. Newcombe, Stat. Med. 17 (1998) 857–872, table I, method 3: 81/263, 15/148, 0/20, 1/29.
+    for count, total, low, high in ((81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611),
+                                    (1, 29, 0.0061, 0.1718)):  # fmt: skip
+        assert np.allclose(Proportion(count, total).interval, (low, high), atol=5e-5)
+
+
+def test_errors_of_coefficients_are_in_standard_deviations():
+    said = document(["free_play"], cn=(0.4525, -0.124), std=(0.001, 0.001))
+    one = case("c", {**TRUTH, "effects": ["free_play"]}, said)
+    assert np.allclose(one.error("cn_beta", "after"), (2.5, 0.0025 / 0.45))
+    assert np.allclose(one.error("cn_r", "before"), (-4.0, -0.004 / 0.12))
+    found = {(e.group, e.name, e.when): e.within for e in Score((one,), (), "", "", {}, False).coefficients()}
+    assert found["named rightly", "cn_beta", "after"] == Proportion(1, 1)
+    assert found["named rightly", "cn_r", "after"] == Proportion(0, 1)
+
+
+def test_a_rival_is_named_where_the_truth_is_among_those_not_distinguished():
+    truth = {**TRUTH, "effects": ["free_play"]}
+    assert case("c", truth, document(["cubic_stiffness"], rivals=["free_play"])).rival
+    assert not case("c", truth, document(["cubic_stiffness"], rivals=["buffeting"])).rival
+    assert not case("c", truth, document(["free_play"])).rival
+
+
+def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
+    page = blind.markdown(score, "set")
+    assert "| one effect | 2 | 5 | 40.0 % |" in page
+    assert "## Confusion matrix" in page
+    rows = [line for line in page.splitlines() if line.startswith("|")]
+    for row in rows:
+        assert row.count("|") == row.strip().count("|")
+    matrix = page[page.index("## Confusion matrix") :].splitlines()
+    cells = [
+        line.split("|")[3:-1] for line in matrix if line.startswith("| ") and not line.startswith("| truth")
+    ]
+    counted = sum(int(cell) for row in cells for cell in row if cell.strip().isdigit())
+    assert counted == len(SAID)
+    json.dumps(score.to_json_dict(), allow_nan=False)
+
+
+def test_times_are_on_the_page_where_they_are_known(score):
+    """Linear interpolation between the order statistics: the 90th percentile of 1, 2, ..., 11 is 10."""
+    title = "Seconds for each campaign"
+    assert title not in [section.title for section in blind.sections(score)]
+    timed = tuple(
+        case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
+    )
+    (found,) = [s for s in blind.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
+    assert found.rows == (("6.0", "10.0", "11.0"),)
+
+
+def test_answers_are_listed_by_truth_with_what_was_answered_otherwise(score):
+    (found,) = [s for s in blind.sections(score) if s.title == "Answers by truth"]
+    assert set(found.rows) == {
+        ("coulomb_friction", "2", "1", "quadratic_damping 1"),
+        ("free_play", "2", "1", "unknown 1"),
+        ("two or more", "2", "1", "free_play 1"),
+        ("none", "2", "1", "mains_hum 1"),
+        ("unknown", "1", "1", ""),
+        ("sensor_drift", "1", "0", "none 1"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("causes", 3), ("causes", [1]), ("causes", ...), ("candidates", [{"effect": "x"}]), ("candidates", 1),
+     ("coefficients", {"before": {"cn_beta": {"value": "x", "std": 1.0}}}), ("coefficients", []), ("gap", None),
+     ("gap", {"closed": "1"}), ("wall_s", "x"), ("ambiguous_with", None)],
+)  # fmt: skip
+def test_an_answer_of_another_kind_is_refused_where_it_is_read(key, value):
+    good = document(["free_play"])
+    spoilt = {name: one for name, one in good.items() if name != key} | ({} if value is ... else {key: value})
+    case("c", {**TRUTH, "effects": ["free_play"]}, good)
+    with pytest.raises(ValueError, match="validation error"):
+        case("c", {**TRUTH, "effects": ["free_play"]}, spoilt)
+    for truth in ({}, {"effects": 1}, {"effects": ["x"], "severity": "y"}, {"effects": [], "cn_r": []}):
+        with pytest.raises(ValueError, match="validation error"):
+            case("c", truth, good)

@@ -1,0 +1,297 @@
+"""Summary of a sweep: error against noise, speed, spring and severity, by estimator, with intervals.
+
+Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
+pooled. Lines along noise, speed and spring use the cases without effects and without scatter, if the sweep has any.
+Cases of severity 0 count as cases without effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from identification.printing import concise, significant, unit
+from identification.scoring import Score, score
+from tunnel_lab.experiments.answers import NOT_ASKED, not_given
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, share_text, trials_of
+from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
+from tunnel_lab.experiments.view import View
+from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.outputs import table
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.text_cells import as_text_cell
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from identification.estimate import Quantity
+
+
+OVERALL = "all"
+SEVERITY = "severity"
+AXES = {
+    "noise_std": ("noise", "rad"),
+    "wind_speed": ("wind speed", "m/s"),
+    "spring_stiffness": ("spring stiffness", "N m/rad"),
+    "duration": ("duration", "s"),
+    **{
+        column: (f"scatter of {name}", "rad")
+        if name == "zero"
+        else (f"relative scatter of {name.removesuffix('_between_runs').replace('_', ' ')}", "1")
+        for column, name in SCATTER_COLUMNS.items()
+    },
+}
+"""Columns that a summary uses as axes, each with its name and unit."""
+DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
+"""Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
+BRACKETS = (
+    "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %. Bound: "
+    "Cramér–Rao's, of the nominal model, with the scatter where runs scatter."
+)
+_TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
+_ASIDE = 0.012  # of the axis, between two estimators
+_LOGARITHMIC = ("noise_std", "spring_stiffness")
+_WIDE = 10.0  # ratio of the largest to the least value above which an axis is logarithmic
+
+
+@dataclass(frozen=True)
+class Line:
+    """The score of an estimator for a quantity at a place on an axis.
+
+    Args:
+        axis: a key of `AXES`, ``severity`` or ``all``.
+        effect: the effect for the axis ``severity``; otherwise the pooled effects.
+        at: the value on the axis, in its unit; None for ``all``.
+        at_unit: unit of the axis.
+        quantity: its name; ``omega_n`` and ``zeta`` are those of single runs.
+        score: bias, RMSE, coverage and failures, in the score's unit.
+    """
+
+    axis: str
+    effect: str
+    at: float | None
+    at_unit: str
+    estimator: str
+    quantity: str
+    score: Score
+
+    def to_row(self) -> dict[str, Any]:
+        """The line as plain values: every figure with its standard error or 95 % interval."""
+        figures = {name: name for name in ("bias", "rmse", "rmse_over_bound")}
+        failures = figure_columns(self.score, {}, {"failures": "failures"}, "")
+        return {
+            "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
+            "estimator": self.estimator, "quantity": self.quantity,
+            "unit": getattr(self.score.bias, "unit", None), "count": self.score.count, **failures,
+            **figure_columns(self.score, figures, {"coverage": "coverage"}, "_std"),
+        }  # fmt: skip
+
+
+def summarise(results: pl.LazyFrame) -> list[Line]:
+    """Score the results of a sweep.
+
+    Returns:
+        Lines: of all cases, then along each axis that has two values or more, by estimator and quantity.
+    """
+    absent = unanswered(results)
+    columns = ("effect", "severity", *AXES, "truth", "value", "std", "bound", "status", "unit")
+    asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
+    pairs = results.select("estimator", "quantity").unique(maintain_order=True).collect()
+    lines: list[Line] = []
+    for estimator, quantity in pairs.iter_rows():
+        if quantity not in absent.get(estimator, ()):
+            mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
+            data = results.filter(mine & asked & pl.col("truth").is_not_null()).select(columns).collect()
+            lines += lines_of(data, estimator, quantity) if len(data) else ()
+    order = [OVERALL, *AXES, SEVERITY]
+    return sorted(
+        lines, key=lambda line: (order.index(line.axis), line.effect if line.axis == SEVERITY else "")
+    )
+
+
+def sweep_view(results: pl.LazyFrame, name: str) -> View:
+    """The view of the finished part of a sweep.
+
+    Args:
+        name: of the sweep.
+    """
+    lines = summarise(results)
+    along = groups(lines)
+    texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
+    csv = pl.DataFrame([line.to_row() for line in lines]).with_columns(texts).write_csv()
+    tables = (overall_table(lines), *map(axis_table, along.values()))
+    return View(
+        f"Sweep {name}",
+        [*tables, BRACKETS, *not_given_lines(unanswered(results))],
+        {name: partial(error_figure, part) for name, part in along.items()},
+        {"summary.csv": csv.encode()},
+    )
+
+
+def unanswered(results: pl.LazyFrame) -> dict[str, tuple[str, ...]]:
+    """Quantities by estimator that it gives in no case, unless its status is a failure in all cases."""
+    return not_given(results.filter(pl.col("truth").is_not_null()))
+
+
+def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
+    """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
+    plain = data.filter(pl.col("effect") == NO_EFFECT)
+    base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
+    yield Line(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
+    for axis, (_, at_unit) in AXES.items():
+        for at, part in _along(_repeating(base, but=axis), axis):
+            yield Line(axis, effects, at, at_unit, estimator, quantity, _score(part))
+    for effect in sorted(set(data["effect"]) - {NO_EFFECT}):
+        both = _repeating(data.filter(pl.col("effect").is_in([effect, NO_EFFECT])))
+        at_unit = effect_class(effect.partition(" + ")[0]).parameters()[0].unit
+        for at, part in _along(both, SEVERITY):
+            yield Line(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
+
+
+def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
+    """The cases whose runs repeat exactly, except for the scatter ``but``; all cases where there are none."""
+    found = data
+    for column in SCATTER_COLUMNS:
+        found = found if column == but else found.filter(found[column] == 0.0)
+    return found if len(found) else data
+
+
+def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
+    """The parts at each value of an axis, ascending; none where it has only one value, or rows lack it."""
+    values = sorted(set(data[axis].drop_nulls()))
+    if len(values) < 2 or data[axis].null_count():
+        return []
+    return [(value, data.filter(data[axis] == value)) for value in values]
+
+
+def _score(data: pl.DataFrame) -> Score:
+    """The score in % of the truth, or in the quantity's unit where a truth is zero."""
+    return score(trials_of(data, percent=bool((data["truth"] != 0.0).all())))
+
+
+def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
+    """Lines by the name of their figure, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``."""
+    by_name: dict[str, list[Line]] = {}
+    for line in lines:
+        if line.axis != OVERALL:
+            what = line.effect.replace(" + ", "-and-") if line.axis == SEVERITY else line.axis
+            by_name.setdefault(f"error-by-{what.replace('_', '-')}", []).append(line)
+    return by_name
+
+
+@styled
+def error_figure(lines: Sequence[Line]) -> Figure | None:
+    """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
+
+    Returns:
+        The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
+    """
+    quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
+    if not quantities:
+        return None
+    estimators = list(dict.fromkeys(line.estimator for line in lines))
+    fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
+    panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
+    first, values = lines[0], [line.at for line in lines if line.at is not None]
+    logarithmic = first.axis in _LOGARITHMIC and min(values) > 0.0 and max(values) / min(values) >= _WIDE
+    for name, (errors, biases) in zip(quantities, panels, strict=True):
+        mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
+        for place, estimator in enumerate(estimators):
+            drawn = [line for line in mine if line.estimator == estimator and line.at is not None]
+            if not drawn:
+                continue
+            at = [float(line.at) for line in drawn if line.at is not None]
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # keeps intervals from hiding each other
+            if logarithmic:
+                at = [x * (max(at) / min(at)) ** aside for x in at]
+            else:
+                at = [x + aside * (max(at) - min(at)) for x in at]
+            for axes, figures in (
+                (errors, [line.score.rmse for line in drawn]),
+                (biases, [line.score.bias for line in drawn]),
+            ):
+                axes.errorbar(
+                    at, [found.value for found in figures if found],
+                    yerr=[INTERVAL * found.std for found in figures if found],
+                    color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)], markersize=4.0,
+                    linewidth=1.0, label=estimator.replace("_", " "),
+                )  # fmt: skip
+        scale = mine[0].score.rmse.unit if mine[0].score.rmse else ""
+        per = "% of truth" if scale == "%" else scale
+        log_axis(errors, "y")
+        biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+        errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+        biases.set_ylabel(f"bias [{per}]")
+        for axes in (errors, biases):
+            grid(axes)
+    for axes in panels[-1]:
+        if logarithmic:
+            log_axis(axes, "x")
+        else:
+            axes.locator_params(axis="x", nbins=_TICKS)
+    for column in panels.T:
+        fig.align_ylabels(column)
+    fig.supxlabel(f"{_label(first)} [{first.at_unit}]", fontsize=9)
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
+    return fig
+
+
+def _label(line: Line) -> str:
+    return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
+
+
+def overall_table(lines: Iterable[Line]) -> Table:
+    """Bias, RMSE, coverage and failures of each estimator and quantity over the cases of `_repeating`.
+
+    The title names these cases.
+    """
+    every = list(lines)
+    kept = [line for line in every if line.axis == OVERALL]
+    pooled = "without effects" if all(line.effect == NO_EFFECT for line in kept) else "with effects pooled"
+    # if only some cases have scatter, the table has only the others
+    scattering = {line.at for line in every if line.axis in SCATTER_COLUMNS and line.at is not None}
+    repeating = " and without scatter" if 0.0 in scattering else ""
+    result = table(
+        f"All cases {pooled}{repeating}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
+        "95 % covers\n[%]", "failed\n[%]", right=("trials",),
+    )  # fmt: skip
+    last = ""
+    for line in kept:
+        if last not in ("", line.estimator):
+            result.add_section()
+        last = line.estimator
+        score = line.score
+        result.add_row(
+            line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
+            _figure(score.rmse_over_bound), share_text(score.coverage), share_text(score.failures),
+        )  # fmt: skip
+    return result
+
+
+def axis_table(lines: Sequence[Line]) -> Table:
+    """RMSE along one axis, a column for each quantity that has a panel in the figures."""
+    label, at_unit = _label(lines[0]), lines[0].at_unit
+    quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
+    heads = [f"RMSE {NAMES[name]}" for name in quantities]
+    result = table(f"Error against {label}", f"{label} {unit(at_unit)}", "estimator", *heads)
+    cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
+    for at in sorted({line.at for line in lines if line.at is not None}):
+        if result.row_count:
+            result.add_section()
+        for estimator in dict.fromkeys(line.estimator for line in lines):
+            figures = [_figure(cells.get((at, estimator, name))) for name in quantities]
+            result.add_row(significant(at), estimator, *figures)
+    return result
+
+
+def _figure(quantity: Quantity | None) -> str:
+    if quantity is None:
+        return "–"
+    return f"{concise(quantity.value, quantity.std)} {'' if quantity.unit == '1' else quantity.unit}".rstrip()

@@ -1,0 +1,124 @@
+"""What a user states about files before an import, as options or in ``import.toml``: how each step decides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
+from tunnel_sim.files.importing.condition_names import Conditions
+from tunnel_sim.files.toml_input import (
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    optional,
+    read_document,
+    validate,
+)
+from tunnel_sim.vocabulary.drive import Hold
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
+
+
+class StatedBy(StrictModel):
+    """``[choices.stated_by]``: the names of columns or numbers of the files that state a condition."""
+
+    wind_speed: OneLine | None = optional("the name of a column or number")
+    spring_stiffness: OneLine | None = optional("the name of a column or number")
+    air_density: OneLine | None = optional("the name of a column or number")
+    release_angle: OneLine | None = optional("the name of a column or number")
+
+
+class Stretch(StrictModel):
+    """``[[choices.stretches]]``: start and end of a run in its record, and its reading at rest; None: as found."""
+
+    file: OneLine = Field(description="the name of the file")
+    run: OneLine = Field(description="the name of the run")
+    start: float | None = optional("the time of the release by the file's clock, in s")
+    end: float | None = optional("the time at which the run ends by the file's clock, in s")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted")
+
+
+class ImportChoices(StrictModel):
+    """How files are read; None: found from the files."""
+
+    time: OneLine | None = optional("the name or number of the column of times")
+    angle: tuple[OneLine, ...] = Field(
+        default=(), strict=False, description="a list of names or numbers of columns"
+    )
+    unit: OneLine | None = optional("the unit of the angle, such as 'deg'")
+    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'")
+    rate: SampleRate | None = optional("a positive number in Hz")
+    counts_per_turn: Positive | None = optional("a positive number")
+    calibration: OneLine | None = optional(
+        "a formula such as '0.1 + 20*V', or the name of a table of two columns"
+    )
+    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional("'tab', ';', ',', '|' or 'blank'")
+    decimal: Literal[".", ","] | None = optional("'.' or ','")
+    start: float | None = optional("a time of the file in s: earlier samples are left out")
+    end: float | None = optional("a time of the file in s: later samples are left out")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
+    input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
+    input_as: InputColumn | None = optional(one_of([f"'{name}'" for name in INPUT_COLUMNS]))
+    input_hold: Hold | None = optional("'zero' or 'linear'")
+    leave_out: tuple[OneLine, ...] = Field(
+        default=(), strict=False, description="a list of names of runs or files"
+    )
+    cut: bool = Field(default=True, description="false to keep records whole")
+    stretches: tuple[Stretch, ...] = Field(
+        default=(),
+        strict=False,
+        description="[[choices.stretches]] tables with file, run, start, end and rest",
+    )
+    name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
+    conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
+    stated_by: StatedBy = Field(default=StatedBy(), description="a [choices.stated_by] table")
+
+    def stretch_of(self, file: str, run: str) -> Stretch:
+        """The statement on start, end and rest of a run in its file."""
+        found = (one for one in self.stretches if (one.file, one.run) == (file, run))
+        # A file may have a name that a recipe cannot express: there is then no statement about it.
+        return next(found, Stretch.model_construct(file=file, run=run))
+
+
+class OriginalTable(StrictModel):
+    """``[[originals]]``."""
+
+    file: OneLine = Field(description="the name of the file")
+    sha256: OneLine = Field(description="the SHA-256 of its content")
+    said: tuple[OneLine, ...] = Field(default=(), strict=False, description="a list of texts")
+
+
+class Recipe(StrictModel):
+    """The whole of ``import.toml``."""
+
+    schema_version: Literal[1] = Field(description="1")
+    choices: ImportChoices = Field(default=ImportChoices(), description="a [choices] table")
+    originals: tuple[OriginalTable, ...] = Field(default=(), strict=False, description="[[originals]] tables")
+
+
+def read_recipe(path: Path) -> ImportChoices:
+    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder with it."""
+    path = path / IMPORT_RECIPE if path.is_dir() else path
+    missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
+    return read_document(Recipe, path, missing=missing).choices
+
+
+def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
+    """Conditions from ``key=value``, separated by commas; a value is a number, or a name in the files."""
+    numbers: dict[str, float] = {}
+    names: dict[str, str] = {}
+    for part in text.split(","):
+        key, _, value = (piece.strip() for piece in part.partition("="))
+        try:
+            numbers[key] = float(value)
+        except ValueError:
+            if not value:
+                what = f"'{part.strip()}' is not of the form key=number"
+                remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
+                raise TunnelError(what, where=where, remedy=remedy) from None
+            names[key] = value
+    return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))

@@ -1,0 +1,76 @@
+"""What the names of columns say: times, angles, rates, the number of a run; and the columns that a user names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from tunnel_sim.files.importing.condition_names import condition_of
+from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.files.importing.units import claims, kind_of
+
+RUN_MARK = re.compile(
+    r"[\s_,;.#(\[-]*(?:run|trial|test|swing|rep|versuch|messung|lauf)[\s_#.-]*(\d+)[)\]]?\s*$", re.IGNORECASE
+)
+_TIME = re.compile(
+    r"(?<![a-z])(t|time|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
+    re.IGNORECASE,
+)
+ANGLE = re.compile(
+    r"angle|winkel|angolo|yaw|(?<![a-z])(theta|beta|psi|phi|alpha|pitch|roll|pos|position|encoder|rotation|deg|rad)"
+    r"(?![a-z])|[θβψφα]",
+    re.IGNORECASE,
+)
+_RATE = re.compile(
+    r"velocity|geschwindigkeit|ω|[βθψφ]̇|(?<![a-z])(omega|[xyz]?gyr[oa]?|gyro[a-z]+|speed)(?![a-z])"
+    r"|(rate|vel|dot)(?![a-z])",
+    re.IGNORECASE,
+)
+_ACCELERATION = re.compile(
+    r"acceleration|beschleunigung|ddot|[βθψφ]̈|(?<![a-z])(angacc|acc|acce?l)(?![a-z])", re.IGNORECASE
+)
+_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+"""Between the words of a name that are joined, such as ``xGyro`` or ``ZGyro``."""
+OTHER = re.compile(
+    r"(?<![a-z])(index|idx|sample|samples|nr|no|row|#|frame|temperature|current|force)(?![a-z])", re.I
+)
+
+
+def named_kind(name: str) -> str:
+    """The kind of quantity, ``rate`` or ``acceleration``, stated by a column's name; empty: neither."""
+    words = _JOINED.sub("_", name)
+    if _ACCELERATION.search(words):
+        return "acceleration"
+    return "rate" if _RATE.search(words) else ""
+
+
+def stem(name: str) -> str:
+    """The name of a column without the number of its run."""
+    return RUN_MARK.sub("", name)
+
+
+def is_time(channel: Channel) -> bool:
+    """Whether a column contains times, by its unit or its name."""
+    kind = kind_of(channel.unit)
+    if condition_of(channel.name, channel.unit) is not None:
+        return False
+    return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
+
+
+def named(channels: Sequence[Channel], wanted: str) -> list[Channel]:
+    """The columns of a name, with or without its unit as written in the file, or of a number from 1 on."""
+    found = [channel for channel in channels if matches(channel, wanted)]
+    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(channels):
+        found = [channels[int(wanted) - 1]]
+    return found
+
+
+def matches(channel: Channel, wanted: str) -> bool:
+    """Whether a user's text names a column, with or without its unit and the number of its run."""
+    return claims(wanted, channel.name, channel.unit) or claims(wanted, stem(channel.name), channel.unit)
+
+
+def listed(channels: Sequence[Channel]) -> str:
+    """The names of columns for a message."""
+    names = [f"'{channel.name}'" for channel in channels]
+    return ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")

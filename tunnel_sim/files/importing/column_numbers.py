@@ -1,0 +1,238 @@
+"""The numbers of a column in seconds and radians: by its unit, or by one that is guessed from their size."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.column_names import listed, named_kind
+from tunnel_sim.files.importing.source import read_source
+from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import Quantity
+from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
+from tunnel_sim.vocabulary.quantities import PerSample, Readings, Rows
+
+_COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
+_TURNS = (2.0 * pi, 360.0)
+_NEAR_END = 4.0  # other steps: a jump leads from one end of the range to the other
+_MOST_JUMPS = 10  # least number of samples per jump
+_NEARLY = 0.75  # of a counter's range: a step this long between two samples is an overflow
+_SMALL = 0.25  # of the range: no other step is longer
+_SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
+_HALF_TURN = pi  # half the span of an angle: a greater one is in degrees
+_NUMBER = r"([+-]?\s*\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)"
+_FORMULA = re.compile(rf"^\s*(?:{_NUMBER}\s*(?=[+-]))?\s*{_NUMBER}?\s*\*?\s*[VvXx]\s*(?:{_NUMBER})?\s*$")
+_RATE_FACTS = re.compile(
+    r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
+)
+_STEP_FACTS = re.compile(
+    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval)|wf_increment)($|[^a-z])"
+)
+
+_STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
+
+Calibration = tuple[PerSample, PerSample] | tuple[float, float]
+"""Voltages and readings of a table; or offset and factor of a straight line."""
+
+
+def without_overflow(values: Rows, said: list[str]) -> Rows:
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are reported."""
+    known = np.flatnonzero(np.isfinite(values))
+    numbers = values[known]
+    steps = np.diff(numbers)
+    longest = float(np.abs(steps).max(initial=0.0))
+    counts = longest >= _NEARLY * _COUNTERS[0] and bool((numbers == np.round(numbers)).all())
+    for full in (*_TURNS, *(_COUNTERS if counts else ())):
+        if not _NEARLY * full < longest <= full or np.ptp(numbers) > full:
+            continue
+        jumps = np.abs(steps) > _NEARLY * full
+        if _MOST_JUMPS * jumps.sum() > jumps.size:
+            continue
+        others = float(np.abs(steps[~jumps]).max())
+        if others > _SMALL * full or (full - np.abs(steps[jumps]) > _NEAR_END * others).any():
+            continue
+        said.append(f"{counted(int(jumps.sum()), 'jump')} by {full:.6g} taken out (overflow of the counter)")
+        turns = np.concatenate([[0.0], np.cumsum(np.where(jumps, -np.sign(steps), 0.0))])
+        result = values.copy()
+        result[known] = numbers + full * turns
+        return result
+    return values
+
+
+def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
+    """The unit of certain kinds, keys of `UNITS`, named by an option; None if the option is not given."""
+    unit = known_unit(text) if text is not None else None
+    if text is not None and (unit is None or kind_of(unit) not in kinds):
+        names = ", ".join(name for kind in kinds for name in UNITS[kind])
+        raise TunnelError(f"unknown unit '{one_line(text, 20)}'", where=option, remedy=f"use one of {names}")
+    return unit
+
+
+def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
+    """The interval of samples without times, s, None if it is not stated; and its source."""
+    if choices.rate is not None:
+        return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
+    for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
+        least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
+        for name, value in facts.items():
+            if pattern.search(name) and least <= value <= most:
+                return 1.0 / value if is_rate else float(value), f"'{name}' = {value:g} in the file"
+    return None, ""
+
+
+def guessed_time_unit(values: Rows) -> tuple[str, float]:
+    """The assumed unit of times without one, and the usual step in it."""
+    steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
+    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
+
+
+def guessed_angle_unit(values: Rows) -> tuple[str, float]:
+    """The assumed unit of angles without one, and half their range in it."""
+    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    return "deg" if swing > _HALF_TURN else "rad", swing
+
+
+def in_seconds(
+    times: Channel | None,
+    count: int,
+    facts: Mapping[str, float],
+    choices: ImportChoices,
+    said: list[str],
+    where: str,
+) -> Rows:
+    """The times of a run, s: from their column, or of a count of rows at the stated rate; guesses are reported."""
+    if times is None:
+        interval, origin = sample_interval(facts, choices)
+        if interval is None:
+            raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
+        said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
+        return np.arange(count, dtype=np.float64) * interval
+    values = without_overflow(times.values, said)
+    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
+    if unit and kind_of(unit) != "time":
+        what = f"'{one_line(times.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
+        remedy = "give --time-unit, or --time with the name of another column"
+        raise TunnelError(what, where=where, remedy=remedy)
+    if not unit:
+        _ask_for_unit(times, ("time",), "--time-unit", where)
+        unit, step = guessed_time_unit(values)
+        said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
+    return values * UNITS["time"][unit] if unit != "s" else values
+
+
+def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
+    """Refuse to guess the unit of a column whose name may contain a unit."""
+    word = written_unit(channel.name, kinds)
+    if word:
+        what = f"'{word}' in the name of '{one_line(channel.name, 40)}' may be its unit"
+        allowed = ", ".join(name for kind in kinds for name in UNITS[kind])
+        raise TunnelError(what, where=where, remedy=f"give {option}, one of {allowed}")
+
+
+def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
+    """Refuse columns named as rates or accelerations whose unit is not stated.
+
+    Their size does not separate rad/s from deg/s, as an angle's separates rad from deg: a rate has no greatest
+    value.
+    """
+    kinds = {channel: named_kind(channel.name) for channel in channels if not channel.unit}
+    first = next(filter(None, kinds.values()), "")
+    found = [channel for channel, kind in kinds.items() if kind and kind == first]
+    if not found:
+        return
+    noun = f"is {'an' if first == 'acceleration' else 'a'} {first} by its name, and nothing states its unit"
+    chosen = f'--angle "{one_line(found[0].name, 40)}"'
+    if len(found) > 1:
+        noun = f"are {first}s by their names, and nothing states their unit"
+        chosen += ", or another of them,"
+    raise TunnelError(
+        f"{listed(found)} {noun}",
+        where=where,
+        remedy=f"give {chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle",
+    )
+
+
+def in_radians(
+    reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
+) -> tuple[Readings, Quantity, str]:
+    """Readings in rad, rad/s or rad/s², their quantity, and their assumed unit."""
+    kinds = ("angle", "counts", "voltage", "rate", "acceleration")
+    unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
+    if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
+        raise TunnelError(
+            f"'{one_line(reading.name, 40)}' is in '{one_line(unit, 20)}', which is not a known unit of an angle",
+            where=where,
+            remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
+        )
+    values = reading.values
+    if calibration is not None:
+        volts = values * UNITS["voltage"].get(unit, 1.0)
+        first, second = calibration
+        if isinstance(first, float):
+            values = first + second * volts
+        elif np.nanmin(volts) < first[0] or np.nanmax(volts) > first[-1]:
+            raise TunnelError(
+                f"readings from {np.nanmin(volts):.4g} to {np.nanmax(volts):.4g} V go beyond the calibration table",
+                where=where,
+                remedy=f"calibrate beyond {first[0]:.4g} to {first[-1]:.4g} V, or give a formula",
+            )
+        else:
+            values = np.interp(volts, first, second)
+        unit = unit if kind_of(unit) == "angle" else ""
+        said.append(f"'{reading.name}' converted by the calibration")
+    elif choices.counts_per_turn is not None:
+        values, unit = values / choices.counts_per_turn, "turns"
+        said.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
+    if kind_of(unit) in ("counts", "voltage"):
+        option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
+        raise TunnelError(f"'{reading.name}' is in {unit}", where=where, remedy=f"give {option}")
+    if not unit:
+        if calibration is None:
+            _ask_for_unit(reading, kinds, "--unit", where)
+            refuse_without_unit([reading], where)
+        unit, swing = guessed_angle_unit(values)
+        said.append(
+            f"no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit says otherwise"
+        )
+    kind = kind_of(unit)
+    factor = UNITS[kind][unit]
+    quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
+    values = values if factor == 1.0 else values * factor
+    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    # A disc between springs swings as far, but counts look like degrees.
+    if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
+        what = f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn"
+        remedy = "give --unit deg if it does; of an encoder --counts-per-turn N"
+        raise TunnelError(what, where=where, remedy=remedy)
+    return values, quantity, unit
+
+
+def read_calibration(text: str | None) -> Calibration | None:
+    """The calibration: a formula such as ``0.1 + 20*V``, or from a text file of volts and angle."""
+    if text is None:
+        return None
+    formula = _FORMULA.match(text)
+    if formula:
+        before, factor, behind = (part and float(part.replace(" ", "")) for part in formula.groups())
+        if not (before is not None and behind is not None):
+            return float(before or behind or 0.0), float(1.0 if factor is None else factor)
+    path = Path(text)
+    if formula or not path.is_file():
+        raise TunnelError(
+            "is not a formula", where=f"--calibration {one_line(text, 40)}",
+            remedy="give 'a + b*V' with numbers for a and b, or the name of a table of two columns",
+        )  # fmt: skip
+    channels = read_source(path, ImportChoices()).tables[0].channels
+    if len(channels) != 2 or channels[0].values.size < 2:
+        raise TunnelError("is not a table of two columns", where=shown(path), remedy="give volts and angle")
+    order = np.argsort(channels[0].values)
+    factor = UNITS["angle"].get(channels[1].unit, 1.0)
+    return channels[0].values[order], channels[1].values[order] * factor

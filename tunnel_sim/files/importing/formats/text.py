@@ -1,0 +1,376 @@
+"""Tables as text in any dialect: delimiter, decimal sign, encoding and head are found from the content."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
+from tunnel_sim.files.readers import Reader
+from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
+
+MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
+"""Texts, in lower case, that stand for a missing number."""
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
+}
+_FACT = re.compile(
+    r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
+    r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+    r" *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
+)
+"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell."""
+_HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+_SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
+_LONG_UNIT = 8  # characters: a longer text is a name
+
+
+def is_number(text: str, decimal: str = ".") -> bool:
+    """Whether a text is a number."""
+    return _NUMBER[decimal].fullmatch(text) is not None
+
+
+def is_missing(text: str) -> bool:
+    """Whether a text stands for a missing number."""
+    return text.lower() in MISSING
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units."""
+
+    first: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    headed: bool
+    facts: Mapping[str, float]
+
+    @property
+    def runs(self) -> int | None:
+        """Index of the column that gives the run of a row."""
+        columns = enumerate(zip(self.names, self.units, strict=True))
+        return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
+
+
+def facts_in(lines: Sequence[str]) -> dict[str, float]:
+    """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
+
+    Returns:
+        Values in SI units where the unit is known; the name then ends with it in brackets.
+    """
+    facts = {}
+    for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
+        for name, before, number, behind in _FACT.findall(line):
+            name = name.strip()
+            if before and known_unit(before) is None:  # a cell with the name, after a heading
+                name, before = before, ""
+            text = (before or behind.lstrip(";,\t ")).strip("()[] ")
+            unit, value = known_unit(text), float(number.replace(",", "."))
+            if unit is not None:
+                text, value = _SI[kind_of(unit)], value * UNITS[kind_of(unit)][unit]
+            elif text.lower() in _HERTZ:
+                text, value = "", value * _HERTZ[text.lower()]
+            facts[f"{name} ({text})" if text else name] = value
+    return facts
+
+
+def find_layout(
+    rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
+) -> Layout | None:
+    """Names, units and the first row of numbers of a sheet, given the cells and lines of its head; or None."""
+    tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
+    numeric = [
+        column
+        for column in range(width)
+        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
+    ]
+
+    def is_data(row: Sequence[str]) -> bool:
+        cells = [row[column] if column < len(row) else "" for column in numeric]
+        filled = sum(is_number(cell, decimal) for cell in cells)
+        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
+
+    first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
+    if first is None:
+        return None
+    above = []  # the rows that may name every column
+    for index, row in enumerate(rows[:first]):
+        cells = [cell.strip().strip('"').strip() for cell in row]
+        if cells:
+            cells[0] = cells[0].lstrip("#%!*/;").strip()
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        texts = [cell for cell in cells if cell and not is_number(cell, decimal)]
+        if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
+            above.append((index, cells + [""] * (width - len(cells))))
+    units: list[str] = [""] * width
+    # A row of units: known ones or others in brackets, or more known ones than short texts.
+    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
+    known = [cell for cell in stated if known_unit(cell) is not None]
+    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
+    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
+    if known and (not bare or few):
+        beside = above.pop()[1]
+        units = [unit_beside(name, cell) for name, cell in zip(above[-1][1], beside, strict=True)]
+    names = list(above[-1][1]) if above else []
+    split = [split_unit(name) for name in names]
+    named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
+    facts = facts_in(lines[: above[-1][0] if above else first])
+    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
+        named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
+    return Layout(
+        first,
+        tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
+        tuple(one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)),
+        bool(names),
+        facts,
+    )
+
+
+TEXT = Reader("a table of text", limits.CSV_BYTES)
+"""Any file without a reader of its own; `read_text_tables` takes what is known of its dialect."""
+_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
+_DAY = 86400.0  # s
+_HEAD, _MIDDLE = 2**18, 2**14  # bytes that are inspected
+_LOOKED_AT = 1000  # texts of a column that show whether they are times of day
+_PART = 2**20  # texts that are converted at once
+_LONG_LINE = 1000  # characters: a longer line above a table does not state a number
+_HEAD_LINES = 400
+_NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
+_SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """The separation of a line and the form of a number; a blank matches any number of blanks and tabs."""
+
+    delimiter: str
+    decimal: str
+    width: int
+
+    def split(self, line: str) -> list[str]:
+        """The cells of a line, without blanks and quotes around them."""
+        if self.delimiter == " ":
+            return line.split()
+        cells = re.findall(
+            rf'(?:^|{re.escape(self.delimiter)})("[^"]*"|[^{re.escape(self.delimiter)}]*)', line
+        )
+        return [cell.strip(' \t"') for cell in cells]
+
+
+def read_text_tables(
+    content: bytes, where: str, choices: ImportChoices
+) -> tuple[list[Table], dict[str, str]]:
+    """The table of a text file; and how it was read, for the recipe."""
+    content, encoding = _as_utf8(content, where)
+    if b"\n" not in content:
+        content = content.replace(b"\r", b"\n")
+    nul = (
+        "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet), or save it again as text"
+    )
+    check_lines(content, where, nul)
+    head = content[:_HEAD].decode(errors="replace").splitlines()
+    if len(content) > _HEAD:
+        head.pop()
+    head = head[:_HEAD_LINES]
+    half = len(content) // 2
+    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
+    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
+    dialect = find_dialect([line for line in body if line.strip() and line[0] not in "#%"], choices)
+    if dialect is None:
+        remedy = "give --delimiter and --decimal, or name a table"
+        raise TunnelError("no columns of numbers", where=where, remedy=remedy)
+    check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
+    lines = content.count(b"\n")
+    check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
+    cells = lines * dialect.width
+    check_count(cells, limits.CELLS, "cells", where, "leave out columns that are not needed")
+    layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
+    sample = [dialect.split(line) for line in body if line.strip()]
+    if layout is None:
+        what = f"no numbers in the first {counted(len(head), 'line')}"
+        raise TunnelError(what, where=where, remedy="remove the lines above the table")
+    heading = "names in the line above the numbers" if layout.headed else "no names of columns"
+    said = (
+        f"text ({encoding}), {counted(dialect.width, 'column')} separated by {_SAID[dialect.delimiter]}, decimal "
+        f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}"
+    )
+    known = {
+        "delimiter": next(name for name, sign in _NAMES.items() if sign == dialect.delimiter),
+        "decimal": dialect.decimal,
+    }
+    if dialect.delimiter == " ":
+        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is scanned twice
+        content = re.sub(rb"(?m)^ | $", b"", content)
+    options: dict[str, Any] = {
+        "separator": dialect.delimiter,
+        "has_header": False,
+        "skip_lines": layout.first,
+        "truncate_ragged_lines": True,
+    }
+    names = [f"column_{i + 1}" for i in range(dialect.width)]
+    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
+    try:
+        labels = None
+        if (at := layout.runs) is not None:  # the name of a run is kept, even if it is "nan"
+            schema = dict.fromkeys(names, pl.String)
+            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
+        try:
+            text_at = {i for i in range(dialect.width) if _holds_texts(sample, i, dialect.decimal)} - {at}
+            kinds = {
+                name: pl.String if i in text_at or i == at else pl.Float64 for i, name in enumerate(names)
+            }
+            numbers = {**options, "decimal_comma": dialect.decimal == ","}
+            if not text_at:  # a text may contain delimiters in quotes
+                numbers["quote_char"] = None
+            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
+        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
+            texts = dict.fromkeys(names, pl.String)
+            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
+        table = Table((), said=(said,), facts=layout.facts)
+        return tables_of(frame, layout, dialect.decimal, labels, table), known
+    except pl.exceptions.PolarsError as error:
+        what = f"not a table of text ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _cells(line: str, dialect: Dialect) -> list[str]:
+    """The cells of a line of the head, whose names may have other delimiters than the numbers below."""
+    own = dialect.split(line)
+    if len(own) != 1 or dialect.width < 2:
+        return own
+    others = (
+        Dialect(sign, dialect.decimal, dialect.width).split(line) for sign in _NAMES.values() if sign != " "
+    )
+    return next((cells for cells in others if len(cells) == dialect.width and all(cells)), own)
+
+
+def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bool:
+    """Whether a column contains a text in some rows of a table; it is then read as texts from the first row on."""
+    cells = (row[column] for row in rows if column < len(row))
+    return any(not is_number(cell, decimal) and not is_missing(cell) for cell in cells)
+
+
+def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
+    """The dialect in which most cells of some lines are numbers; of several, the one with most columns."""
+    delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
+    decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
+    best, score = None, (0.2, 0)
+    for delimiter in delimiters:
+        for decimal in decimals:
+            if delimiter == "," == decimal:
+                continue
+            rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
+            width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
+            cells = [cell for row in rows for cell in row if not is_missing(cell)]
+            share = sum(is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
+            if (round(share, 1), width) > score:
+                best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
+    return best
+
+
+def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
+    """The text as UTF-8, and its encoding."""
+    encoding = "ASCII"
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "UTF-16"
+    elif not content.isascii():
+        encoding = "UTF-8 with a byte-order mark" if content.startswith(b"\xef\xbb\xbf") else "UTF-8"
+    try:
+        if encoding == "UTF-16":
+            content = content.decode("utf-16").encode()
+        else:
+            check_utf8(content, where)
+    except UnicodeDecodeError:
+        raise TunnelError("not UTF-16 text", where=where, remedy="save the file as UTF-8") from None
+    except TunnelError:
+        content, encoding = content.decode("latin-1").encode(), "Latin-1"
+    return content.removeprefix(b"\xef\xbb\xbf"), encoding
+
+
+def tables_of(
+    frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
+) -> list[Table]:
+    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
+    channels, notes = [], {-1: table.said[0]}
+    for i, (name, unit, column) in enumerate(
+        zip(layout.names, layout.units, frame.get_columns(), strict=True)
+    ):
+        number, lost = column, 0
+        if column.dtype == pl.String and name == "drive_hold":
+            number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
+            lost = number.null_count() - column.null_count()
+        elif column.dtype == pl.String:
+            number = _in_parts(column, partial(_as_numbers, decimal=decimal))
+            lost = number.null_count() - column.null_count()
+        if lost and number.null_count() == column.len():
+            notes[i] = f"the column '{name}' holds text and is left out"
+            some = _seconds(column.drop_nulls().head(_LOOKED_AT))
+            if 2 * some.null_count() <= some.len():
+                seconds = _in_parts(column, _seconds)
+                midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
+                number, unit = seconds + _DAY * midnights, "s"
+                notes[i] = f"the column '{name}' holds times of day, taken as seconds"
+        elif lost:
+            notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
+        if number.null_count() < number.len():
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit))
+    table = replace(table, channels=tuple(channels), headed=layout.headed)
+    tables = [table]
+    if labels is not None and layout.runs is not None and labels.len() == frame.height:
+        tables = by_texts(table, layout.names[layout.runs], labels)
+    said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
+    return [replace(one, said=(*said, *one.said[1:])) for one in tables]
+
+
+def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
+    """Numbers of a column of texts, part by part: a conversion temporarily takes ten times the memory."""
+    parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
+    return pl.concat(parts)
+
+
+def _as_numbers(column: pl.Series, decimal: str) -> pl.Series:
+    cells = column.str.strip_chars(' \t\r"')
+    cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
+    return cells.cast(pl.Float64, strict=False)
+
+
+def _seconds(column: pl.Series) -> pl.Series:
+    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null if there is none."""
+    text = column.str.strip_chars(' \t\r"')
+    parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
+    hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
+    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+    hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
+    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
+    return 3600.0 * hours + 60.0 * minutes + rest
+
+
+def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
+    """A small table of texts, such as one of conditions: its names, and the cells of every further line."""
+    where = shown(path)
+    content, _ = _as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
+    lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]
+    if len(lines) < 2:
+        raise TunnelError("no rows", where=where, remedy="give a line of names and a line for each run")
+    delimiter = max("\t;,", key=lines[0].count)
+    rows = [Dialect(delimiter, ".", 0).split(line) for line in lines]
+    wrong = next((i for i, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if wrong is not None:
+        cells = counted(len(rows[wrong]), "cell")
+        what = f"{cells} in line {wrong + 1}, but {counted(len(rows[0]), 'name')} of columns"
+        remedy = f"give every line one cell for each column, with {_SAID[delimiter]} between"
+        raise TunnelError(what, where=where, remedy=remedy)
+    return rows[0], rows[1:]
