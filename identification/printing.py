@@ -173,7 +173,7 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
     if not given.get("determined", True):
         return UNDETERMINED
     value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-    text = f"{value} {mark}".rstrip() + at_bound(given) + " (fixed)" * (given["std"] == 0.0)
+    text = f"{value} {mark}".rstrip() + at_bound(given) + (" (fixed)" if given["std"] == 0.0 else "")
     if not given.get("interval") or not given["std"]:
         return text
     # The ends of the interval have as many digits as the value.
