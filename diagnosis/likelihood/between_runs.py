@@ -196,10 +196,10 @@ class Between:
             given: the common parameters that are not integrated out, shape (common,): those of effects that the
                 runs show by themselves, which cannot align runs by chance. None: there are none.
         """
-        one = np.eye(self.widths.size)
-        scaled = one + self.widths[None, :, None] * known * self.widths
+        identity = np.eye(self.widths.size)
+        scaled = identity + self.widths[None, :, None] * known * self.widths
         away = self.found.deviations / self.widths
-        seen = np.einsum("rk,rkl,rl->", away, one - np.linalg.inv(scaled), away)
+        seen = np.einsum("rk,rkl,rl->", away, identity - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
         if given is None:
             given = np.zeros(self.found.common.size, bool)

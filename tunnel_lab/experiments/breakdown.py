@@ -295,8 +295,8 @@ def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
         one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
         one_table.columns[0].no_wrap = True
         for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows():
-            row = [cells[effect, severity, name] for name in some]
-            one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
+            biases = [cells[effect, severity, name] for name in some]
+            one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *biases)
         tables.append(one_table)
     return tables
 

@@ -273,8 +273,9 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     for key in {**old, **new}:
         one, other = old.get(key), new.get(key)
         if one != other:
-            tables = isinstance(one, Mapping) and isinstance(other, Mapping)
-            return _first_difference(one, other) if tables else key
+            if isinstance(one, Mapping) and isinstance(other, Mapping):
+                return _first_difference(one, other)
+            return key
     return ""
 
 

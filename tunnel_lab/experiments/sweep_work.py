@@ -76,7 +76,8 @@ def run_shard(sweep: Sweep, index: int, nthread: int = 1) -> Done:
     simulated: dict[int, Campaign | Failure] = {}
     for group in groups.values():
         simulated.update(zip((case.index for case in group), _simulate(group, nthread), strict=True))
-    bounds, rows, failed = bounds_of(cases), [], []
+    bounds, failed = bounds_of(cases), list[Failure]()
+    rows: list[dict[str, Any]] = []
     for case in cases:
         campaign = simulated[case.index]
         for name in sweep.document.estimators or (None,):
