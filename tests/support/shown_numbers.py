@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -53,3 +53,10 @@ def assert_shows(text: str, values: Sequence[float]) -> None:
         assert one.means(value), (text, one, value)
         # a number so coarse that anything would pass for it says nothing
         assert one.half <= 0.06 * abs(value) or one.value == value, (text, one, value)
+
+
+def assert_known(text: str, values: Iterable[float]) -> None:
+    """Every number of a text is one of these."""
+    known = tuple(values)
+    for one in numbers(text):
+        assert any(one.means(value) for value in known), (text, one)

@@ -12,7 +12,14 @@ import polars as pl
 
 from identification.estimate import PARAMETERS, UNITS
 from identification.estimators import make_estimator
-from tunnel_lab.experiments.answers import QUANTITY_COLUMNS, Failure, asked, counted_failures, quantity_rows
+from tunnel_lab.experiments.answers import (
+    QUANTITY_COLUMNS,
+    Failed,
+    Failure,
+    asked,
+    counted_failures,
+    quantity_rows,
+)
 from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -76,8 +83,9 @@ def run_shard(sweep: Sweep, index: int, nthread: int = 1) -> Done:
     simulated: dict[int, Campaign | Failure] = {}
     for group in groups.values():
         simulated.update(zip((case.index for case in group), _simulate(group, nthread), strict=True))
-    bounds, failed = bounds_of(cases), list[Failure]()
-    rows: list[dict[str, Any]] = []
+    bounds = bounds_of(cases)
+    rows: list[tuple[Any, ...]] = []
+    failed: list[Failed] = []
     for case in cases:
         campaign = simulated[case.index]
         for name in sweep.document.estimators or (None,):

@@ -52,7 +52,7 @@ def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
     return () if effects_file is None else read_effects(effects_file)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Sealed:
     """The folder of the answers to a set, with their seal.
 
@@ -72,9 +72,8 @@ class Sealed:
             TunnelError: when an answer was changed afterwards.
         """
         if (self.folder / SEAL).exists():
-            self.hashes = read_hashes(
-                self.folder / SEAL, "answers_sha256", "remove the folder and answer again"
-            )
+            again = "remove the folder and answer again"
+            self.hashes.update(read_hashes(self.folder / SEAL, "answers_sha256", again))
         for name, known in self.hashes.items():
             path = self.folder / f"{name}.json"
             if not path.is_file() or file_hash(path) != known:

@@ -135,7 +135,7 @@ def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
         found.words == "Explained; the residual (0.0145° root mean square) changes Cnβ by less than 0.02 %."
     )
     assert judged(study, 0.0, None).words.startswith(
-        "Explained; what remains (0.0145° root mean square) concerns no"
+        "Explained; the residual (0.0145° root mean square) changes no coefficient"
     )
 
 

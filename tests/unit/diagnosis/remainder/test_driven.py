@@ -68,7 +68,7 @@ def test_the_rise_of_friction_at_low_rates_is_proposed(answer: Diagnosis, tmp_pa
     # The simulation's own steps, of first order, allow for a few per cent.
     assert size == pytest.approx(-RISE, rel=0.05)
     assert width == pytest.approx(WIDTH, rel=0.05)
-    assert "The formula k*exp(-(r/v1)^2)*sign(r) closes" in answer.to_json_dict()["closable"]["words"]
+    assert "The formula k*exp(-(r/v1)^2)*sign(r) explains" in answer.to_json_dict()["closable"]["words"]
     path = write_proposal(tmp_path / "law.toml", answer.to_json_dict())
     assert path is not None
     assert tomllib.loads(path.read_text())["effects"][0]["name"] == "proposed_rate"

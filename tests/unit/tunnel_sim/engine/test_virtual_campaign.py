@@ -111,7 +111,7 @@ def test_the_truth_holds_what_was_injected(plan: CampaignPlan) -> None:
     assert truth["parameters"] == {
         "coulomb_friction": {
             "friction_moment": 0.05, "presliding": 0.0,
-            "exponent": 0.0, "saturation": 0.0, "peak": 0.0, "peak_rate": 0.2,
+            "exponent": 0.0, "saturation": 0.0, "peak": 0.0, "peak_rate": 0.2, "load": 0.0,
         },
         "mains_hum": {"amplitude": 0.003, "frequency": 50.0},
     }  # fmt: skip

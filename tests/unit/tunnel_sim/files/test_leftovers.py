@@ -158,7 +158,7 @@ def test_a_command_that_refuses_an_occupied_folder_clears_first(tmp_path: Path) 
     from tunnel_lab.commands import score, simulate
 
     names_of_the_dead(tmp_path / "trials.parquet")[0].write_text("half")
-    score._refuse_occupied(tmp_path, overwrite=False)
+    score._parts(tmp_path, overwrite=False)
     assert list(tmp_path.iterdir()) == []
     names_of_the_dead(tmp_path / "campaign")[1].mkdir()
     with pytest.raises(TunnelError, match="exists already"):

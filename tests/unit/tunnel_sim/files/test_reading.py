@@ -310,7 +310,7 @@ def trials(**changes: object) -> pl.DataFrame:
 def test_a_baseline_that_cannot_be_counted_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "b.parquet"
     trials().write_parquet(path)
-    assert len(read_trials(path).rows) == 2
+    assert read_trials(path).table.height == 2
     for changes in (
         {"grid": "[" * DEEP}, {"grid": "{}"}, {"grid": None}, {"grid": 3}, {"cell": 7}, {"cell": -1},
         {"cell": "x"}, {"value": None}, {"truth": None}, {"status": None}, {"estimator": None}, {"truth": "1"},
