@@ -59,4 +59,6 @@ def test_the_search_ends_there_and_says_so() -> None:
     assert max(len(answer.effects) for answer in study.answers) <= 2
     words = CAUTIONS["beyond reach"]
     assert callable(words)
-    assert "all known effects together would leave at least 20.0 % of the gap unexplained" in words({"left": 0.2})
+    assert "all known effects together would leave at least 20.0 % of the gap unexplained" in words(
+        {"left": 0.2}
+    )
