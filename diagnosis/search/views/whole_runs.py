@@ -161,14 +161,15 @@ class WholeRuns(View):
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
-        if not found.explains_runs and self._nearly_explains(found):
+        share = self.base.settings.search.nearly_explained
+        if not found.explains_runs and self._leaves_less(found, share):
             (found,) = with_forms([found], self._scattering_gap, 0.0)
         return replace(found, fit=settled(found.fit))
 
-    def _nearly_explains(self, beside: Hypothesis) -> bool:
-        """Whether what a set beside chance differences leaves within runs could be its effects' other forms."""
+    def _leaves_less(self, beside: Hypothesis, share: float) -> bool:
+        """Whether a set beside chance differences leaves less than a share of the gap within runs."""
         left, gap = np.sum(misfit(beside.fit).excess), np.sum(self._scattering_gap.excess)
-        return bool(left < self.base.settings.search.nearly_explained * gap)
+        return bool(left < share * gap)
 
     def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
         """The likeliest of the sets that explain every run by itself, or of their parts that do.
@@ -213,7 +214,10 @@ class WholeRuns(View):
         view = replace(self, base=self.scattering, unscattered=self.base, first=explained or none)
 
         def unexplained(level: Sequence[Hypothesis]) -> bool:
-            return any(one.effects for one in level) and not any(map(self._nearly_explains, level))
+            share = self.base.settings.search.grown_beside
+            if not any(one.effects for one in level):
+                return False
+            return not any(self._leaves_less(one, share) for one in level)
 
         with clock.step("effects"):
             grown = grow(view, clock.progress, unexplained)
@@ -263,9 +267,7 @@ class WholeRuns(View):
 
 def _with_moments(found: Sets, clock: Clock) -> Sets:
     """Sets, and the random moments that may act beside them."""
-    view = found.view
-    assert isinstance(view, WholeRuns)
     with clock.step("random moments"):
-        random = weigh_random_moments(view, found.hypotheses)
-        sets = without_the_random_moment(random, found.hypotheses, view.gap)
+        random = weigh_random_moments(found.view, found.hypotheses)
+        sets = without_the_random_moment(random, found.hypotheses, found.view.gap)
     return replace(found, random=tuple(random), hypotheses=tuple(sets))
