@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
+from diagnosis.likelihood.between_runs import Between, Kept, RunColumns, width_prior
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
@@ -247,7 +246,7 @@ class Fit:
         return 0 if self.between is None else sum(not seen for seen in self._shown_by_runs.values())
 
     @property
-    def shown(self) -> NDArray[np.bool_]:
+    def shown(self) -> Kept:
         """The common parameters of effects that single runs show beside chance differences, shape (common,)."""
         by_runs = self._shown_by_runs
         return np.array([by_runs.get(name.split(".")[0], False) for name in self.problem.names], np.bool_)

@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _HELD = 1e18  # precision of fixed deviations
 _MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
-_ABSORBED = 2  # steps, after which the first order of an effect is absorbed to the order in which it shows
+_ABSORBED = 2  # steps; after one, the error of the absorption is as large as what remains of the effect
 _NEARER = 0.02  # share of an effect's size by linear theory
 
 

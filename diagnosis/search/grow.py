@@ -156,7 +156,7 @@ def _worth_fitting(
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
             return [item for item in likely if beyond[item[0].name] > 0.0]
         worth = [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
-        # deviations of the runs absorb most of a first-order prediction of such an effect, but not of the effect
+        # linear theory underestimates these: the runs' deviations absorb most of the prediction, not of the effect
         absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
         return worth + [item for item in absorbed if item not in worth and beyond[item[0].name] > 0.0]
     limit = chosen.predicted_share * parent.fit.total

@@ -94,6 +94,9 @@ class Marginal:
     def log_information_given(self, given: NDArray[np.bool_]) -> float:
         """ln|H| of the other common parameters, where some are given.
 
+        Where the given ones are not determined apart, a floor keeps the value finite; it is the same for all
+        widths.
+
         Args:
             given: the given parameters, shape (common,); each has a variance above 0.
         """
