@@ -54,7 +54,7 @@ class ActuatorSaturation(_OfActuator):
     place = 30
     size = "an actuator that exerts at most {limit}"
     advice = "Ask the actuator for less, or record the moment that it exerts"
-    equation = "|moment| ≤ M, in driven runs; general form: u/(1 + |u/M|^(1/s))^s for the moment that the input u asks for"
+    equation = "|moment| ≤ M, in driven runs; general form: u/(1 + |u/M|^(1/s))^s for the demanded moment u"
     signature = (
         "Small inputs act as stated; at the peaks of large ones the motion falls short of the nominal model."
     )
