@@ -31,7 +31,7 @@ from tunnel_lab.bench.parts import (
     show_items,
 )
 from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
-from tunnel_lab.terminal.outputs import STEPS
+from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json

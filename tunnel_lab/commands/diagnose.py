@@ -25,7 +25,8 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.outputs import say, say_written, show, show_tables, step_display
+from tunnel_lab.terminal.outputs import say, say_written, show
+from tunnel_lab.terminal.progress import step_display
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
 if TYPE_CHECKING:
@@ -285,7 +286,7 @@ def compare(
         names = stems
     if len(set(names)) < len(names):
         names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
-    show_tables(*comparison_tables(names, diagnoses))
+    show(comparison_tables(names, diagnoses))
 
 
 def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[Table]:

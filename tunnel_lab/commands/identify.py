@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 import textwrap
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,8 +15,9 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Block, Paragraph, Table
 from identification.estimators import SUMMARIES, make_estimator
+from identification.printing import budget_blocks, estimate_blocks
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
@@ -28,23 +31,17 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.outputs import (
-    bar,
-    budget_lines,
-    budget_table,
-    console,
-    say,
-    say_written,
-    show,
-    show_estimate,
-    show_tables,
-)
+from tunnel_lab.terminal.outputs import console, say, say_written, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from identification.estimators import Estimator
+    from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.turning_points import TurningPoints
 
+DIAGNOSE = "run the diagnosis"
+"""The ending of notes whose remedy is a diagnosis."""
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
 ESTIMATORS = "  {estimators}"
@@ -180,14 +177,28 @@ def run(
         if json is not None:
             write_json(json, document)
         detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
-        show_estimate(data, estimate, windows=detailed, source=campaign)
+        show(estimate_shown(data, document, campaign, windows=detailed))
         if found is not None:
             say("")
-            show((budget_table(document["budget"]), *map(Paragraph, budget_lines(document["budget"]))))
-            say("The standard deviations above are the combined ones.")
+            show(
+                (*budget_blocks(document), Paragraph("The standard deviations above are the combined ones."))
+            )
         say_written(json)
     if estimate.status.failed:
         raise typer.Exit(1)
+
+
+def estimate_shown(
+    campaign: Campaign, document: Mapping[str, Any], source: Path, *, windows: bool
+) -> Iterator[Block]:
+    """The blocks of an estimate, with the conditions of all runs, and with commands to copy in its notes."""
+    conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign.runs}
+    command = f"run tunnel diagnose {shlex.quote(str(source))}"
+    for block in estimate_blocks(document, conditions, windows=windows):
+        if isinstance(block, Paragraph):
+            yield replace(block, text=block.text.replace(DIAGNOSE, command))
+        else:
+            yield block
 
 
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
@@ -222,7 +233,7 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     cells = tuple((name, with_std(one.value, one.std)) for name, one in rows)
     heading = "value ± one standard deviation"
     title = f"{points.name}: {points.time_s.size} turning points"
-    show_tables(Table(title, ("quantity", heading), cells, right=(heading,)))
+    show([Table(title, ("quantity", heading), cells, right=(heading,))])
     for line in found.said:
         say(f"Note: {line}")
     say(

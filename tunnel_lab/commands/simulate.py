@@ -12,7 +12,8 @@ from typer import Argument, Option
 
 from identification.blocks import Table
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import say, say_written, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
@@ -273,7 +274,7 @@ def plan_drive(
         ("free decays", run_count(document), document.duration, spent, free),
         ("planned drive", cells, duration, rig_time(best), driven),
     )
-    show_tables(bounds)
+    show([bounds])
     if minutes is not None:
         say("The last row is for free decays repeated to the same rig time.")
     chosen = best.drive

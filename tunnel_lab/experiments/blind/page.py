@@ -230,10 +230,10 @@ def _other_sections(score: Score) -> list[ScoreSection]:
 
 def blind_view(score: Score) -> View:
     """The view of a score, each table with its note."""
-    parts: list[Block] = [Paragraph(line) for line in origin_lines(score)]
+    blocks: list[Block] = [Paragraph(line) for line in origin_lines(score)]
     for section in sections(score):
-        parts += [section, Paragraph(section.note)]
-    return View("Blind check", parts)
+        blocks += [section, Paragraph(section.note)]
+    return View("Blind check", blocks)
 
 
 def origin_lines(score: Score) -> list[str]:

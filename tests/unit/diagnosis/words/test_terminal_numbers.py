@@ -32,8 +32,8 @@ from identification.printing import runs_table as estimated_runs
 from identification.status import Status
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.support.shown_numbers import assert_shows
+from tunnel_lab.commands.demo import truth_table
 from tunnel_lab.report.page import render_report
-from tunnel_lab.terminal import outputs
 
 Document = dict[str, Any]
 Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")
@@ -46,9 +46,7 @@ def given() -> Document:
 
 def rows(table: Table) -> list[list[str]]:
     """The cells of a table in a terminal, units and brackets of units left out."""
-    plain = outputs.rich_table(table)
-    columns = [[str(cell) for cell in column.cells] for column in plain.columns]
-    return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
+    return [[Y_UNIT.sub("", cell) for cell in row] for row in table.without_detail().rows]
 
 
 def short(text: str) -> tuple[float, float]:
@@ -320,7 +318,7 @@ def test_coefficients_of_an_estimate() -> None:
 
 def test_errors_against_the_truth() -> None:
     found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
-    table = outputs.truth_table(found, truth)
+    table = truth_table(found, truth)
     assert table.title.startswith("own")
     cells = rows(table)
     for row, (name, value) in zip(cells, truth.items(), strict=True):
