@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
+from identification.blocks import Block, Card, Detail
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")
@@ -43,6 +45,12 @@ def _shown(digits: str) -> Shown:
     mantissa, _, power = digits.partition("e")
     decimals = len(mantissa.partition(".")[2])
     return Shown(float(digits), 0.5 * 10.0 ** (int(power or 0) - decimals))
+
+
+def all_blocks(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Blocks, and those inside them."""
+    for block in blocks:
+        yield from all_blocks(block.blocks) if isinstance(block, Card | Detail) else (block,)
 
 
 def assert_shows(text: str, values: Sequence[float]) -> None:
