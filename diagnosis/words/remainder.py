@@ -23,6 +23,7 @@ from diagnosis.words.numbers import (
 from diagnosis.words.scatter import scattering
 from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.units import beside
 
 
 def rest_words(document: Document) -> str:
@@ -120,8 +121,7 @@ def _with_values(law: Document) -> str:
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
-        mark = "" if unit == "1" else f" {unit_mark(unit)}"
-        said.append(f"{name} = {with_std(one['value'], one['std'])}{mark}")
+        said.append(f"{name} = {with_std(one['value'], one['std'])}{unit_mark(beside(unit))}")
     left = f"{listed(unknown)} not determined by these runs" if unknown else ""
     return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
 

@@ -36,6 +36,7 @@ from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
@@ -309,7 +310,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     from identification.printing import estimated, unit_mark
 
     def size(given: ParameterEstimate) -> str:
-        return typeset(estimated(given.to_json_dict(), "" if given.unit == "1" else unit_mark(given.unit)))
+        return typeset(estimated(given.to_json_dict(), unit_mark(beside(given.unit, ""))))
 
     show_facts(
         [

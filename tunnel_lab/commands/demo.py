@@ -19,6 +19,7 @@ from typer import Option
 from identification.blocks import Table
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity
@@ -133,7 +134,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
     )
     for effect in plan.effects:
         sizes = (
-            f"{info.name} {info.symbol} = {effect.parameters[info.name]:g}{_spaced(info.unit)}"
+            f"{info.name} {info.symbol} = {effect.parameters[info.name]:g}{beside(info.unit)}"
             for info in effect_class(effect.name).parameters()
             if info.name in effect.parameters
         )
@@ -204,10 +205,6 @@ def missed_faults(plan: CampaignPlan, document: Document) -> list[str]:
         if found is None
         or not isclose(found["value"], truth, abs_tol=CHECK_STDS * (found["std"] or 0.0), rel_tol=1e-9)
     ]
-
-
-def _spaced(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
 
 
 def _listed(values: Iterable[float]) -> str:

@@ -28,6 +28,7 @@ from tunnel_lab.terminal.inputs import (
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -323,7 +324,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         answer, texts = document["candidates"][0], {}
         for full, given in answer["parameters"].items():
             owner, _, name = full.rpartition(".")
-            mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
+            mark = unit_mark(beside(given["unit"], ""))
             owner = owner or answer["effect"]
             texts[owner, name] = spread_estimate(document, owner, given) or estimated(given, mark)
         parameters.append(texts)

@@ -22,6 +22,7 @@ from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import beside
 
 REFERENCE_SPEED = 20.0
 """Wind speed at which a speed-dependent form equals the textbook form, m/s."""
@@ -135,7 +136,7 @@ class Effect:
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
                 what = f"{info.name} = {value!r} is out of range"
-                remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
+                remedy = f"give a number from {info.lower:g} to {info.upper:g}{beside(info.unit, ' in ')}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
             if info.of_input and value != round(value):
                 what = f"{info.name} = {value!r} is not a valid case"
