@@ -220,14 +220,13 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         severity = f"{kind.name}.{kind.parameters()[0].name}"
         if kind.driven or severity not in problem.names:
             continue
-        runs = range(len(data.runs))
-        windy = [i for i in runs if data.runs[i].wind_on] if kind.condition == "wind_on" else []
+        acts = [i for i, run in enumerate(data.runs) if kind.acts(wind_on=run.wind_on)]
         release, without = fit.point.release.copy(), fit.point.common.copy()
         release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0
         both = problem.predict([Point(fit.point.common, release), Point(without, release)])
         # only some runs show a cause in one spring or one wind
-        shown = [i for i in windy or runs if not np.array_equal(both[0][i], both[1][i])]
+        shown = [i for i in acts or range(len(data.runs)) if not np.array_equal(both[0][i], both[1][i])]
         if not shown:
             continue
         # the softest spring, on which a moment acts most

@@ -159,6 +159,21 @@ class Effect:
         return (names,) if names else ()
 
     @classmethod
+    def shown_forms(cls, *, load_varies: bool) -> tuple[tuple[str, ...], ...]:
+        """The general forms that runs can show.
+
+        Args:
+            load_varies: whether the moment that the joint carries varies in the runs.
+        """
+        of_load = {info.name for info in cls.parameters() if info.of_load}
+        return tuple(form for form in cls.forms() if load_varies or of_load.isdisjoint(form))
+
+    @classmethod
+    def acts(cls, *, wind_on: bool) -> bool:
+        """Whether it acts in a run with the wind on or off."""
+        return wind_on or cls.condition == "always"
+
+    @classmethod
     def column(cls, effects: Sequence[Effect], name: str) -> Array:
         """A parameter of several effects of the class, in its unit, shape (effects,)."""
         return np.array([getattr(effect, name) for effect in effects], np.float64)
@@ -178,6 +193,20 @@ class Effect:
         if cls.skips:
             return tuple(f"instant_{number + 1}" for number in range(instants))
         return ("phase",) if cls.line else ()
+
+    @classmethod
+    def numbers_like_forms(cls, instants: int) -> int:
+        """Number of its unknowns of every run that absorb any slow phase error, as a freed form does: its instants.
+
+        Args:
+            instants: number of instants of an effect that skips samples.
+        """
+        return len(cls.own_numbers(instants)) if cls.skips else 0
+
+    @classmethod
+    def gains_in(cls) -> Literal["frequency", "harmonics"]:
+        """The channel of the misfit that its unknowns of every run lower by chance."""
+        return "frequency" if cls.skips else "harmonics"
 
     @classmethod
     def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
