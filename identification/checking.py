@@ -184,7 +184,8 @@ def _compare(subject: _Subject, name: str, quantity: Quantity | None, truth: flo
     if abs(quantity.value - truth) > _FAR * abs(truth) + _DEVIATIONS * quantity.std:
         value = f"{quantity.value:.4g} ± {quantity.std:.2g}{beside(quantity.unit)}"
         what = f"{name} is {value}, and the truth is {truth:.4g}"
-        raise subject.refuse(what, f"check its sign and its value{beside(quantity.unit, ' in ')}")
+        right = " and ".join(filter(None, (beside(quantity.unit, "is in "), "has its sign")))
+        raise subject.refuse(what, f"check that it {right}")
 
 
 def _check_same_runs(subject: _Subject) -> None:
