@@ -292,9 +292,9 @@ def repeatability_lines(document: Document) -> list[str]:
     """
     if "repeatability" not in document:  # from an earlier version
         return []
-    found, coefficients = document["repeatability"], document["parameters"]
+    scatter, coefficients = document["repeatability"], document["parameters"]
     shown = [run for run in document["runs"] if run["omega_n"] is not None]
-    if found is None:
+    if scatter is None:
         if not coefficients or 2 * len(shown) > len(coefficients):
             return []
         return [
@@ -303,11 +303,11 @@ def repeatability_lines(document: Document) -> list[str]:
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():
-        width = found[name]
+        width = scatter[name]
         if width is None:
             continue
         size = f"{words} by {percent(width['value'])}"
-        if name in found["stated"]:
+        if name in scatter["stated"]:
             stated.append(size)
         else:
             low, high = width["interval"]
@@ -317,7 +317,9 @@ def repeatability_lines(document: Document) -> list[str]:
     if seen:
         ways.append(f"as if by chance, {', '.join(seen)}")
         told = "; tunnel diagnose tells chance from a cause"
-    differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
+    differs = (
+        f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
+    )
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
         f"it{told}."

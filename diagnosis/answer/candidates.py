@@ -137,15 +137,15 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
 
 def _parameters(study: Study, answer: Answer | None = None) -> dict[str, ParameterEstimate]:
     """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect."""
-    found: dict[str, ParameterEstimate] = {}
+    estimates: dict[str, ParameterEstimate] = {}
     prepared, hum = study.prepared, study.prepared.hum
     if hum is not None:
         amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
-        found[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
-        found[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
+        estimates[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
+        estimates[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
     if prepared.coarse:
         step = f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"
-        found[step] = ParameterEstimate(prepared.step, None, "rad")
+        estimates[step] = ParameterEstimate(prepared.step, None, "rad")
     random = None if answer is None else answer.random
     stated = None if answer is None else answer.stated
     hypothesis = stated if random is None else random.beside
@@ -158,13 +158,13 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
             undetermined = study.settings.answer.undetermined_from
-            found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
+            estimates[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for one in problem.scatter:
             if one.shown:
                 spread = one.kind.parameters()[0]
-                found[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
+                estimates[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
         for name, value in problem.fixed:
-            found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
+            estimates[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
         seconds = random.process.interval * sum(i.size for i in random.process.innovations)
         data = study.nominal.problem.data
@@ -180,18 +180,18 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
                 size = float(np.sqrt(2.0)) * intensity
                 speeds = [run.wind_speed for run in data.runs if run.wind_on]
                 reduced = float(np.sqrt(np.mean(np.square(speeds)))) / data.width  # Hz
-                found[severity] = ParameterEstimate(size, size * relative, "1")
-                found[place] = ParameterEstimate(
+                estimates[severity] = ParameterEstimate(size, size * relative, "1")
+                estimates[place] = ParameterEstimate(
                     part.strouhal_number, part.bandwidth / reduced * relative, "1"
                 )
             else:
                 # a corner above the rig's frequencies looks white: only size over square root is known there
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-                found[severity] = ParameterEstimate(
+                estimates[severity] = ParameterEstimate(
                     intensity, intensity * relative, kind.parameters()[0].unit
                 )
-                found[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
-    own = own_parameters(found, study.campaign, study.similarity, study.model)
+                estimates[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
+    own = own_parameters(estimates, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
 

@@ -191,7 +191,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         (`interval_beside`). No standard deviation is given at a bound, or where the runs do not determine the
         coefficient.
     """
-    fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
+    fit, estimates, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
             continue  # fixed
@@ -220,10 +220,10 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         }
         between = float(probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each])
         shares["rivals"] = shares.get("rivals", 0.0) + between
-        found[name] = _estimate(fit, name, whole.mean, whole.std, shares)
-        if found[name].std is not None:
-            found[name] = replace(found[name], interval=interval_beside(whole, chosen))
-    return found
+        estimates[name] = _estimate(fit, name, whole.mean, whole.std, shares)
+        if estimates[name].std is not None:
+            estimates[name] = replace(estimates[name], interval=interval_beside(whole, chosen))
+    return estimates
 
 
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:

@@ -381,11 +381,11 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     def law(common: Array) -> FoundLaw:
         release = chosen.point.release[still]
-        found = found_law(problem, common, release, noise, still, actuated(common))
+        identified = found_law(problem, common, release, noise, still, actuated(common))
         if given is None:
-            return found
-        steps = inertia_of_steps(given, float(given.dof_damping[0]) + found.patch.damping[0])
-        return replace(found, patch=replace(found.patch, inertia=found.patch.inertia - steps))
+            return identified
+        steps = inertia_of_steps(given, float(given.dof_damping[0]) + identified.patch.damping[0])
+        return replace(identified, patch=replace(identified.patch, inertia=identified.patch.inertia - steps))
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:
@@ -399,9 +399,9 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     native = frozenset[str]() if actuated(chosen.point.common) is None else runs
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
-    found = law(chosen.point.common)
-    differences = found.differences
-    if found.patch.friction > 0.0:
+    identified = law(chosen.point.common)
+    differences = identified.differences
+    if identified.patch.friction > 0.0:
         creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
         differences += (
             Fact("soft friction", {"below_per_s": creep, "unit": "m" if model.law.slide else "rad"}),
@@ -414,7 +414,7 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
         own = [_restarted(problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
-    spec, written = patched(model, found.patch, starts)
+    spec, written = patched(model, identified.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
     return PatchedModel(model, spec, written, differences, zero, closure)

@@ -84,38 +84,38 @@ def terms(kind: str, r: Ranges) -> list[Term]:
     Their inner parameters are spaced closely enough for a fit to reach the values between. There are no terms for
     kinds that no formula explains.
     """
-    found: list[Term] = []
+    library: list[Term] = []
     if kind in ("angle", "state", "wind"):
-        found += map(Term, _ANGLE)
-        found += _grid(_ANGLE_WIDE, w=_widths(r, 9))
-        found += _grid(_ANGLE_PLACE, c=_places(r))
-        found += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
-        found += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
-        found += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
+        library += map(Term, _ANGLE)
+        library += _grid(_ANGLE_WIDE, w=_widths(r, 9))
+        library += _grid(_ANGLE_PLACE, c=_places(r))
+        library += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
+        library += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
+        library += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
     if kind in ("rate", "state", "wind"):
-        found += map(Term, _RATE)
-        found += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
+        library += map(Term, _RATE)
+        library += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
     if kind in ("state", "wind"):
-        found += map(Term, _STATE)
-        found += _grid(_STATE_WIDE, w=_widths(r))
+        library += map(Term, _STATE)
+        library += _grid(_STATE_WIDE, w=_widths(r))
         places = np.linspace(-0.85, 0.85, 18) * r.angle
-        found += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
+        library += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
     if kind == "time":
-        found += map(Term, _TIME)
-        found += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
-        found += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
+        library += map(Term, _TIME)
+        library += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
+        library += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
         instants = np.linspace(0.04, 0.96, 24) * r.time
-        found += _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
+        library += _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
         often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
-        found += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
+        library += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
     if kind == "reading":
-        found += map(Term, _READING)
-        found += _grid(_READING_PLACE, c=_places(r))
-        found += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
+        library += map(Term, _READING)
+        library += _grid(_READING_PLACE, c=_places(r))
+        library += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
         instants = np.linspace(0.04, 0.96, 47) * r.time
-        found += _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
-        found += _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
-    return found
+        library += _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
+        library += _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
+    return library
 
 
 def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[Term]:

@@ -90,27 +90,27 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     """The share of the kind beside those of the others, its place, and its formula."""
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
-    said = [
+    sentences = [
         f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on "
         f"{best.held_out} held out of the fit."
     ]
     if found["alike"]:
-        said.append(
+        sentences.append(
             f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found['alike'])}."
         )
     elif found["next_most"] is not None:
         alike = all(one.held_out == best.held_out for one in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        said.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
+        sentences.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
-        said.append(f"Most of it is in {largest}{run}.")
+        sentences.append(f"Most of it is in {largest}{run}.")
     if law is not None:
         formula = law["effect"].get("moment") or law["effect"]["reading"]
         closes = percent(law["closed"], law["std"])
-        said.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
-    return said
+        sentences.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
+    return sentences
 
 
 def _with_values(law: Document) -> str:

@@ -224,7 +224,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
     missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
     tables = validate(EffectsDocument, load_toml(path, missing=missing), path).effects
     names = [table.name for table in tables]
-    found = []
+    effects = []
     for table in tables:
         where = f"{shown(path)}, effect '{table.name}'"
         if names.count(table.name) > 1:
@@ -240,7 +240,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
             stated = {
                 key: getattr(table, key) for key in ("channel", "condition", "moment", "reading", "summary")
             }
-            found.append(expression_effect(table.name, parameters=quantities, **stated))
+            effects.append(expression_effect(table.name, parameters=quantities, **stated))
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from error
-    return tuple(found)
+    return tuple(effects)

@@ -309,7 +309,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
     damping = model.dof_damping[0], *model.dof_dampingpoly[0]
     affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
     constant = np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0])
-    found = {
+    attributes = {
         ("joint armature", "kg m2"): [model.dof_armature[0]],
         ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
         ("joint springref", "rad"): [model.qpos_spring[0]],
@@ -330,7 +330,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
         ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
         ("plugin vwt.yaw_moment", "1"): [model.nplugin],
     }
-    return {name: tuple(map(float, values)) for name, values in found.items()}
+    return {name: tuple(map(float, values)) for name, values in attributes.items()}
 
 
 def _filters(model: mujoco.MjModel, actuator: int) -> bool:

@@ -115,7 +115,7 @@ def _records(
     where: str,
 ) -> list[RawRecord]:
     """The cleaned records of the columns of a run: one, or one from each start of the clock."""
-    found = []
+    records = []
     driven = columns.input
     time, readings = columns.time[kept], columns.reading[kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
@@ -140,7 +140,7 @@ def _records(
                     remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )
             given = driven.column, values
-        found.append(
+        records.append(
             RawRecord(
                 id=name if len(starts) == 2 else f"{name}-{place}",
                 source=path,
@@ -156,7 +156,7 @@ def _records(
                 input_facts=facts,
             )
         )
-    return found
+    return records
 
 
 def _turning_points(
