@@ -45,7 +45,7 @@ def meant_parameter(
     return _limited(found, min(uniform, size))
 
 
-def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
+def meant_coefficient(estimate: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
     """A coefficient, its standard deviation omitted where it is meaningless.
 
     Args:
@@ -56,11 +56,11 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
         coefficient whose moment is that of the stiffness or of the critical damping in the fastest wind.
     """
     if name == "omega_n":
-        return _limited(found, abs(found.value))
+        return _limited(estimate, abs(estimate.value))
     if name == "zeta":
-        return _limited(found, 1.0)
+        return _limited(estimate, 1.0)
     if not name.startswith("cn_"):
-        return found
+        return estimate
     data, greatest = fit.problem.data, math.inf
     for index, run in enumerate(data.runs):
         if run.wind_on:
@@ -72,7 +72,7 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
                 critical = 2.0 * math.sqrt(inertia * abs(stiffness))
                 own = critical * run.wind_speed / (pressure * data.reference_length)
             greatest = min(greatest, own)
-    return _limited(found, greatest)
+    return _limited(estimate, greatest)
 
 
 def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
@@ -98,26 +98,26 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
             Candidate("none", 1.0 - rate, excess, 0.0),
             Candidate("unknown", rate, excess, 0.0),
         )
-    found = []
+    answers = []
     before = max(study.nominal.excess, 1e-9)
     for answer in study.answers:
         if answer.effects == UNKNOWN:
-            found.append(Candidate("unknown", answer.probability, before / block, 0.0))
+            answers.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
         name = " + ".join(sorted({*study.beside, *answer.effects}))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
-        found.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
+        answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
     if not study.answers:
         whole = excess + base.hum + base.extra
         closed = float(np.clip(1.0 - max(excess, 0.0) / max(whole, 1e-9), 0.0, 1.0))
         name = " + ".join(study.read_off)
         even = study.settings.weighing.even_share
-        found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
-        found.append(Candidate("unknown", even, whole, 0.0))
+        answers.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
+        answers.append(Candidate("unknown", even, whole, 0.0))
     none = 0.0 if study.beside else min(study.gap.test.p_value, rate)
-    found.append(Candidate("none", none, before / block, 0.0))
-    total = sum(candidate.probability for candidate in found)
-    first, *others = (replace(c, probability=c.probability / total) for c in found)
+    answers.append(Candidate("none", none, before / block, 0.0))
+    total = sum(candidate.probability for candidate in answers)
+    first, *others = (replace(c, probability=c.probability / total) for c in answers)
     return (first, *sorted(others, key=lambda c: -c.probability))
 
 
@@ -214,7 +214,7 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     if not data.model.restored:
         return ()
     problem = replace(fit.problem, data=data)
-    own, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing
+    reading_unit, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing
     sizes = []
     for kind, effect in zip(problem.effects, problem.effects_at(fit.point.common), strict=True):
         severity = f"{kind.name}.{kind.parameters()[0].name}"
@@ -244,8 +244,8 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
             damping_ratio=decay[1],
             damping_ratio_without=decay_without[1],
             frequency_change=decay[0] / decay_without[0] - 1.0,
-            zero_change=own * (decay[2] - decay_without[2]),
-            reading_change=own * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
+            zero_change=reading_unit * (decay[2] - decay_without[2]),
+            reading_change=reading_unit * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
             stands=effect.stands(linear_coefficients(fit, index)[2]),
         )
         sizes.append(size)

@@ -238,9 +238,9 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
     """
     whole = total(parts)
     c = whole.free
-    own = np.diag(whole.matrix)[c:]
+    power = np.diag(whole.matrix)[c:]
     settings = unexplained.fit.settings.remainder
-    threshold = float(chdtri(1, settings.term_rate / own.size))
+    threshold = float(chdtri(1, settings.term_rate / power.size))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
@@ -251,10 +251,10 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
         width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
         cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / width[:, None]
         solved = np.linalg.pinv(inner / np.outer(width, width), rcond=1e-11, hermitian=True) @ cross
-        left = own - np.sum(cross * solved, axis=0)
+        left = power - np.sum(cross * solved, axis=0)
         along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / width)
         # a term that the others explain to within rounding gains nothing
-        drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
+        drops = np.where(left > 1e-6 * np.maximum(power, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
         order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
         tried = []
         for i in order:

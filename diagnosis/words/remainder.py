@@ -67,14 +67,14 @@ def _each(sizes: dict[str, str]) -> str:
 
 def closable_words(document: Document) -> str:
     """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
-    found = document["closable"]
-    if found is None:
+    closable = document["closable"]
+    if closable is None:
         return ""
     named = document["causes"] != ["unknown"] and document["decided"]
     beyond = " beyond the scatter between runs" if scattering(document["causes"]) else ""
     left = "the residual gap" if named else f"the gap{beyond}"
-    ceilings = [ceiling(one) for one in found["ceilings"]]
-    if found["kind"] == "noise":
+    ceilings = [ceiling(one) for one in closable["ceilings"]]
+    if closable["kind"] == "noise":
         chosen = settings_of(document).remainder
         most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
         bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
@@ -82,8 +82,8 @@ def closable_words(document: Document) -> str:
             f"A smooth moment or error of the reading could explain no more than {bound} of {left}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(document, found["kind"], ceilings)
-    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found["line"])])
+    of_others = _measured_otherwise(document, closable["kind"], ceilings)
+    return " ".join([*_largest(closable, ceilings, left), *of_others, *_line(closable["line"])])
 
 
 def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:

@@ -252,7 +252,7 @@ def shipped_posteriors() -> dict[str, TrainedPosterior]:
 def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPosterior]:
     """Networks from safetensors and the JSON of their training record, by kind."""
     with open_stored(weights, record, where, estimator="neural_posterior") as (tensors, document):
-        found = {}
+        trained = {}
         for kind in KINDS:
             own = {
                 name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
@@ -268,8 +268,8 @@ def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPo
                 raise ValueError(kind)
             centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
             threshold, effects = float(stated["threshold"]), tuple(document["effects"])
-            found[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
-        return found
+            trained[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
+        return trained
 
 
 # Logarithm of χ² over its freedom: smaller values come from records with hardly any noise.

@@ -418,7 +418,7 @@ def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, li
         harmonics += [fold(np.arcsinh(level.real)), fold(np.arcsinh(level.imag)), np.log(0.5 * spread + 0.05)]
     centred = (run.zero - float(np.average(run.zero, weights=weight**2))) * weight
     remaining = np.log(alone.remaining / alone.freedom + 0.05)
-    own = [
+    features = [
         abs(float(np.arcsinh(zero_time))),
         abs(float(np.arcsinh(zero_size))),
         float(np.log(np.mean(centred**2) + 0.05)),
@@ -434,8 +434,8 @@ def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, li
         speed,
         float(speed > 0.0),
     ]
-    assert len(own) == OWN
-    return np.concatenate((np.arcsinh(alone.scores[1:]), own))
+    assert len(features) == OWN
+    return np.concatenate((np.arcsinh(alone.scores[1:]), features))
 
 
 def _slope(values: Array, against: Array, weight: Array) -> float:

@@ -266,8 +266,8 @@ def plan_drive(
             duration=duration,
             progress=lambda: progress(next(tried), None),
         )
-    found = plan_from(best, rig, where)
-    driven = plan_bound(found, rig)
+    proposed = plan_from(best, rig, where)
+    driven = plan_bound(proposed, rig)
     write_whole(out, tomli_w.dumps(best.model_dump(exclude_none=True, exclude_defaults=True)).encode())
     bounds = _bounds(
         (rig_time(best) - changes) / (spent - changes),
@@ -283,7 +283,7 @@ def plan_drive(
     between = " to " if chosen.from_hz else ", "
     hertz = between.join(f"{rate:g}" for rate in rates)
     words = f"Drive: {chosen.kind.replace('_', ' ')}, {hertz} Hz, {chosen.amplitudes_nm[0]:g} N m peak"
-    say(f"{words}; response up to {peak_response(found, rig):.3g} rad")
+    say(f"{words}; response up to {peak_response(proposed, rig):.3g} rad")
     say_written(out)
 
 

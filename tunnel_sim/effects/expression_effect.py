@@ -143,12 +143,12 @@ def expression_effect(
     _check_names(parameters)
     formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))
     expected = "N m" if reading is None else "rad"
-    units = _UNITS | {own: quantity.unit for own, quantity in parameters.items()}
-    found = formula.dimension({own: dimension(unit) for own, unit in units.items()})
+    units = _UNITS | {symbol: quantity.unit for symbol, quantity in parameters.items()}
+    found = formula.dimension({symbol: dimension(unit) for symbol, unit in units.items()})
     if found != dimension(expected):
         what = f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})"
         raise TunnelError(what, remedy="correct the expression or the units of its parameters")
-    unused = [own for own in parameters if own not in formula.names]
+    unused = [symbol for symbol in parameters if symbol not in formula.names]
     if unused:
         raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
     # refused where it acts at its null, does nothing beyond it or has no value somewhere
@@ -172,11 +172,11 @@ def expression_effect(
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
     fields = []
-    for own, q in parameters.items():
+    for symbol, q in parameters.items():
         field = parameter(
-            own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
+            symbol, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
         )
-        fields.append((own, float, field))
+        fields.append((symbol, float, field))
     first, *others = parameters.values()
     namespace: dict[str, Any] = {
         "name": name,

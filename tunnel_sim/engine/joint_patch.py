@@ -268,10 +268,10 @@ def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
     """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
-    own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
+    spring = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
-    total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
-    total -= (1.0 - weight) * own(offset)  # the spring carries the weight
+    total = spring(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
+    total -= (1.0 - weight) * spring(offset)  # the spring carries the weight
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
     if not total.degree():
         moment, own_actuator = -float(total.coef[0]), model.law.actuator
@@ -293,7 +293,7 @@ def _write_spring(
     if real.size == 0:
         remedy = "add a spring to the joint"
         raise TunnelError("the patched model would have no rest position", remedy=remedy)
-    usual = -offset if np.any(own.coef) else 0.0
+    usual = -offset if np.any(spring.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
     joint = spec.joint(model.joint)

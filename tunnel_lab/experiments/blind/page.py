@@ -140,10 +140,10 @@ _OF_SCATTER = {
 
 def _scatter_sections(score: Score) -> list[ScoreSection]:
     """Findings on the scatter between runs; empty where there are none."""
-    found = score.scatter()
-    if found is None:
+    scatter = score.scatter()
+    if scatter is None:
         return []
-    shares = ((text, getattr(found, name)) for name, text in _OF_SCATTER.items())
+    shares = ((text, getattr(scatter, name)) for name, text in _OF_SCATTER.items())
     return [
         _section(
             "Scatter between runs",
@@ -167,7 +167,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
                     *map(_brief, (one.named, one.false, one.within)),
                     _brief(one.covered),
                 )
-                for one in found.by_number
+                for one in scatter.by_number
                 if any(share.total for share in (one.named, one.false, one.within, one.covered))
             ),
         ),
