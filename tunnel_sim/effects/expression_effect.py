@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tunnel_sim.effects.base import Channel, Condition, Drawn, Effect
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
+from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, shown

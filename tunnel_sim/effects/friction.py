@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect, Text
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable

@@ -12,7 +12,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, TypeVar, cast, get_args
 
-from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
+from tunnel_sim.effects.base import Effect, make_effect
+from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
 from tunnel_sim.vocabulary.units import dimension
 
