@@ -31,7 +31,7 @@ from tests.support.diagnosis_document import (
     document,
     scattering_document,
 )
-from tests.support.shown_numbers import all_blocks, assert_known, assert_shows
+from tests.support.shown_numbers import all_blocks, assert_known, assert_shows, assert_units
 from tunnel_lab.report.figures import candidates_figure
 
 Document = dict[str, Any]
@@ -64,15 +64,8 @@ def answer(given: Document) -> Answer:
 
 
 def test_every_number_of_a_table_has_a_unit_and_an_estimate_its_uncertainty(answer: Answer) -> None:
-    """A bare number is under a heading with a unit; p and a version have none."""
     for table in (block for blocks in answer.values() for block in blocks if isinstance(block, Table)):
-        for heading, *cells in zip(table.columns, *table.rows, strict=True):
-            bare = [cell for cell in cells if re.fullmatch(r"[-+−]?[\d.]+(e[-+]?\d+)?( ± [\d.]+)?", cell)]
-            labelled = all("[" in first for first, *_ in table.rows)
-            assert not bare or labelled or "[" in heading or heading in ("p", "version"), (heading, bare)
-            if heading in ("parameters", "estimate", "nominal model", "with the causes"):
-                for line in (line for cell in cells for line in cell.split("\n") if line):
-                    assert re.search(r"±|\(fixed\)", line), (heading, line)
+        assert_units(table)
 
 
 def test_the_head_of_the_page(given: Document) -> None:

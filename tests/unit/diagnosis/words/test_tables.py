@@ -27,11 +27,11 @@ from diagnosis.words.tables import (
 from diagnosis.words.verdict import rival_lines, run_words
 from identification.blocks import Paragraph, Table
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
-from identification.printing import coefficients_table, status_lines, windows_table
+from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs
 from identification.status import Status
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
-from tests.support.shown_numbers import assert_shows
+from tests.support.shown_numbers import assert_shows, assert_units
 from tunnel_lab.commands.demo import truth_table
 from tunnel_lab.report.page import render_report
 
@@ -299,6 +299,15 @@ def test_coefficients_of_an_estimate() -> None:
     for cells, value in zip(rows(coefficients_table(found.to_json_dict())), named, strict=True):
         assert value is not None
         assert_shows(cells[1], [value.value, value.std])
+
+
+def test_every_number_of_an_estimate_has_a_unit() -> None:
+    conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign().runs}
+    blocks = estimate_blocks(estimate().to_json_dict(), conditions, windows=True)
+    shown = [block for block in blocks if isinstance(block, Table)]
+    assert len(shown) == 2 + len(IDS)
+    for table in shown:
+        assert_units(table)
 
 
 def test_errors_against_the_truth() -> None:
