@@ -84,14 +84,14 @@ def identify(
         refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
     refuse_several_gains([run.drive for run in campaign.runs], campaign.name)
     examined = examine(campaign).accepted()
-    left = examined.campaign
+    remaining = examined.campaign
     with shown_by(progress):
         found = (
-            checked_return(chosen.estimate(left), chosen.name, left)
-            if left.runs
+            checked_return(chosen.estimate(remaining), chosen.name, remaining)
+            if remaining.runs
             else Estimate(campaign.name, chosen.name, ())
         )
-    found = widened_by_contradictions(found, left, examined.remarks)
+    found = widened_by_contradictions(found, remaining, examined.remarks)
     estimate = as_angles(found, campaign.sensor)
     if examined.remarks:  # the estimate includes them, and every run of the campaign, in its order
         of_runs = {run.id: run for run in estimate.runs}
@@ -109,12 +109,12 @@ def identify(
             remarks=(*examined.remarks, *estimate.remarks),
         )
     contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # it names the springs
-    if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
+    if not contradicted and (pair := pair_remark(remaining, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     estimate = replace(
         estimate,
         remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks),
-        trade_off=of_coefficients(estimate.parameters, estimate.covariance_matrix, left),
+        trade_off=of_coefficients(estimate.parameters, estimate.covariance_matrix, remaining),
     )
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")

@@ -1,7 +1,7 @@
 """Results as headings, paragraphs, tables, lists and figures, and the back ends that show these blocks.
 
 A result is turned into blocks once, for every face: `as_text` serves ``print``, `as_notebook` notebooks, `as_html`
-the report and the bench, and ``tunnel_lab.terminal.outputs.show`` a terminal.
+the report and the bench, and ``tunnel_lab.terminal.outputs.show`` terminals.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Table:
         right: headings of the right-aligned columns.
         names: headings of the columns of names such as ``coulomb_friction``, which a page shows as words.
         detail: headings of the columns that only a page has room for.
-        ruled: whether a line parts the rows in a terminal.
+        groups: the group of each row; in a terminal a line separates groups. Empty: one group.
     """
 
     title: str
@@ -89,7 +89,7 @@ class Table:
     right: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
-    ruled: bool = False
+    groups: tuple[object, ...] = ()
 
     def without_detail(self) -> Table:
         """The table without the columns of a page."""

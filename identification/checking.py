@@ -19,6 +19,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, own_traceback, raised_line
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from typing import Any
@@ -181,8 +182,10 @@ def _compare(subject: _Subject, name: str, quantity: Quantity | None, truth: flo
     if quantity is None:
         return
     if abs(quantity.value - truth) > _FAR * abs(truth) + _DEVIATIONS * quantity.std:
-        what = f"{name} is {quantity.value:.4g} ± {quantity.std:.2g} {quantity.unit}, and the truth is {truth:.4g}"
-        raise subject.refuse(what, f"check that it is in {quantity.unit} and has its sign")
+        value = f"{quantity.value:.4g} ± {quantity.std:.2g}{beside(quantity.unit)}"
+        what = f"{name} is {value}, and the truth is {truth:.4g}"
+        right = " and ".join(filter(None, (beside(quantity.unit, "is in "), "has its sign")))
+        raise subject.refuse(what, f"check that it {right}")
 
 
 def _check_same_runs(subject: _Subject) -> None:

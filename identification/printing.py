@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification.blocks import Block, Paragraph, Table
@@ -203,11 +203,14 @@ SHOWN_RUNS = 16
 """At most this many runs are listed."""
 
 
-def estimate_blocks(document: Document, conditions: Conditions | None = None) -> tuple[Block, ...]:
+def estimate_blocks(
+    document: Document, conditions: Conditions | None = None, *, windows: bool = False
+) -> tuple[Block, ...]:
     """An estimate: the coefficients, the runs, the scatter between them, and a paragraph for each note.
 
     Args:
         conditions: of the runs, which are then all listed; without them, the first `SHOWN_RUNS` runs.
+        windows: whether a table for each run has its windows.
     """
     count = len(document["runs"]) - SHOWN_RUNS
     more = (
@@ -217,6 +220,7 @@ def estimate_blocks(document: Document, conditions: Conditions | None = None) ->
     return (
         coefficients_table(document),
         shown,
+        *(map(windows_table, document["runs"]) if windows else ()),
         Paragraph(more),
         Paragraph(BRACKETS if shown.rows else ""),
         *(Paragraph(line) for line in notes(document)),
@@ -288,9 +292,9 @@ def repeatability_lines(document: Document) -> list[str]:
     """
     if "repeatability" not in document:  # from an earlier version
         return []
-    found, coefficients = document["repeatability"], document["parameters"]
+    scatter, coefficients = document["repeatability"], document["parameters"]
     shown = [run for run in document["runs"] if run["omega_n"] is not None]
-    if found is None:
+    if scatter is None:
         if not coefficients or 2 * len(shown) > len(coefficients):
             return []
         return [
@@ -299,11 +303,11 @@ def repeatability_lines(document: Document) -> list[str]:
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():
-        width = found[name]
+        width = scatter[name]
         if width is None:
             continue
         size = f"{words} by {percent(width['value'])}"
-        if name in found["stated"]:
+        if name in scatter["stated"]:
             stated.append(size)
         else:
             low, high = width["interval"]
@@ -313,7 +317,9 @@ def repeatability_lines(document: Document) -> list[str]:
     if seen:
         ways.append(f"as if by chance, {', '.join(seen)}")
         told = "; tunnel diagnose tells chance from a cause"
-    differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
+    differs = (
+        f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
+    )
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
         f"it{told}."
@@ -393,6 +399,45 @@ def windows_table(run: Document) -> Table:
     )
     heads = ("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]")
     return Table(f"{run['id']}: windows of {counted(cycles, 'cycle')}", heads, rows, right=heads[:2])
+
+
+def budget_blocks(document: Document) -> tuple[Block, ...]:
+    """The uncertainty budget of an estimate: its sources, the dominant one of each quantity, and their notes.
+
+    A negative value in the table is the reduction by a correlation. Quantities are in their units.
+
+    Args:
+        document: of an estimate, with its ``budget``.
+    """
+    budget = document["budget"]
+    components, combined = budget["components"], budget["combined_std"]
+    names = [name for name in SYMBOLS if name in combined]
+    headings = tuple(f"{SYMBOLS[name]}\n{unit(document[name]['unit'])}" for name in names)
+    rows = [(part["name"], *(_budget_cell(part, name) for name in names)) for part in components]
+    rows.append(("all together", *(significant(combined[name], 2) for name in names)))
+    title = "Uncertainty budget: one standard uncertainty each"
+    return (
+        Table(title, ("source", *headings), tuple(rows), right=headings),
+        *(Paragraph(_dominant(components, name)) for name in names),
+        *(Paragraph(f"{part['name']}: {part['note']}") for part in components if part["note"]),
+    )
+
+
+def _budget_cell(component: Document, name: str) -> str:
+    variance = float(component["variance"][name])
+    if variance == 0.0:
+        return "0" if component["known"] else "–"
+    return f"{'−' if variance < 0.0 else ''}{significant(math.sqrt(abs(variance)), 2)}"
+
+
+def _dominant(components: Sequence[Document], name: str) -> str:
+    """The largest source of a quantity; it dominates if it exceeds all others together."""
+    variances = [float(component["variance"][name]) for component in components]
+    largest, total = max(variances), sum(variances)
+    share = largest / total if total > 0.0 else 0.0
+    verb = "dominates" if share > 0.5 else "is the largest source"
+    source = components[variances.index(largest)]["name"]
+    return f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance"
 
 
 def status_lines(document: Document) -> list[str]:

@@ -71,17 +71,17 @@ def checked_return(found: object, name: str, campaign: Campaign, of: str = "") -
     raise WrongReturn(what, where=f"estimator {name}", remedy=f"{remedy}{more}")
 
 
-def _fault(found: Estimate, campaign: Campaign, of: str) -> Fault | None:
+def _fault(estimate: Estimate, campaign: Campaign, of: str) -> Fault | None:
     """The first fault of an answer; None where there is none."""
-    if not isinstance(found.runs, tuple):
-        return f"the runs with {of} are {_described(found.runs)}", "give a tuple of RunEstimate"
-    given, wanted = [getattr(run, "id", None) for run in found.runs], [run.id for run in campaign.runs]
-    if given != wanted or not all(isinstance(run, RunEstimate) for run in found.runs):
+    if not isinstance(estimate.runs, tuple):
+        return f"the runs with {of} are {_described(estimate.runs)}", "give a tuple of RunEstimate"
+    given, wanted = [getattr(run, "id", None) for run in estimate.runs], [run.id for run in campaign.runs]
+    if given != wanted or not all(isinstance(run, RunEstimate) for run in estimate.runs):
         what = f"returns the runs {given} with {of}, and not {wanted}"
         return what, "give a RunEstimate for each run, in the campaign's order"
     owners: list[tuple[Estimate | RunEstimate, Mapping[str, str], str, str]] = [
-        (found, CAMPAIGN_UNITS, f"with {of}", f"the campaign with {of}"),
-        *((run, RUN_UNITS, f"of run {run.id} with {of}", f"run {run.id} with {of}") for run in found.runs),
+        (estimate, CAMPAIGN_UNITS, f"with {of}", f"the campaign with {of}"),
+        *((run, RUN_UNITS, f"of run {run.id} with {of}", f"run {run.id} with {of}") for run in estimate.runs),
     ]
     for owner, units, at, whose in owners:
         for quantity, unit in units.items():
@@ -92,7 +92,7 @@ def _fault(found: Estimate, campaign: Campaign, of: str) -> Fault | None:
         known = isinstance(statuses, tuple) and all(isinstance(one, Status) for one in statuses)
         if not (known and statuses):
             return f"the statuses of {whose} are {statuses!r}", "give a tuple of identification.Status"
-    return _fault_of_covariance(found, of) or _fault_as_json(found, of)
+    return _fault_of_covariance(estimate, of) or _fault_as_json(estimate, of)
 
 
 def _fault_of_quantity(name: str, quantity: object, unit: str, of: str) -> Fault | None:
@@ -133,10 +133,10 @@ def _described(value: object) -> str:
     return "None" if value is None else f"{type(value).__name__} {one_line(repr(value), 60)}"
 
 
-def _fault_of_covariance(found: Estimate, of: str) -> Fault | None:
+def _fault_of_covariance(estimate: Estimate, of: str) -> Fault | None:
     """The first fault of the covariance of the coefficients; None where there is none."""
-    given = tuple(name for name in PARAMETERS if getattr(found, name) is not None)
-    names, rows = found.parameters, found.covariance
+    given = tuple(name for name in PARAMETERS if getattr(estimate, name) is not None)
+    names, rows = estimate.parameters, estimate.covariance
     if not isinstance(names, tuple) or sorted(map(str, names)) != sorted(given):
         what = f"gives {', '.join(given) or 'no coefficient'} with {of}, and parameters is {names!r}"
         return what, "name the coefficients in a tuple as parameters, in the order of the covariance"
@@ -151,10 +151,10 @@ def _fault_of_covariance(found: Estimate, of: str) -> Fault | None:
     strange = next((one for row in rows for one in row if not _is_number(one)), 0.0)
     if not _is_number(strange):
         return f"the covariance with {of} holds {_described(strange)}", "give numbers"
-    matrix = found.covariance_matrix
+    matrix = estimate.covariance_matrix
     if not np.isfinite(matrix).all():
         return f"the covariance with {of} contains NaN or an infinity", "give finite numbers"
-    stds = np.array([getattr(found, name).std for name in names])
+    stds = np.array([getattr(estimate, name).std for name in names])
     return _fault_of_variances(matrix, stds, names, of) or _fault_of_correlations(matrix, stds, of)
 
 

@@ -34,7 +34,7 @@ def run_logged(log: Path, words: Sequence[str]) -> int:
     now = datetime.now().astimezone().isoformat(timespec="seconds")
     print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()}, started {now})", flush=True)
     from tunnel_lab.cli import main  # after the first line: the bench waits for it
-    from tunnel_lab.terminal.outputs import print_sets
+    from tunnel_lab.terminal.progress import print_sets
 
     print_sets(_SETS_EVERY_S)
     sys.argv[1:] = words

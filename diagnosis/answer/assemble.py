@@ -41,24 +41,24 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     The place follows from the residuals alone. The causes only have to agree with it.
     """
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
-    found = place.survey
+    survey = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
-    maps = found.maps
+    maps = survey.maps
     if answer is not None:
         both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
         friction = friction_curve(answer, study.similarity) if study.causes else None
-        maps = replace(with_answer(found, study.campaign, *both), friction=friction)
+        maps = replace(with_answer(survey, study.campaign, *both), friction=friction)
     if not study.causes:
-        return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
+        return Where(None, None), maps, nowhere(survey, within_step=study.gap.test.within_step)
     compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
     where = Where(
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, chosen.interval_share, chosen)
-        or found.maps.time.interval(chosen.interval_share),
-        amplitude_rad=found.maps.amplitude.interval(chosen.interval_share),
-        frequency_hz=found.frequency_interval,
+        time_s=blow_interval(survey, chosen.interval_share, chosen)
+        or survey.maps.time.interval(chosen.interval_share),
+        amplitude_rad=survey.maps.amplitude.interval(chosen.interval_share),
+        frequency_hz=survey.frequency_interval,
     )
     return where, maps, described(where, place, [effect_class(name) for name in compared], study.settings)
 

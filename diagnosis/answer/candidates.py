@@ -45,7 +45,7 @@ def meant_parameter(
     return _limited(found, min(uniform, size))
 
 
-def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
+def meant_coefficient(estimate: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
     """A coefficient, its standard deviation omitted where it is meaningless.
 
     Args:
@@ -56,11 +56,11 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
         coefficient whose moment is that of the stiffness or of the critical damping in the fastest wind.
     """
     if name == "omega_n":
-        return _limited(found, abs(found.value))
+        return _limited(estimate, abs(estimate.value))
     if name == "zeta":
-        return _limited(found, 1.0)
+        return _limited(estimate, 1.0)
     if not name.startswith("cn_"):
-        return found
+        return estimate
     data, greatest = fit.problem.data, math.inf
     for index, run in enumerate(data.runs):
         if run.wind_on:
@@ -72,7 +72,7 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
                 critical = 2.0 * math.sqrt(inertia * abs(stiffness))
                 own = critical * run.wind_speed / (pressure * data.reference_length)
             greatest = min(greatest, own)
-    return _limited(found, greatest)
+    return _limited(estimate, greatest)
 
 
 def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
@@ -98,26 +98,26 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
             Candidate("none", 1.0 - rate, excess, 0.0),
             Candidate("unknown", rate, excess, 0.0),
         )
-    found = []
+    answers = []
     before = max(study.nominal.excess, 1e-9)
     for answer in study.answers:
         if answer.effects == UNKNOWN:
-            found.append(Candidate("unknown", answer.probability, before / block, 0.0))
+            answers.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
         name = " + ".join(sorted({*study.beside, *answer.effects}))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
-        found.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
+        answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
     if not study.answers:
         whole = excess + base.hum + base.extra
         closed = float(np.clip(1.0 - max(excess, 0.0) / max(whole, 1e-9), 0.0, 1.0))
         name = " + ".join(study.read_off)
         even = study.settings.weighing.even_share
-        found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
-        found.append(Candidate("unknown", even, whole, 0.0))
+        answers.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
+        answers.append(Candidate("unknown", even, whole, 0.0))
     none = 0.0 if study.beside else min(study.gap.test.p_value, rate)
-    found.append(Candidate("none", none, before / block, 0.0))
-    total = sum(candidate.probability for candidate in found)
-    first, *others = (replace(c, probability=c.probability / total) for c in found)
+    answers.append(Candidate("none", none, before / block, 0.0))
+    total = sum(candidate.probability for candidate in answers)
+    first, *others = (replace(c, probability=c.probability / total) for c in answers)
     return (first, *sorted(others, key=lambda c: -c.probability))
 
 
@@ -137,15 +137,15 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
 
 def _parameters(study: Study, answer: Answer | None = None) -> dict[str, ParameterEstimate]:
     """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect."""
-    found: dict[str, ParameterEstimate] = {}
+    estimates: dict[str, ParameterEstimate] = {}
     prepared, hum = study.prepared, study.prepared.hum
     if hum is not None:
         amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
-        found[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
-        found[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
+        estimates[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
+        estimates[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
     if prepared.coarse:
         step = f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"
-        found[step] = ParameterEstimate(prepared.step, None, "rad")
+        estimates[step] = ParameterEstimate(prepared.step, None, "rad")
     random = None if answer is None else answer.random
     stated = None if answer is None else answer.stated
     hypothesis = stated if random is None else random.beside
@@ -158,13 +158,13 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
             undetermined = study.settings.answer.undetermined_from
-            found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
+            estimates[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for one in problem.scatter:
             if one.shown:
                 spread = one.kind.parameters()[0]
-                found[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
+                estimates[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
         for name, value in problem.fixed:
-            found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
+            estimates[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
         seconds = random.process.interval * sum(i.size for i in random.process.innovations)
         data = study.nominal.problem.data
@@ -180,18 +180,18 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
                 size = float(np.sqrt(2.0)) * intensity
                 speeds = [run.wind_speed for run in data.runs if run.wind_on]
                 reduced = float(np.sqrt(np.mean(np.square(speeds)))) / data.width  # Hz
-                found[severity] = ParameterEstimate(size, size * relative, "1")
-                found[place] = ParameterEstimate(
+                estimates[severity] = ParameterEstimate(size, size * relative, "1")
+                estimates[place] = ParameterEstimate(
                     part.strouhal_number, part.bandwidth / reduced * relative, "1"
                 )
             else:
                 # a corner above the rig's frequencies looks white: only size over square root is known there
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-                found[severity] = ParameterEstimate(
+                estimates[severity] = ParameterEstimate(
                     intensity, intensity * relative, kind.parameters()[0].unit
                 )
-                found[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
-    own = own_parameters(found, study.campaign, study.similarity, study.model)
+                estimates[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
+    own = own_parameters(estimates, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
 
@@ -214,20 +214,19 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     if not data.model.restored:
         return ()
     problem = replace(fit.problem, data=data)
-    own, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing
+    reading_unit, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing
     sizes = []
     for kind, effect in zip(problem.effects, problem.effects_at(fit.point.common), strict=True):
         severity = f"{kind.name}.{kind.parameters()[0].name}"
         if kind.driven or severity not in problem.names:
             continue
-        runs = range(len(data.runs))
-        windy = [i for i in runs if data.runs[i].wind_on] if kind.condition == "wind_on" else []
+        acts = [i for i, run in enumerate(data.runs) if kind.acts(wind_on=run.wind_on)]
         release, without = fit.point.release.copy(), fit.point.common.copy()
         release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0
         both = problem.predict([Point(fit.point.common, release), Point(without, release)])
         # only some runs show a cause in one spring or one wind
-        shown = [i for i in windy or runs if not np.array_equal(both[0][i], both[1][i])]
+        shown = [i for i in acts or range(len(data.runs)) if not np.array_equal(both[0][i], both[1][i])]
         if not shown:
             continue
         # the softest spring, on which a moment acts most
@@ -245,8 +244,8 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
             damping_ratio=decay[1],
             damping_ratio_without=decay_without[1],
             frequency_change=decay[0] / decay_without[0] - 1.0,
-            zero_change=own * (decay[2] - decay_without[2]),
-            reading_change=own * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
+            zero_change=reading_unit * (decay[2] - decay_without[2]),
+            reading_change=reading_unit * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
             stands=effect.stands(linear_coefficients(fit, index)[2]),
         )
         sizes.append(size)

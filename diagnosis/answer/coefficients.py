@@ -130,11 +130,11 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     chosen = study.stated
     even = study.settings.weighing.even_share / max(len(study.answers), 1)
     least = study.settings.answer.small_causes_from
-    others, own, unknown = [], 1.0, 0.0
+    others, probability_of_answer, unknown = [], 1.0, 0.0
     for place, answer in enumerate(study.answers):
         probability, fit = max(answer.probability - even, 0.0), answer.fit(study.nominal)
         if place == 0:
-            own = probability
+            probability_of_answer = probability
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
@@ -142,11 +142,11 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
             share, alternatives = _by_choice(answer, fit, probability, kinds)
             others += [Possible(probability * share, fit, answer.textbook_of(fit), small), *alternatives]
     answer = study.answer or Answer((), 1.0, 1.0)
-    share, alternatives = _by_choice(answer, chosen, own, kinds)
+    share, alternatives = _by_choice(answer, chosen, probability_of_answer, kinds)
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
     hidden = hidden_effects(chosen, starts, None if small is None else small.left)
-    first = Possible(own * share, chosen, answer.textbook_of(chosen), small)
+    first = Possible(probability_of_answer * share, chosen, answer.textbook_of(chosen), small)
     return Answers((first, *alternatives, *others), unknown, study.nominal, hidden)
 
 
@@ -191,7 +191,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         (`interval_beside`). No standard deviation is given at a bound, or where the runs do not determine the
         coefficient.
     """
-    fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
+    fit, estimates, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
             continue  # fixed
@@ -220,10 +220,10 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         }
         between = float(probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each])
         shares["rivals"] = shares.get("rivals", 0.0) + between
-        found[name] = _estimate(fit, name, whole.mean, whole.std, shares)
-        if found[name].std is not None:
-            found[name] = replace(found[name], interval=interval_beside(whole, chosen))
-    return found
+        estimates[name] = _estimate(fit, name, whole.mean, whole.std, shares)
+        if estimates[name].std is not None:
+            estimates[name] = replace(estimates[name], interval=interval_beside(whole, chosen))
+    return estimates
 
 
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
@@ -278,9 +278,9 @@ def _of_answer(
         return None
     small = alone(fit) if answer.small is None else answer.small
     place = coefficients_of(fit).index(name)
-    left = float(small.scatter[place])
+    misfit = float(small.scatter[place])
     if answer.small is not None:
-        left = max(left, coefficient_move(replace(fit, residuals=small.left), name))
+        misfit = max(misfit, coefficient_move(replace(fit, residuals=small.left), name))
     rounding = unseen = 0.0
     if name.startswith("cn_"):
         for run in campaign.runs:
@@ -295,7 +295,7 @@ def _of_answer(
     form_std = fit.settings.answer.freed_form_std
     unfreed = None if answer.textbook is None else _value(answer.textbook, name)
     common = {
-        "misfit": left**2,
+        "misfit": misfit**2,
         "hidden effects": hidden**2,
         "air density": (value * rounding) ** 2,
         "unseen form": unseen**2,

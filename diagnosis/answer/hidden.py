@@ -55,7 +55,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     beyond = max(total - fit.count - chosen.dispersion_stds * np.sqrt(2.0 * fit.count), 0.0)
     reach = chosen.hidden_stds**2 * (1.0 + beyond / chosen.misfit_degrees)
     names, influence = coefficients_of(fit), influences(fit)
-    found, units = [], fit.problem.data.model.coefficient_units
+    hidden, units = [], fit.problem.data.model.coefficient_units
     for kind, points in starts:
         sizes: list[_Size] = []
         with suppress(np.linalg.LinAlgError):
@@ -71,8 +71,8 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
                 for name, move in zip(names, largest.moves, strict=True)
             }
             stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one in sizes) / reach))
-            found.append(Hidden(kind.name, severity.name, size, moves, stds))
-    return tuple(found)
+            hidden.append(Hidden(kind.name, severity.name, size, moves, stds))
+    return tuple(hidden)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,26 +41,26 @@ def cautions(
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
-    found, chosen = [], settings.words
+    facts, chosen = [], settings.words
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
-        found.append(Fact("one spring assumed"))
-    found += noise.cautions(chosen.noise_contradicted)
+        facts.append(Fact("one spring assumed"))
+    facts += noise.cautions(chosen.noise_contradicted)
     if confirmation.failure:
-        found.append(Fact("not followed", {"failure": confirmation.failure}))
+        facts.append(Fact("not followed", {"failure": confirmation.failure}))
     elif not confirmation.agrees:
         figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
         beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
-        found.append(Fact("not confirmed", figures | beside))
+        facts.append(Fact("not confirmed", figures | beside))
     windy = any(run.wind_on for run in campaign.runs)
     if len(campaign.runs) < chosen.runs_without_caution:
         kind = {"driven": campaign.driven, "windy": windy}
-        found.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
+        facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
-        found.append(Fact("none held out", {"windy": windy}))
+        facts.append(Fact("none held out", {"windy": windy}))
     elif named and fitted:
-        found.append(Fact("some not held out", {"runs": fitted}))
-    return tuple(found)
+        facts.append(Fact("some not held out", {"runs": fitted}))
+    return tuple(facts)
 
 
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:

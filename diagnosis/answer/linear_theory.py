@@ -204,35 +204,35 @@ def beside(fit: Fit, starts: Starts) -> Beside:
             causes += [] if cause is None else [cause]
     if not causes:
         return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
-    left = np.array([cause.left for cause in causes])
-    gram, score = left @ left.T, left @ residuals
+    changes = np.array([cause.left for cause in causes])
+    gram, score = changes @ changes.T, changes @ residuals
     formal = _formal(fit, gradients)
     zero = np.zeros(formal.size)
-    found = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
+    steps_taken = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
     tried = np.argsort(-(score**2) / np.maximum(np.diag(gram), 1e-300), kind="stable")[
         : settings.small_causes_tried
     ].tolist()
     sizes = range(1, settings.small_causes + 1)
     sets = [list(chosen) for size in sizes for chosen in combinations(tried, size)]
     steps = (_step(gram, score, causes, chosen, settings.small_form_std) for chosen in sets)
-    found += [step for step in steps if step is not None]
-    excess = fit.total - fit.count - np.array([step.drop for step in found])
-    price = settings.small_cause_price * np.array([np.count_nonzero(step.sizes) for step in found])
+    steps_taken += [step for step in steps if step is not None]
+    excess = fit.total - fit.count - np.array([step.drop for step in steps_taken])
+    price = settings.small_cause_price * np.array([np.count_nonzero(step.sizes) for step in steps_taken])
     best = float(excess[np.argmin(excess + price)])
     beyond = max(best - settings.dispersion_stds * math.sqrt(2.0 * fit.count), 0.0)
     odds = -0.5 * (excess / (1.0 + beyond / settings.misfit_degrees) + price)
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
     taken = np.split(
-        (weights @ np.array([step.sizes for step in found])) @ left,
+        (weights @ np.array([step.sizes for step in steps_taken])) @ changes,
         np.cumsum([residual.size for residual in fit.residuals])[:-1],
     )
     remaining = [residual - part for residual, part in zip(fit.residuals, taken, strict=True)]
     return Beside(
         weights,
-        np.array([step.moves for step in found]),
-        np.array([formal + step.noise for step in found]),
-        np.array([step.forms for step in found]),
+        np.array([step.moves for step in steps_taken]),
+        np.array([formal + step.noise for step in steps_taken]),
+        np.array([step.forms for step in steps_taken]),
         remaining,
         _scatter(fit, influence, remaining),
     )

@@ -43,7 +43,7 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
         than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first
         half or its first quarter. A motion that decays before it reverses is not a mode. Driven runs are left out.
     """
-    found = []
+    modes = []
     for run in campaign.runs:
         frequency = starting_frequency(run.record) if run.drive is None else None
         if frequency is None:
@@ -69,9 +69,9 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
             main, second = (
                 Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
             )
-            found.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
+            modes.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
             break
-    return tuple(found)
+    return tuple(modes)
 
 
 def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:

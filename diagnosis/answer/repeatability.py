@@ -112,7 +112,7 @@ class _Runs:
         found = marginal(self.products, middle).deviations
         spreads = []
         for k, one in enumerate(scatter):
-            acts = [run.wind_on or one.kind.condition == "always" for run in data.runs]
+            acts = [one.kind.acts(wind_on=run.wind_on) for run in data.runs]
             own = {run.id: float(e) for run, e, a in zip(data.runs, found[:, k], acts, strict=True) if a}
             known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
             spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
@@ -132,7 +132,7 @@ class _Runs:
     def _trend(self, place: int, tried: int) -> Trend | None:
         """The drift of one parameter; None where too few runs have it."""
         runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
-        count = sum(run.wind_on or kind.condition == "always" for run in runs)
+        count = sum(kind.acts(wind_on=run.wind_on) for run in runs)
         if count < _FEWEST:
             return None
         columns, size = self.columns.with_drift(place)

@@ -379,11 +379,11 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
                 what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm"
             )
         return drive
-    said = f"actuator {one_line(actuator.name)!r}"
+    named = f"actuator {one_line(actuator.name)!r}"
     if drive.column == "command_rad":
         drive = _as_control(drive, actuator, where)
     if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
-        what = f"drive_gain = {drive.gain:g} is stated, and {said} gives {actuator.gain:g} N m per unit of control"
+        what = f"drive_gain = {drive.gain:g} is stated, and {named} gives {actuator.gain:g} N m per unit of control"
         raise TunnelError(
             what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model"
         )
@@ -395,7 +395,7 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
         slack = _SAME_GAIN * max(abs(low), abs(high))
         far = values[np.argmax(np.maximum(values - high, low - values))]
         if not low - slack <= far <= high + slack:
-            what = f"the {name} of {said} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
+            what = f"the {name} of {named} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
             remedy = (
                 "correct the range or the unit of the input, or leave out the run: clipping is not diagnosed"
             )

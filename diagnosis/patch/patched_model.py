@@ -81,7 +81,7 @@ def found_law(
     """
     data = problem.data
     assert isinstance(data.model, Joint | LooseJoint)
-    law, own = data.model.law, data.similarity.own
+    law, to_own_unit = data.model.law, data.similarity.own
     chain = problem.chain(common, release, data.runs[index])
     physics = condensed(chain.physics(), data)
     zero = problem.zero(common, release)
@@ -139,17 +139,17 @@ def found_law(
     program = _added(program, friction.program)
     differences += friction.differences
     units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
-    k0, k1, k2, k3 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
-    c0, c1, c2 = (own(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
+    k0, k1, k2, k3 = (to_own_unit(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
+    c0, c1, c2 = (to_own_unit(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
     patch = JointPatch(
-        inertia=own(physics.yaw_inertia, "kg m2"),
+        inertia=to_own_unit(physics.yaw_inertia, "kg m2"),
         spring=(k0, k1, k2, k3),
         damping=(c0, c1, c2),
-        friction=own(friction.loss, "N m"),
-        program=_own_program(program, law.rest + data.similarity.rest, own) if program else (),
-        contact=tuple((name, own(value, unit)) for name, value, unit in friction.contact),
+        friction=to_own_unit(friction.loss, "N m"),
+        program=_own_program(program, law.rest + data.similarity.rest, to_own_unit) if program else (),
+        contact=tuple((name, to_own_unit(value, unit)) for name, value, unit in friction.contact),
         actuator=actuator,
-        kp=None if kp is None else own(kp, "N m/rad"),
+        kp=None if kp is None else to_own_unit(kp, "N m/rad"),
         noise=noise,
     )
     return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
@@ -235,10 +235,10 @@ def native_closure(
     fitted: list[Array] = []
     engine: list[Array] = []
     for i in held:
-        common, own = chosen_out.points[runs[i].id]
+        common, start = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        engine.append(_restarted(chosen.problem, common, own, i, simulate, native)[1])
+        engine.append(_restarted(chosen.problem, common, start, i, simulate, native)[1])
     ids = [] if held else [run.id for run in runs if not run.wind_on]
     if ids:
         turns = turns_of(nominal, ids)
@@ -251,8 +251,8 @@ def native_closure(
                 continue
             for i, left in enumerate(out):
                 if left.any():
-                    own = point.release[i]
-                    seen = _restarted(chosen.problem, point.common, own, i, simulate, native, seen=~left)[1]
+                    start = point.release[i]
+                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
                     engine.append(seen[left])
@@ -381,11 +381,11 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     def law(common: Array) -> FoundLaw:
         release = chosen.point.release[still]
-        found = found_law(problem, common, release, noise, still, actuated(common))
+        identified = found_law(problem, common, release, noise, still, actuated(common))
         if given is None:
-            return found
-        steps = inertia_of_steps(given, float(given.dof_damping[0]) + found.patch.damping[0])
-        return replace(found, patch=replace(found.patch, inertia=found.patch.inertia - steps))
+            return identified
+        steps = inertia_of_steps(given, float(given.dof_damping[0]) + identified.patch.damping[0])
+        return replace(identified, patch=replace(identified.patch, inertia=identified.patch.inertia - steps))
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:
@@ -399,9 +399,9 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     native = frozenset[str]() if actuated(chosen.point.common) is None else runs
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
-    found = law(chosen.point.common)
-    differences = found.differences
-    if found.patch.friction > 0.0:
+    identified = law(chosen.point.common)
+    differences = identified.differences
+    if identified.patch.friction > 0.0:
         creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
         differences += (
             Fact("soft friction", {"below_per_s": creep, "unit": "m" if model.law.slide else "rad"}),
@@ -414,7 +414,7 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
         own = [_restarted(problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
-    spec, written = patched(model, found.patch, starts)
+    spec, written = patched(model, identified.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
     return PatchedModel(model, spec, written, differences, zero, closure)

@@ -45,15 +45,15 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
     """
-    similarity, left = study.similarity, study.chosen
+    similarity, fitted = study.similarity, study.chosen
     if not decided:
-        left = with_scatter(study.nominal, study.chosen.problem.scatter)
+        fitted = with_scatter(study.nominal, study.chosen.problem.scatter)
     if not study.causes or not significant or study.random is not None:
         return None
     # a run of few blocks has no row of an eighth of a cycle
-    if left.excess <= 0.0 or any(path.residual.size == 0 for path in paths(left)):
+    if fitted.excess <= 0.0 or any(path.residual.size == 0 for path in paths(fitted)):
         return None
-    unexplained = Unexplained(left)
+    unexplained = Unexplained(fitted)
     windy = any(path.speed > 0.0 for path in unexplained.paths)
     common = {kind: unexplained.common(kind) for kind in COMMON if windy or kind != "wind"}
     line = steady_line(unexplained)
@@ -82,7 +82,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     alike, next_most = _others(kind, ceilings, chosen)
     return Closable(
-        excess=left.excess / left.problem.data.mean_block,
+        excess=fitted.excess / fitted.problem.data.mean_block,
         ceilings=ceilings,
         kind=kind,
         events=where,
@@ -168,14 +168,14 @@ _OVER: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> Curve | None:
+def curve(unexplained: Unexplained, evidence: Evidence, similarity: Similarity) -> Curve | None:
     """The law of a kind without a formula, in the measured campaign's units; None where it has no common law.
 
     It is for the median spring, and for the greatest wind speed if it is of the wind; a moment in time is that at
     the greatest angle, without rate. The part absorbed by the model's own coefficients and its zero is removed.
     """
-    kind = found.ceiling.kind
-    if found.solution is None or kind not in _OVER:
+    kind = evidence.ceiling.kind
+    if evidence.solution is None or kind not in _OVER:
         return None
     r = unexplained.ranges
     count = _MAP if len(_OVER[kind]) > 1 else _POINTS
@@ -193,12 +193,12 @@ def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> 
         "time": np.zeros(size),
     }
     at = Places(**{**still, **grid}, stiffness=r.stiffness, speed=r.speed if kind == "wind" else 0.0)
-    basis, free = COMMON[kind](at, r), found.solution.whole.free
+    basis, free = COMMON[kind](at, r), evidence.solution.whole.free
     line = np.column_stack([np.ones(size), *(grid[name] for name in _OVER[kind] if name != "time")])
     own = np.linalg.qr(line)[0]
     rows = basis - own @ (own.T @ basis)
-    variance = np.einsum("ij,jk,ik->i", rows, found.solution.covariance[free:, free:], rows)
-    values, std = rows @ found.solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
+    variance = np.einsum("ij,jk,ik->i", rows, evidence.solution.covariance[free:, free:], rows)
+    values, std = rows @ evidence.solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
     unit = unexplained.fit.problem.data.model.moment_unit
     if kind in OF_READING:
         values, std, unit = values * r.angle, std * r.angle, "rad"

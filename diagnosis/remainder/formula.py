@@ -84,38 +84,38 @@ def terms(kind: str, r: Ranges) -> list[Term]:
     Their inner parameters are spaced closely enough for a fit to reach the values between. There are no terms for
     kinds that no formula explains.
     """
-    found: list[Term] = []
+    library: list[Term] = []
     if kind in ("angle", "state", "wind"):
-        found += map(Term, _ANGLE)
-        found += _grid(_ANGLE_WIDE, w=_widths(r, 9))
-        found += _grid(_ANGLE_PLACE, c=_places(r))
-        found += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
-        found += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
-        found += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
+        library += map(Term, _ANGLE)
+        library += _grid(_ANGLE_WIDE, w=_widths(r, 9))
+        library += _grid(_ANGLE_PLACE, c=_places(r))
+        library += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
+        library += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
+        library += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
     if kind in ("rate", "state", "wind"):
-        found += map(Term, _RATE)
-        found += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
+        library += map(Term, _RATE)
+        library += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
     if kind in ("state", "wind"):
-        found += map(Term, _STATE)
-        found += _grid(_STATE_WIDE, w=_widths(r))
+        library += map(Term, _STATE)
+        library += _grid(_STATE_WIDE, w=_widths(r))
         places = np.linspace(-0.85, 0.85, 18) * r.angle
-        found += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
+        library += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
     if kind == "time":
-        found += map(Term, _TIME)
-        found += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
-        found += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
+        library += map(Term, _TIME)
+        library += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
+        library += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
         instants = np.linspace(0.04, 0.96, 24) * r.time
-        found += _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
+        library += _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
         often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
-        found += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
+        library += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
     if kind == "reading":
-        found += map(Term, _READING)
-        found += _grid(_READING_PLACE, c=_places(r))
-        found += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
+        library += map(Term, _READING)
+        library += _grid(_READING_PLACE, c=_places(r))
+        library += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
         instants = np.linspace(0.04, 0.96, 47) * r.time
-        found += _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
-        found += _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
-    return found
+        library += _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
+        library += _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
+    return library
 
 
 def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[Term]:
@@ -238,9 +238,9 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
     """
     whole = total(parts)
     c = whole.free
-    own = np.diag(whole.matrix)[c:]
+    power = np.diag(whole.matrix)[c:]
     settings = unexplained.fit.settings.remainder
-    threshold = float(chdtri(1, settings.term_rate / own.size))
+    threshold = float(chdtri(1, settings.term_rate / power.size))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
@@ -251,10 +251,10 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
         width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
         cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / width[:, None]
         solved = np.linalg.pinv(inner / np.outer(width, width), rcond=1e-11, hermitian=True) @ cross
-        left = own - np.sum(cross * solved, axis=0)
+        left = power - np.sum(cross * solved, axis=0)
         along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / width)
         # a term that the others explain to within rounding gains nothing
-        drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
+        drops = np.where(left > 1e-6 * np.maximum(power, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
         order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
         tried = []
         for i in order:

@@ -110,7 +110,7 @@ def sets_with_one_more(
     # alone, a freed form also follows the effects of other causes
     single = [h for h in level if len(h.effects) == 1]
     textbook = [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
-    found: dict[tuple[str, ...], Hypothesis] = {}
+    sets: dict[tuple[str, ...], Hypothesis] = {}
     for parent in (*level, *textbook):
         base = parent.fit
         others = [kind for kind in kinds if kind.name not in parent.effects]
@@ -127,8 +127,8 @@ def sets_with_one_more(
             if best is not None:
                 best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
                 child = Hypothesis((*parent.effects, kind.name), best)
-                found[child.names] = of_more_weight(found.get(child.names), child, gap_left(base))
-    return list(found.values())
+                sets[child.names] = of_more_weight(sets.get(child.names), child, gap_left(base))
+    return list(sets.values())
 
 
 def _worth_fitting(

@@ -63,9 +63,7 @@ class Hypothesis:
         much as gravity does.
         """
         problem = self.fit.problem
-        numbers = self.forms + sum(
-            len(kind.own_numbers(problem.instants)) for kind in problem.effects if kind.skips
-        )
+        numbers = self.forms + sum(kind.numbers_like_forms(problem.instants) for kind in problem.effects)
         spring = self.fit.fitted_spring
         if spring is not None:
             needless = self.fit.settings.weighing.needless_spring * linear_coefficients(self.fit, 0)[2]
@@ -83,8 +81,7 @@ class Hypothesis:
         for kind in problem.effects:
             count = len(kind.own_numbers(problem.instants)) * len(problem.data.runs)
             if count:
-                channel = "frequency" if kind.skips else "harmonics"
-                found[CHANNELS.index(channel)] += gain * count
+                found[CHANNELS.index(kind.gains_in())] += gain * count
         return found
 
     @cached_property
@@ -294,15 +291,9 @@ def with_forms(
 
 def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
     """All combinations of one form of every effect that the runs can show; a form that is free already is kept."""
-    free = fitted.problem.free_forms
-    loaded = fitted.problem.carries_load
-    of_load = {(kind, i.name) for kind in fitted.problem.effects for i in kind.parameters() if i.of_load}
+    free, load_varies = fitted.problem.free_forms, fitted.problem.carries_load
     by_effect = [
-        [
-            tuple(f"{kind.name}.{name}" for name in form)
-            for form in kind.forms()
-            if loaded or not any((kind, name) in of_load for name in form)
-        ]
+        [tuple(f"{kind.name}.{name}" for name in form) for form in kind.shown_forms(load_varies=load_varies)]
         for kind in fitted.problem.effects
     ]
     by_effect = [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
@@ -371,13 +362,7 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
         return None
     freed = dataclasses.replace(problem, free_forms=tuple(name for form in forms for name in form))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
-    # a form starts at the textbook value, or half a step inside a bound, where its slope may vanish
-    defaults = {
-        f"{k.name}.{i.name}": i.default + 0.5 * i.scale if i.default == i.lower else i.default
-        for k in problem.effects
-        for i in k.parameters()
-        if i.form
-    }
+    defaults = {f"{k.name}.{i.name}": i.form_start for k in problem.effects for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):

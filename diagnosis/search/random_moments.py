@@ -417,7 +417,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
-        if not (kind.skips or kind.line):
+        if not kind.own_numbers(1):
             continue
         others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
         start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)

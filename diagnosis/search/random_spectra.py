@@ -16,7 +16,7 @@ import numpy as np
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.base import Condition
+from tunnel_sim.effects.traits import Condition
 
 LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
 _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3

@@ -34,9 +34,13 @@ _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit h
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
     """The differences that the runs could show: at least three runs have the quantity, and a spring."""
-    runs = {"always": len(data.runs), "wind_on": sum(run.wind_on for run in data.runs)}
-    held = data.model.restored
-    return tuple(kind for kind in kinds if kind.scatters and held and runs[kind.condition] >= _FEWEST)
+    if not data.model.restored:
+        return ()
+    return tuple(
+        kind
+        for kind in kinds
+        if kind.scatters and sum(kind.acts(wind_on=run.wind_on) for run in data.runs) >= _FEWEST
+    )
 
 
 def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:

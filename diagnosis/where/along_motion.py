@@ -59,7 +59,7 @@ class Backbone:
 
 def backbones(fit: Fit) -> list[Backbone]:
     """The backbone of every run, by a fit of the nominal model, in the measured rig's units."""
-    found = []
+    curves = []
     seconds, hertz = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz"))
     for index, run in enumerate(fit.problem.data.runs):
         inertia, damping, stiffness = linear_coefficients(fit, index)
@@ -68,7 +68,7 @@ def backbones(fit: Fit) -> list[Backbone]:
         nominal = decay.omega_n / (2.0 * np.pi) * hertz, decay.zeta
         if run.drive is not None:
             none = np.zeros(0)
-            found.append(Backbone(run.id, none, none, none, none, none, none, *nominal))
+            curves.append(Backbone(run.id, none, none, none, none, none, none, *nominal))
             continue
         std = float(run.noise_at(resonance(fit, index)))
         reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
@@ -91,8 +91,8 @@ def backbones(fit: Fit) -> list[Backbone]:
             *nominal,
             *alone,
         )
-        found.append(backbone)
-    return found
+        curves.append(backbone)
+    return curves
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:

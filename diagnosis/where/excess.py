@@ -259,16 +259,18 @@ def residual_lines(
 ) -> tuple[ResidualLine, ...]:
     """The prominent lines in the residual of single runs: at most two in each, the stronger first."""
     lines: list[ResidualLine] = []
-    for run, own in zip(runs, data, strict=True):
+    for run, run_data in zip(runs, data, strict=True):
         local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
-        open_to = away_from_motion(run.frequency / run.resonance) & ~of_drive(run.frequency.size, own)
-        found: list[ResidualLine] = []
+        open_to = away_from_motion(run.frequency / run.resonance) & ~of_drive(run.frequency.size, run_data)
+        of_run: list[ResidualLine] = []
         for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
             excess = float(local[index]) - _WIDTH
             unlikely = len(runs) * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
-            if unlikely > chosen.line_rate or len(found) == _PER_RUN:
+            if unlikely > chosen.line_rate or len(of_run) == _PER_RUN:
                 break
-            close = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
+            close = any(
+                abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in of_run
+            )
             beside = np.concatenate(
                 [
                     local[max(index - _AROUND, 0) : max(index - _WIDTH, 0)],
@@ -281,9 +283,9 @@ def residual_lines(
             near = slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
             whole = max(float(run.power.sum()) - run.power.size, excess)
             frequency = float(np.average(run.frequency[near], weights=run.power[near]))
-            amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
-            found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
-        lines += found
+            amplitude = float(run_data.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
+            of_run.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
+        lines += of_run
     return tuple(lines)
 
 

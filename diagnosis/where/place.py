@@ -127,17 +127,17 @@ def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[f
     return interval if brief and interval[0] > chosen.blow_after * length else None
 
 
-def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding:
+def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Finding:
     """The channel on which the gap acts, from features of the residual and the inferred condition."""
     chosen = nominal.settings.where
-    blow = blow_interval(found, chosen.blow_share, chosen)
+    blow = blow_interval(survey, chosen.blow_share, chosen)
     if blow is not None:
         return Finding("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
     # most of the excess may be a line, or lie beside the frequency of the motion
-    excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
+    excess = {band.band: max(band.excess, 0.0) for band in survey.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in found.maps.lines if line.share > chosen.line_share]
-    if lines and len(lines) >= max(1, len(found.maps.runs) // chosen.line_one_in):
+    lines = [line for line in survey.maps.lines if line.share > chosen.line_share]
+    if lines and len(lines) >= max(1, len(survey.maps.runs) // chosen.line_one_in):
         hertz = float(np.median([line.frequency for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Finding(
@@ -154,12 +154,12 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         return Finding("sensor", Fact("shifted centre"))
     if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > chosen.harmonic_share * whole:
         return Finding("sensor", Fact("harmonics"))
-    apart = _between_runs(nominal, found)
+    apart = _between_runs(nominal, survey)
     if apart is not None:
         return apart
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, Fact("every run driven"))
-    frequency, damping = drift(list(found.maps.backbones))
+    frequency, damping = drift(list(survey.maps.backbones))
     if frequency > chosen.drift_ratio * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", Fact("frequency along the decay"))
     if damping > chosen.drift_ratio * max(frequency, 0.0) and damping > 0.0:

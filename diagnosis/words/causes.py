@@ -188,7 +188,7 @@ def consequence(document: Document) -> str:
 
     Empty where no coefficient is known before and after, or no cause is named.
     """
-    before, after, said = document["coefficients"]["before"], document["coefficients"]["after"], []
+    before, after, clauses = document["coefficients"]["before"], document["coefficients"]["after"], []
     if not document["causes"] or document["causes"] == ["unknown"]:
         return ""
     for name, one in before.items():
@@ -197,7 +197,7 @@ def consequence(document: Document) -> str:
             continue
         label = COEFFICIENTS.get(name, name)
         if two["std"] is not None and two["std"] > _OPEN * abs(two["value"]):
-            said.append(
+            clauses.append(
                 f"{label} remains uncertain ({for_people(two['value'], two['std'], unit_mark(two['unit']))})"
             )
             continue
@@ -205,14 +205,14 @@ def consequence(document: Document) -> str:
         share = 100.0 * (abs(two["value"]) / abs(one["value"]) - 1.0)
         values = _apart(one["value"], two["value"])
         if one["value"] * two["value"] < 0.0:
-            said.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
+            clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
-            said.append(f"{label} changes by less than 1 %")
+            clauses.append(f"{label} changes by less than 1 %")
         else:
-            said.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
-    if not said:
+            clauses.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
+    if not clauses:
         return ""
-    text = listed(said)
+    text = listed(clauses)
     first = text[0].upper() if text[0].isascii() else text[0]  # a Greek letter is a symbol
     return f"{first}{text[1:]}."
 

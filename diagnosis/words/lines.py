@@ -21,6 +21,7 @@ from diagnosis.words.numbers import (
 from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
 from identification.printing import COEFFICIENTS, significant, unit_mark
+from tunnel_sim.vocabulary.units import beside
 
 _MOST = 0.5  # of a variance: more than all its other sources together
 _COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
@@ -96,8 +97,7 @@ def hidden_line(document: Document) -> str:
             moved.append(f"{COEFFICIENTS.get(name, name)} by {by.strip()}")
     if not moved:
         return ""
-    mark = "" if first["size"]["unit"] == "1" else unit_mark(first["size"]["unit"])
-    size = f"{significant(abs(first['size']['value']), 2)} {mark}".strip()
+    size = f"{significant(abs(first['size']['value']), 2)}{unit_mark(beside(first['size']['unit']))}"
     return (
         f"What could hide: {plain(first['effect'])} of up to {size}{explained({first['size']['unit']})}, which "
         f"these runs do not exclude, would change {' and '.join(moved)}. The intervals allow for it."

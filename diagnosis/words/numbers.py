@@ -11,6 +11,7 @@ from diagnosis.facts.closure import Misfit
 from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.quantities import Share
+from tunnel_sim.vocabulary.units import beside
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -35,7 +36,7 @@ def for_people(value: float, std: float | None, unit: str) -> str:
         mark, factor = unit_shown(unit)
         value, std = factor * value, None if std is None else factor * std
     else:
-        mark = "" if unit == "1" else f" {unit if unit == '%' else unit_mark(unit)}"
+        mark = unit_mark(beside(unit))
     last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
     shown = significant(value, 3) if std is None or std < 0.5 * last else with_std(value, std)
     return f"{shown.replace('-', '−') if shown.startswith('-') else shown}{mark}"

@@ -23,6 +23,7 @@ from diagnosis.words.numbers import (
 from diagnosis.words.scatter import scattering
 from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.units import beside
 
 
 def rest_words(document: Document) -> str:
@@ -66,14 +67,14 @@ def _each(sizes: dict[str, str]) -> str:
 
 def closable_words(document: Document) -> str:
     """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
-    found = document["closable"]
-    if found is None:
+    closable = document["closable"]
+    if closable is None:
         return ""
     named = document["causes"] != ["unknown"] and document["decided"]
     beyond = " beyond the scatter between runs" if scattering(document["causes"]) else ""
     left = "the residual gap" if named else f"the gap{beyond}"
-    ceilings = [ceiling(one) for one in found["ceilings"]]
-    if found["kind"] == "noise":
+    ceilings = [ceiling(one) for one in closable["ceilings"]]
+    if closable["kind"] == "noise":
         chosen = settings_of(document).remainder
         most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
         bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
@@ -81,35 +82,35 @@ def closable_words(document: Document) -> str:
             f"A smooth moment or error of the reading could explain no more than {bound} of {left}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(document, found["kind"], ceilings)
-    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found["line"])])
+    of_others = _measured_otherwise(document, closable["kind"], ceilings)
+    return " ".join([*_largest(closable, ceilings, left), *of_others, *_line(closable["line"])])
 
 
 def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     """The share of the kind beside those of the others, its place, and its formula."""
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
-    said = [
+    sentences = [
         f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on "
         f"{best.held_out} held out of the fit."
     ]
     if found["alike"]:
-        said.append(
+        sentences.append(
             f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found['alike'])}."
         )
     elif found["next_most"] is not None:
         alike = all(one.held_out == best.held_out for one in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        said.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
+        sentences.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
-        said.append(f"Most of it is in {largest}{run}.")
+        sentences.append(f"Most of it is in {largest}{run}.")
     if law is not None:
         formula = law["effect"].get("moment") or law["effect"]["reading"]
         closes = percent(law["closed"], law["std"])
-        said.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
-    return said
+        sentences.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
+    return sentences
 
 
 def _with_values(law: Document) -> str:
@@ -120,8 +121,7 @@ def _with_values(law: Document) -> str:
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
-        mark = "" if unit == "1" else f" {unit_mark(unit)}"
-        said.append(f"{name} = {with_std(one['value'], one['std'])}{mark}")
+        said.append(f"{name} = {with_std(one['value'], one['std'])}{unit_mark(beside(unit))}")
     left = f"{listed(unknown)} not determined by these runs" if unknown else ""
     return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
 

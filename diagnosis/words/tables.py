@@ -32,6 +32,7 @@ from identification.printing import (
     with_std,
 )
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.units import beside
 
 _IN_BRACKETS = "root mean square (in brackets: its power over that of the noise)"
 
@@ -68,7 +69,7 @@ def candidates_table(document: Document) -> Table:
 
 def _estimate(document: Document, full: str, answer: str, given: Document) -> str:
     """A parameter of an answer, by its full name."""
-    mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
+    mark = unit_mark(beside(given["unit"], ""))
     return spread_estimate(document, full.rpartition(".")[0] or answer, given) or estimated(given, mark)
 
 
@@ -218,8 +219,7 @@ def hidden_table(document: Document) -> Table:
     hidden, rows = document.get("hidden", ()), []
     names = [name for name in document["coefficients"]["after"] if hidden and name in hidden[0]["moves"]]
     for one in hidden:
-        mark = "" if one["size"]["unit"] == "1" else unit_mark(one["size"]["unit"])
-        size = f"{significant(one['size']['value'], 2)} {mark}".rstrip()
+        size = f"{significant(one['size']['value'], 2)}{unit_mark(beside(one['size']['unit']))}"
         moves = [significant(one["moves"][name]["value"], 2) for name in names]
         rows.append((plain(one["effect"]), size, *moves))
     heads = [f"changes {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
@@ -232,8 +232,8 @@ def patch_table(document: Document) -> Table:
     model = document.get("model") or {"written": (), "file": ""}
     rows = []
     for one in model["written"]:
-        mark = "" if one["unit"] == "1" else unit_mark(one["unit"])
-        rows.append((one["name"], _numbers(one["before"]), _numbers(one["after"]), mark))
+        numbers = _numbers(one["before"]), _numbers(one["after"])
+        rows.append((one["name"], *numbers, unit_mark(beside(one["unit"], ""))))
     heads = ("attribute", "before", "after", "unit")
     return Table(f"Changes to {model['file']}", heads, tuple(rows), heads[1:3])
 

@@ -108,49 +108,51 @@ def verdict(document: Document, rest: str) -> str:
 
 def _answer(document: Document, rest: str) -> str:
     """The gap, its causes, and how far it closes with them."""
-    causes, gap, found = document["causes"], document["gap"], document["found"]
+    causes, gap, facts = document["causes"], document["gap"], document["found"]
     excess, repeats = gap["excess_before"], repeats_words(document)
     if not causes:
-        said = (
+        sentence = (
             "No gap: the nominal model explains the runs down to their noise "
             f"(the residual is {beside_noise(excess)}, root mean square)."
         )
-        return " ".join(filter(None, (said, repeats)))
+        return " ".join(filter(None, (sentence, repeats)))
     size, misfit = times_noise(excess), misfit_of(document)
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
     closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
     if not document["decided"]:
-        said = f"There is a gap ({size}), and its cause is undecided."
+        sentence = f"There is a gap ({size}), and its cause is undecided."
         first = without_scatter(causes)
         added = f"With {plain(*first)} added," if first else "With these differences allowed for,"
         with_first = "" if causes == _UNKNOWN else f"{added} {closes}"
-        return " ".join(filter(None, (said, undecided_words(document), repeats, with_first)))
+        return " ".join(filter(None, (sentence, undecided_words(document), repeats, with_first)))
     if causes == _UNKNOWN:
-        nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
-        said = (
+        nearly = "" if facts["nearly"] is None else _nearly(facts["nearly"])
+        sentence = (
             "no effect is named as its cause"
             if nearly
             else "no effect of the vocabulary explains it (tunnel effects lists them)"
         )
-        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
+        return " ".join(filter(None, (f"There is a gap ({size}), and {sentence}.", nearly, rest, repeats)))
     proper = without_scatter(causes)
-    last = (closes, rest, _immaterial(found["immaterial"]) or consequence(document))
+    last = (closes, rest, _immaterial(facts["immaterial"]) or consequence(document))
     if not proper:
-        said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
-        return " ".join(filter(None, (said, *last)))
+        sentence = f"There is a gap ({size}). {repeats} With these differences allowed for,"
+        return " ".join(filter(None, (sentence, *last)))
     sources = []
     for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
-        wind = f", {CONDITIONS[kind.condition]}" if found["both_winds"] else ""
+        wind = f", {CONDITIONS[kind.condition]}" if facts["both_winds"] else ""
         sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
     part = "only in part " if document["rest"]["material"] else ""
     they_act = "They act on" if len(proper) > 1 else "It acts on"
-    said = f"The gap ({size}) is explained {part}by {from_causes(document)}. {they_act} {'; '.join(sources)}."
+    sentence = (
+        f"The gap ({size}) is explained {part}by {from_causes(document)}. {they_act} {'; '.join(sources)}."
+    )
     with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
     if len(causes) > len(proper):
         with_all = f"With {'them' if len(proper) > 1 else 'it'} added and these differences allowed for,"
-    return " ".join(filter(None, (said, repeats, with_all, *last)))
+    return " ".join(filter(None, (sentence, repeats, with_all, *last)))
 
 
 def undecided_words(document: Document) -> str:
@@ -303,23 +305,23 @@ def size_words(document: Document, size: Document) -> str:
     """A cause's effect on a swing, in a sentence; damping and frequency where they change visibly."""
     mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
     angle = unit_shown("rad")[1]
-    said = []
+    changes = []
     zeta, without = size["damping_ratio"], size["damping_ratio_without"]
     if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
-        said.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
+        changes.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
     if abs(size["frequency_change"]) > _VISIBLE_FREQUENCY:
         change = 100.0 * size["frequency_change"]
-        said.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
+        changes.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
     reading = factor * size["reading_change"]
     if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
-        said.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
-    if not said and not reading:  # the run that is simulated does not show it
+        changes.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
+    if not changes and not reading:  # the run that is simulated does not show it
         return ""
-    said.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
+    changes.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
     held = angle * size["stands_rad"]
     stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
     amplitude = significant(angle * size["amplitude_rad"], 2)
-    return f"Over three cycles from {amplitude}°: {', '.join(said)}{stands}"
+    return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
 
 
 def _spaced(mark: str) -> str:

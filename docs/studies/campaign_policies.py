@@ -29,7 +29,7 @@ from tunnel_lab.envs.session import answers, probabilities
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.runner import crew
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
-from tunnel_lab.terminal.outputs import bar
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 

@@ -85,8 +85,8 @@ def joint_estimate(
     noise = noise_level(residuals, campaign.sensor)
     covariance = fisher_covariance(fit.normal, noise)
     size = design.size
-    found = derivatives(design, fit.parameters[:size])
-    own = found.jacobian @ covariance[:size, :size] @ found.jacobian.T
+    values = derivatives(design, fit.parameters[:size])
+    covariance_of_values = values.jacobian @ covariance[:size, :size] @ values.jacobian.T
     statuses = (
         statuses
         | noise_statuses([noise, *(item.noise for _, item, _ in used)])
@@ -94,15 +94,17 @@ def joint_estimate(
     )
     zero = None
     if not campaign.driven:  # neither is stated of driven runs
-        if Status.MODEL_DEPARTS in statuses and found.names:
-            own = widened_covariance(own, _scatter(fit, linked, found, runs, own_zeros=own_zeros))
+        if Status.MODEL_DEPARTS in statuses and values.names:
+            covariance_of_values = widened_covariance(
+                covariance_of_values, _scatter(fit, linked, values, runs, own_zeros=own_zeros)
+            )
         zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")
     if linked.size > size:
         gain = gain_remark(
-            runs, fit.parameters, covariance[: linked.size, : linked.size], found.get("yaw_inertia")
+            runs, fit.parameters, covariance[: linked.size, : linked.size], values.get("yaw_inertia")
         )
         estimate = replace(estimate, remarks=(gain, *remarks))
-    filled = filled_estimate(campaign, estimate, runs, design, found, own, statuses)
+    filled = filled_estimate(campaign, estimate, runs, design, values, covariance_of_values, statuses)
     return replace(filled, sensor_zero=zero, noise=noise)
 
 

@@ -386,10 +386,10 @@ class Bayesian(RunByRun):
                 return np.array([mean_of_blocks(row, factor) for row in forcing.responses(time, decay)])
 
             forced = InputResponse(rows, forcing.known)
-        found = posterior_of(thin, decay, guess, knowledge, forced)
-        if found is None:
+        posterior = posterior_of(thin, decay, guess, knowledge, forced)
+        if posterior is None:
             return Status.NOT_CONVERGED
-        mean, covariance = found.moments()
+        mean, covariance = posterior.moments()
         decay = Decay(float(mean[0]), float(mean[1]))
         if forcing.known is not None:
             gain = forcing.known.at(decay.stiffness)
@@ -402,7 +402,7 @@ class Bayesian(RunByRun):
         if projected is None:
             return Status.NOT_CONVERGED
         described = describe_run(run, free, *projected, covariance, variance, noise=noise)
-        omega_n, zeta = found.modal()
+        omega_n, zeta = posterior.modal()
         estimate = replace(
             described,
             omega_n=Quantity(omega_n[0], omega_n[1], "rad/s", omega_n[2:]),
@@ -418,4 +418,4 @@ class Bayesian(RunByRun):
         moved = np.array([decay.rate, decay.stiffness]) - fitted.coefficients[:2]
         coefficients = fitted.coefficients + jacobian @ moved
         gained = Gained.of(coefficients, of_sought[np.ix_(sought, sought)], sought)
-        return _PosteriorDecay(estimate, gained, posterior=found, driven=forcing.driven)
+        return _PosteriorDecay(estimate, gained, posterior=posterior, driven=forcing.driven)

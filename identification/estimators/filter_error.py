@@ -58,16 +58,16 @@ class FilterError(RunByRun):
         driven = self._driven(bare, sensor)
         if driven is None:
             return RunDecay(bare.estimate, bare.gained)
-        found, noise_std = driven
-        decay, forcing = found.model.decay, bare.reading.forcing
-        gain = found.innovations.gain if forcing.known is None else forcing.known.at(decay.stiffness)
+        filtered, noise_std = driven
+        decay, forcing = filtered.model.decay, bare.reading.forcing
+        gain = filtered.innovations.gain if forcing.known is None else forcing.known.at(decay.stiffness)
         reading = bare.reading.freed(decay, gain)
         projected = project_run(reading, decay)
         if projected is None:
             return Status.NOT_CONVERGED
         fitted, zero = projected
         # The innovations judge the model, since they are white if it is right; the residual is not.
-        values, expected = found.innovations.values, found.innovations.variance
+        values, expected = filtered.innovations.values, filtered.innovations.variance
         level = noise_level(
             [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
             SensorProperties(noise_std=float(np.sqrt(expected))),
@@ -75,15 +75,15 @@ class FilterError(RunByRun):
         departs = level.departs or level.disagrees
         ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
         noise = replace(bare.noise, std=noise_std, departs=departs, slow_ratio=ratio)
-        covariance = found.covariance * noise.slow_ratio
+        covariance = filtered.covariance * noise.slow_ratio
         # The initial state is from least squares; its error due to the moment has the power of the residual.
         variance = max(noise_std, noise.residual_std) ** 2
         estimate = describe_run(run, reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
-        q = found.model.intensity_at_resonance
+        q = filtered.model.intensity_at_resonance
         process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
         estimate = replace(estimate, process_noise=process_noise)
         sought, coefficients = forcing.sought, np.array([decay.rate, decay.stiffness, gain])
-        of_sought = found.gained[np.ix_(sought, sought)] * noise.slow_ratio
+        of_sought = filtered.gained[np.ix_(sought, sought)] * noise.slow_ratio
         return RunDecay(estimate, Gained.of(coefficients, of_sought, sought))
 
     def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:

@@ -145,12 +145,13 @@ def _fitted(
     """Coefficients, the record's residual (rad), and weights of its samples in them; None where undetermined."""
     if lines.used.size < _FEWEST:
         return None
-    parameters, own, last = start, np.zeros(2), np.inf  # own: initial angle and rate; no line shows the zero
+    parameters, last = start, np.inf
+    initial = np.zeros(2)  # angle and rate; no line shows the zero
     step = np.zeros(start.size + 2)
     for _ in range(_STEPS):
         with np.errstate(all="ignore"):  # a distant trial may overflow; it is then rejected
             decay, gain = forcing.at(forcing.link @ parameters)
-            state = State(decay, 0.0, float(own[0]), float(own[1]), gain)
+            state = State(decay, 0.0, float(initial[0]), float(initial[1]), gain)
             rows = forcing.rows(reading.time, decay)
             residual, local = reading.residual(state, rows), forcing.weights(state) @ rows
             left = lines.weighted(residual)
@@ -168,7 +169,7 @@ def _fitted(
             if small.all() or cost >= before * (1.0 - _SETTLED):
                 return kept
         else:
-            parameters, own = parameters - step[: start.size], own - step[start.size :]
+            parameters, initial = parameters - step[: start.size], initial - step[start.size :]
             step = 0.25 * step
-        parameters, own = parameters + step[: start.size], own + step[start.size :]
+        parameters, initial = parameters + step[: start.size], initial + step[start.size :]
     return None

@@ -87,24 +87,24 @@ class NeuralNetwork(Paired):
         if run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
         shown = []
-        for one in readings:
-            if not networks.trained_for(one.zeta, one.omega_n):
+        for response in readings:
+            if not networks.trained_for(response.zeta, response.omega_n):
                 continue
-            window, of_zeta, of_omega = one.window, *np.sqrt(one.variances)
-            own_zeta, own_omega = networks.own_stds(one.zeta, window.t3)
+            window, of_zeta, of_omega = response.window, *np.sqrt(response.variances)
+            own_zeta, own_omega = networks.own_stds(response.zeta, window.t3)
             # The envelope at the first crossing, and from there to mid-window.
-            unit = normalise(response_points(np.array([one.zeta]))[0]).scale
-            middle = float(np.exp(-np.pi * CYCLES * one.zeta / np.sqrt(1.0 - one.zeta**2)))
+            unit = normalise(response_points(np.array([response.zeta]))[0]).scale
+            middle = float(np.exp(-np.pi * CYCLES * response.zeta / np.sqrt(1.0 - response.zeta**2)))
             amplitude = window.shape.scale / unit * middle
             level = window.noise.std * float(np.linalg.norm(window.shape.peak_weights @ window.noise.points))
-            own_std = float(np.hypot(of_omega, own_omega * one.omega_n))
+            own_std = float(np.hypot(of_omega, own_omega * response.omega_n))
             shown.append(
                 WindowEstimate(
                     start_s=window.start_s,
                     duration_s=window.t3,
                     amplitude=Quantity(amplitude, level / unit * middle, "rad"),
-                    omega_n=Quantity(one.omega_n, own_std, "rad/s"),
-                    zeta=Quantity(one.zeta, float(np.hypot(of_zeta, own_zeta)), "1"),
+                    omega_n=Quantity(response.omega_n, own_std, "rad/s"),
+                    zeta=Quantity(response.zeta, float(np.hypot(of_zeta, own_zeta)), "1"),
                     cycles=CYCLES,
                 )
             )

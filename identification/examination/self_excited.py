@@ -68,22 +68,22 @@ def swing_of(run: Run) -> Swing | None:
         return None
     reading = thinned_reading(evenly_spaced(run.record), frequency)
     omega = 2.0 * np.pi * frequency
-    found = _poles(reading, omega)
-    fitted = None if found is None else project_run(reading, found.decay)
-    if found is None or fitted is None:
+    poles = _poles(reading, omega)
+    fitted = None if poles is None else project_run(reading, poles.decay)
+    if poles is None or fitted is None:
         return None
     residual, zero = fitted[0].residual, fitted[1]
-    half_cycle = np.pi / found.decay.omega_d * residual.size / float(reading.time[-1])
+    half_cycle = np.pi / poles.decay.omega_d * residual.size / float(reading.time[-1])
     variance = float(residual @ residual) / max(residual.size - _UNKNOWNS, 1) * max(half_cycle, 1.0)
-    rate_std, stiffness_std = np.sqrt(variance) * np.linalg.norm(found.weights, axis=1)
+    rate_std, stiffness_std = np.sqrt(variance) * np.linalg.norm(poles.weights, axis=1)
     # Change of k between the run's first part and the rest.
     half, change = 0.5 * float(reading.time[-1]), 0.0
-    split = half if found.decay.rate <= 0.0 else min(half, _E_FOLDING / found.decay.rate)
-    at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / found.decay.omega_d)))
+    split = half if poles.decay.rate <= 0.0 else min(half, _E_FOLDING / poles.decay.rate)
+    at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / poles.decay.omega_d)))
     if min(at, reading.time.size - at) >= _LEAST_SAMPLES:
         first, rest = (
             _poles(
-                Reading(reading.time[part] - reading.time[part][0], reading.yaw[part]), found.decay.omega_d
+                Reading(reading.time[part] - reading.time[part][0], reading.yaw[part]), poles.decay.omega_d
             )
             for part in (slice(None, at), slice(at, None))
         )
@@ -91,15 +91,15 @@ def swing_of(run: Run) -> Swing | None:
             change = abs(first.decay.stiffness - rest.decay.stiffness)
     return Swing(
         run,
-        stiffness=found.decay.stiffness,
+        stiffness=poles.decay.stiffness,
         stiffness_std=float(np.hypot(stiffness_std, change)),
-        rate=found.decay.rate,
+        rate=poles.decay.rate,
         rate_std=float(rate_std),
         zero=zero,
         zero_std=float(np.sqrt(variance / residual.size)),
         time=reading.time,
         motion=reading.yaw - zero,
-        amplitude=envelope_amplitude(found.decay, fitted[0].angle, fitted[0].rate),
+        amplitude=envelope_amplitude(poles.decay, fitted[0].angle, fitted[0].rate),
     )
 
 

@@ -252,7 +252,7 @@ def shipped_posteriors() -> dict[str, TrainedPosterior]:
 def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPosterior]:
     """Networks from safetensors and the JSON of their training record, by kind."""
     with open_stored(weights, record, where, estimator="neural_posterior") as (tensors, document):
-        found = {}
+        trained = {}
         for kind in KINDS:
             own = {
                 name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
@@ -268,8 +268,8 @@ def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPo
                 raise ValueError(kind)
             centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
             threshold, effects = float(stated["threshold"]), tuple(document["effects"])
-            found[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
-        return found
+            trained[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
+        return trained
 
 
 # Logarithm of χ² over its freedom: smaller values come from records with hardly any noise.
@@ -303,19 +303,19 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     """Put samples of one kind through its network."""
     if not samples:
         return []
-    shifts = np.stack([one.shifts for one in samples])
-    covariances = np.stack([one.covariances for one in samples])
-    known = np.stack([one.known for one in samples])
-    longest = max(len(one.runs) for one in samples)
+    shifts = np.stack([sample.shifts for sample in samples])
+    covariances = np.stack([sample.covariances for sample in samples])
+    known = np.stack([sample.known for sample in samples])
+    longest = max(len(sample.runs) for sample in samples)
     runs = np.zeros((len(samples), longest, samples[0].runs.shape[1] + 1))
-    for place, one in enumerate(samples):  # with 1 after the features of a run, and 0 for padding
-        runs[place, : len(one.runs), :-1], runs[place, : len(one.runs), -1] = one.runs, 1.0
+    for place, sample in enumerate(samples):  # with 1 after the features of a run, and 0 for padding
+        runs[place, : len(sample.runs), :-1], runs[place, : len(sample.runs), -1] = sample.runs, 1.0
     output = forward(
         np,
         network.weights,
-        np.stack([one.rivals for one in samples]),
+        np.stack([sample.rivals for sample in samples]),
         runs,
-        np.stack([one.valid for one in samples]).astype(np.float64),
+        np.stack([sample.valid for sample in samples]).astype(np.float64),
         shifts,
     )
     widths = np.sqrt(np.maximum(np.diagonal(covariances, axis1=2, axis2=3), 1e-12))
@@ -325,11 +325,11 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     distances = network.distance(output.context)
     chances = 1.0 / (1.0 + np.exp(-np.clip(output.effects, -30.0, 30.0)))
     result = []
-    for place, one in enumerate(samples):
-        low, middle, high = one.values + one.stds * found[place]
+    for place, sample in enumerate(samples):
+        low, middle, high = sample.values + sample.stds * found[place]
         stds = (high - low) / NORMAL_WIDTH
         scaled = covariances[place] * output.scales[place, :, :, None] ** 2
-        scaled = np.where(np.outer(one.known, one.known), scaled, np.eye(one.known.size))
+        scaled = np.where(np.outer(sample.known, sample.known), scaled, np.eye(sample.known.size))
         # Correlations of the mixture, shape (d, d).
         centred = output.means[place] - weights[place] @ output.means[place]
         spread = scaled + np.einsum("ri,rj->rij", centred, centred)
@@ -344,7 +344,7 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
                 np.column_stack((low, high)),
                 related * np.outer(stds, stds),
                 dict(zip(network.effects, chances[place].tolist(), strict=True)),
-                bool(distances[place] > network.threshold and one.rivals[0, LEVEL] > _NOISY),
+                bool(distances[place] > network.threshold and sample.rivals[0, LEVEL] > _NOISY),
             )
         )
     return result

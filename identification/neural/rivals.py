@@ -322,11 +322,14 @@ def campaign_features(
     """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs do not determine any coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
-    for one, link in zip(seen, design.links, strict=True):
-        half = one.time / (2.0 * one.omega)
-        stiffness = one.omega**2 + one.rate**2
-        parts += [one.logarithm - one.rate * one.time, one.phase + half * (stiffness - 2.0 * one.rate**2)]
-        blocks += [np.outer(-one.time, link[0]), np.outer(half, link[1] - 2.0 * one.rate * link[0])]
+    for decay, link in zip(seen, design.links, strict=True):
+        half = decay.time / (2.0 * decay.omega)
+        stiffness = decay.omega**2 + decay.rate**2
+        parts += [
+            decay.logarithm - decay.rate * decay.time,
+            decay.phase + half * (stiffness - 2.0 * decay.rate**2),
+        ]
+        blocks += [np.outer(-decay.time, link[0]), np.outer(half, link[1] - 2.0 * decay.rate * link[0])]
     values, shared = np.concatenate(parts), np.concatenate(blocks)
     first = _fit(seen, values, shared, np.zeros((values.size, 0)))
     if first is None:
@@ -350,12 +353,12 @@ def campaign_features(
     jacobian[known] = start.jacobian
     fastest = max(run.wind_speed for run in runs)
     rows = []
-    for run, one, rivals, link in zip(runs, seen, alone, design.links, strict=True):
-        own = np.array([one.rate, one.omega]) + rivals.parameters
+    for run, decay, rivals, link in zip(runs, seen, alone, design.links, strict=True):
+        own = np.array([decay.rate, decay.omega]) + rivals.parameters
         rate, stiffness = link @ found.parameters
         gap = own - np.array([rate, np.sqrt(max(stiffness - rate**2, 0.0))])
         away = gap / np.sqrt(np.diag(rivals.covariances[0]))
-        rows.append(_run_features(one, rivals, run.wind_speed / max(fastest, 1e-300), away, 1.0))
+        rows.append(_run_features(decay, rivals, run.wind_speed / max(fastest, 1e-300), away, 1.0))
     return _features(found, moved, jacobian, known, np.array(rows))
 
 
@@ -415,7 +418,7 @@ def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, li
         harmonics += [fold(np.arcsinh(level.real)), fold(np.arcsinh(level.imag)), np.log(0.5 * spread + 0.05)]
     centred = (run.zero - float(np.average(run.zero, weights=weight**2))) * weight
     remaining = np.log(alone.remaining / alone.freedom + 0.05)
-    own = [
+    features = [
         abs(float(np.arcsinh(zero_time))),
         abs(float(np.arcsinh(zero_size))),
         float(np.log(np.mean(centred**2) + 0.05)),
@@ -431,8 +434,8 @@ def _run_features(run: Demodulated, alone: Rivals, speed: float, away: Array, li
         speed,
         float(speed > 0.0),
     ]
-    assert len(own) == OWN
-    return np.concatenate((np.arcsinh(alone.scores[1:]), own))
+    assert len(features) == OWN
+    return np.concatenate((np.arcsinh(alone.scores[1:]), features))
 
 
 def _slope(values: Array, against: Array, weight: Array) -> float:

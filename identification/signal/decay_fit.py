@@ -306,14 +306,15 @@ def _project(
     prior: Prior | None = None,
 ) -> _Point:
     nothing = _Point(parameters, 0.0, ())
-    found = [r.forcing.at(link @ parameters) for r, link in zip(readings, links, strict=True)]
+    at_decay = [r.forcing.at(link @ parameters) for r, link in zip(readings, links, strict=True)]
     with np.errstate(over="ignore", invalid="ignore"):  # a distant trial may overflow; it is then rejected
-        rows = [r.forcing.rows(r.time, decay) for r, (decay, _) in zip(readings, found, strict=True)]
+        rows = [r.forcing.rows(r.time, decay) for r, (decay, _) in zip(readings, at_decay, strict=True)]
         grams = [block @ block.T for block in rows]
     if not all(np.isfinite(gram).all() for gram in grams):
         return nothing
     values = [
-        r.forcing.freed(r.yaw, block, gain) for r, block, (_, gain) in zip(readings, rows, found, strict=True)
+        r.forcing.freed(r.yaw, block, gain)
+        for r, block, (_, gain) in zip(readings, rows, at_decay, strict=True)
     ]
     moments = [inner(block[:5], value) for block, value in zip(rows, values, strict=True)]
     try:
@@ -329,7 +330,7 @@ def _project(
         return nothing
     runs, cost = [], 0.0 if prior is None else prior.cost(parameters)
     for reading, block, gram, (decay, gain), (angle, rate), best in zip(
-        readings, rows, grams, found, states, zeros, strict=True
+        readings, rows, grams, at_decay, states, zeros, strict=True
     ):
         state = State(decay, best, float(angle), float(rate), gain)
         residual = reading.residual(state, block)

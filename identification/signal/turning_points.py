@@ -63,19 +63,19 @@ class TurningPointFit:
 def fit_turning_points(points: TurningPoints) -> TurningPointFit:
     """Fit a linear decay to its turning points."""
     k = points.half_periods
-    said: list[str] = []
+    remarks: list[str] = []
     line = np.column_stack([np.ones(k.size), k])
-    times = _Linear.of(line, points.time_s, points.time_std, "times", "s", said)
+    times = _Linear.of(line, points.time_s, points.time_std, "times", "s", remarks)
     half = Fitted(float(times.solution[1]), sqrt(times.covariance[1, 1]))
     first, sides = _decay(k, points.angle_rad)
     columns = _slopes(k, first)
     weights = points.angle_std
     # One more Gauss–Newton step from the minimum gives the covariance and the scatter of the fit.
     residual = points.angle_rad - _angles(k, first)
-    step = _Linear.of(columns, residual, weights, "angles", "rad", said)
+    step = _Linear.of(columns, residual, weights, "angles", "rad", remarks)
     zero, swing, delta = (first + step.solution).tolist()
     stds = np.sqrt(np.diag(step.covariance)).tolist()
-    _bends(line, k, times, step, columns, swing * sides, said, half.value)
+    _bends(line, k, times, step, columns, swing * sides, remarks, half.value)
     damped = pi / half.value
     zeta = delta / sqrt(pi**2 + delta**2)
     slope = pi**2 / (pi**2 + delta**2) ** 1.5
@@ -92,7 +92,7 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
         first_swing=Fitted(swing, stds[1]),
         time_scatter=times.scatter,
         angle_scatter=step.scatter,
-        said=tuple(said),
+        said=tuple(remarks),
     )
 
 
@@ -114,10 +114,10 @@ class _Linear:
         free = values.size - columns.shape[1]
         std = np.ones(values.size) if stated is None else stated
         solution = np.linalg.lstsq(columns / std[:, None], values / std, rcond=None)[0]
-        left = values - columns @ solution
-        chi2 = float(np.sum((left / std) ** 2))
+        residual = values - columns @ solution
+        chi2 = float(np.sum((residual / std) ** 2))
         scale = sqrt(chi2 / free)
-        scatter = float(np.sqrt(np.sum(left**2) / free))
+        scatter = float(np.sqrt(np.sum(residual**2) / free))
         if stated is None:
             said.append(
                 f"the {name} scatter by {scatter:.2g} {unit} about the fit, from which the errors follow"
@@ -131,7 +131,9 @@ class _Linear:
         std = np.asarray(std * scale, np.float64)
         white = columns / std[:, None]
         covariance = np.asarray(np.linalg.inv(white.T @ white), np.float64)
-        return cls(np.asarray(solution, np.float64), covariance, scatter, std, np.asarray(left, np.float64))
+        return cls(
+            np.asarray(solution, np.float64), covariance, scatter, std, np.asarray(residual, np.float64)
+        )
 
     def drop(self, columns: Array, further: Array) -> tuple[float, float]:
         """The value of a further column's coefficient, and the fall of χ² with it."""

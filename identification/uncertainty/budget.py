@@ -294,7 +294,7 @@ def _individual(
 
     Kragten, Analyst 119 (1994) 2161–2165, doi 10.1039/AN9941902161.
     """
-    found = []
+    components = []
     for name, size in inputs.individual.items():
         if size <= 0.0:
             continue
@@ -316,8 +316,8 @@ def _individual(
             total += np.outer(values - budget.values, values - budget.values)
         each = "spring" if name == "spring_stiffness" else "run"
         note = "" if groups else "no run states it"
-        found.append(Component(f"{name}, each {each} its own", "B", total, note))
-    return found
+        components.append(Component(f"{name}, each {each} its own", "B", total, note))
+    return components
 
 
 def _scatter(

@@ -25,6 +25,9 @@ EXAMPLES = dict(
 )
 
 
+PATH = re.compile(r"`((?:tunnel_\w+|identification|diagnosis|mjcf)/[\w/.]*)`")
+
+
 def run(example: str) -> dict[str, object]:
     names: dict[str, object] = {"__name__": __name__}
     exec(compile(EXAMPLES[example], example, "exec", dont_inherit=True), names)
@@ -48,10 +51,21 @@ def test_the_picture_is_drawn_from_this_tree(tmp_path: Path) -> None:
 
 
 def test_every_path_on_the_page_exists() -> None:
-    for path in re.findall(r"`((?:tunnel_\w+|identification|diagnosis)/[\w/.]*)`", TEXT):
+    for path in PATH.findall(TEXT):
         assert (layout.ROOT / path).exists(), path
     for step in re.findall(r"^\| \w+ \| `(\w+)` \|", TEXT, re.MULTILINE):
         assert (layout.ROOT / "diagnosis" / step).is_dir(), step
+
+
+def test_every_question_is_answered_by_files_that_have_the_names() -> None:
+    rows = re.findall(r"^\| (Where .*\?) \| (.*) \|$", TEXT, re.MULTILINE)
+    assert len(rows) >= 10
+    for question, answer in rows:
+        paths = [layout.ROOT / path for path in PATH.findall(answer)]
+        assert paths, question
+        sources = "".join(path.read_text("utf-8") for path in paths if path.is_file())
+        for name in re.findall(r"`(\w+)`", answer):
+            assert re.search(rf"\b{name}\b", sources), (question, name)
 
 
 def test_the_effect_is_registered(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,8 @@ def test_no_number_is_refused_in_one_line(kind: type[Effect]) -> None:
         text = str(refusal.value)
         assert "\n" not in text
         assert f"effect {kind.name}: {info.name} = " in text
-        assert f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}" in text
+        unit = "" if info.unit == "1" else f" in {info.unit}"
+        assert text.endswith(f"give a number from {info.lower:g} to {info.upper:g}{unit}")
 
 
 @each_effect

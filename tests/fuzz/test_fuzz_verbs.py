@@ -37,7 +37,8 @@ def test_identify_answers_or_refuses_in_one_line(campaign, number, draws):
     from identification import identify
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.terminal.outputs import show_estimate
+    from tunnel_lab.commands.identify import estimate_shown
+    from tunnel_lab.terminal.outputs import show
     from tunnel_sim.files.writing import json_text
 
     name = ALL_ESTIMATORS[number % len(ALL_ESTIMATORS)]
@@ -47,7 +48,7 @@ def test_identify_answers_or_refuses_in_one_line(campaign, number, draws):
         document = json.loads(json_text(found.to_json_dict()))
         check_numbers(document, name)
         assert Estimate.from_json_dict(document) == found, f"{name}: the estimate is not what its JSON says"
-        show_estimate(campaign, found, windows=True)
+        show(estimate_shown(campaign, document, folder, windows=True))
         if draws:
             draw_figures(campaign, found, folder)
 

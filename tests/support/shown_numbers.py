@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
+from identification.blocks import Block, Card, Detail, Table
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")
@@ -45,6 +47,12 @@ def _shown(digits: str) -> Shown:
     return Shown(float(digits), 0.5 * 10.0 ** (int(power or 0) - decimals))
 
 
+def all_blocks(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Blocks, and those inside them."""
+    for block in blocks:
+        yield from all_blocks(block.blocks) if isinstance(block, Card | Detail) else (block,)
+
+
 def assert_shows(text: str, values: Sequence[float]) -> None:
     """A text's numbers are these, in this order, and no others."""
     found = numbers(text)
@@ -60,3 +68,14 @@ def assert_known(text: str, values: Iterable[float]) -> None:
     known = tuple(values)
     for one in numbers(text):
         assert any(one.means(value) for value in known), (text, one)
+
+
+def assert_units(table: Table) -> None:
+    """Every number has a unit, in its cell, heading or row label, and every estimate an uncertainty."""
+    labelled = all("[" in first for first, *_ in table.rows)
+    for heading, *cells in zip(table.columns, *table.rows, strict=True):
+        bare = [cell for cell in cells if re.fullmatch(r"[-+−]?[\d.]+(e[-+]?\d+)?( ± [\d.]+)?", cell)]
+        assert not bare or labelled or "[" in heading or heading in ("p", "version"), (heading, bare)
+        if heading in ("parameters", "estimate", "estimate ± std", "nominal model", "with the causes"):
+            for line in (line for cell in cells for line in cell.split("\n") if line):
+                assert re.search(r"±|\(fixed\)", line), (heading, line)

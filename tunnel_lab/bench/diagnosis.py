@@ -31,11 +31,12 @@ from tunnel_lab.bench.parts import (
     show_items,
 )
 from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
-from tunnel_lab.terminal.outputs import STEPS
+from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
@@ -94,18 +95,18 @@ class DiagnosePage:
         state = work.work_of(self._log)
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
-        found = progress_of(state.lines)
+        progress = progress_of(state.lines)
         if not state.running and (took := work.seconds_taken(self._log)) is not None:
             self._before = f"; the last diagnosis took {took:.0f} s"
-        now = (replace(state, lines=(), printed=0.0), found.stages, written)
+        now = (replace(state, lines=(), printed=0.0), progress.stages, written)
         words = "Paused; it continues where it was."
         if state.running and not state.paused:
             begun = datetime.fromisoformat(state.started)
             elapsed = (datetime.now().astimezone() - begun).total_seconds()
-            tried = f" Now with {found.tried}." if found.tried else ""
+            tried = f" Now with {progress.tried}." if progress.tried else ""
             left = "time left not known after a pause"
             if not state.pauses:
-                left = found.reached.words(found.seconds + time.time() - state.printed)
+                left = progress.reached.words(progress.seconds + time.time() - state.printed)
             words = (
                 f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
                 "It runs in a separate process: this page may be closed."
@@ -127,8 +128,8 @@ class DiagnosePage:
                 button("Stop", self._stop)
         self._progress.clear()
         with self._progress:
-            for place, (seconds, words) in enumerate(found.stages if state.running else (), 1):
-                last = place == len(found.stages)
+            for place, (seconds, words) in enumerate(progress.stages if state.running else (), 1):
+                last = place == len(progress.stages)
                 with ui.element("li").classes("now" if last else "done"):
                     ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
         if state.error:
@@ -309,7 +310,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     from identification.printing import estimated, unit_mark
 
     def size(given: ParameterEstimate) -> str:
-        return typeset(estimated(given.to_json_dict(), "" if given.unit == "1" else unit_mark(given.unit)))
+        return typeset(estimated(given.to_json_dict(), unit_mark(beside(given.unit, ""))))
 
     show_facts(
         [

@@ -15,12 +15,11 @@ from nicegui import background_tasks, ui
 from identification.blocks import Block, Paragraph, Table
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import SYMBOLS, notes, unit, with_std
+from identification.printing import SYMBOLS, budget_blocks, notes, unit, with_std
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
 from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
-from tunnel_lab.terminal.outputs import budget_lines, budget_table
 from tunnel_sim.files.toml_input import load_toml
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -137,7 +136,7 @@ class IdentifyPage:
                 show_blocks(side_by_side(shown))
             budget = read_result(budget_file) if is_current(session, budget_file) else None
             if budget is not None and "budget" in budget:
-                show_blocks([budget_table(budget["budget"]), *map(Paragraph, budget_lines(budget["budget"]))])
+                show_blocks(budget_blocks(budget))
         self._frame.refresh(self._on)
 
 

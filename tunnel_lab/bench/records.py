@@ -198,7 +198,7 @@ class RecordsPage:
         with self._drawn:
             self._draw(imported)
         with self._table:
-            from tunnel_lab.terminal.outputs import parts_table
+            from tunnel_lab.report.import_table import parts_table
 
             show_blocks([parts_table(imported)])
             with ui.element("ul").classes("notes"):

@@ -24,6 +24,7 @@ from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import beside
 
 _SLIDERS = {
     "cn_beta": ("Cnβ", "1/rad", -1.0, 1.5, 0.01),
@@ -81,7 +82,7 @@ class TryItPage:
         self, key: str, name: str, unit: str, limits: Sequence[float], value: float, form: str
     ) -> None:
         """A slider of a field of the trial, below its name and value; limits: least, greatest and step."""
-        mark = "" if unit == "1" else f" {unit}"
+        mark = beside(unit)
         label = ui.label(f"{name}: {value:{form}}{mark}")
 
         async def change(event: events.ValueChangeEventArguments[float | None]) -> None:

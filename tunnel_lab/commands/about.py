@@ -20,7 +20,7 @@ from typer import Argument, Option
 from identification.blocks import Table
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import ending
-from tunnel_lab.terminal.outputs import say, say_written, show_tables
+from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
@@ -88,9 +88,11 @@ def doctor() -> None:
     """
     checks = tuple(self_check())
     results = tuple((part, text if fine else f"FAILED: {text}") for part, text, fine in checks)
-    show_tables(
-        Table("Installation", ("part", "version or state"), (*installed(), *extras())),
-        Table("Self-check", ("check", "result"), results),
+    show(
+        [
+            Table("Installation", ("part", "version or state"), (*installed(), *extras())),
+            Table("Self-check", ("check", "result"), results),
+        ]
     )
     if not all(fine for _, _, fine in checks):
         raise typer.Exit(1)

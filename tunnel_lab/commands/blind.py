@@ -20,7 +20,8 @@ from tunnel_lab.terminal.inputs import (
     with_format,
     with_quiet,
 )
-from tunnel_lab.terminal.outputs import bar_or_lines, console, say, say_written
+from tunnel_lab.terminal.outputs import console, say, say_written
+from tunnel_lab.terminal.progress import bar_or_lines
 from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.

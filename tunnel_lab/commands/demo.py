@@ -17,18 +17,12 @@ import typer
 from typer import Option
 
 from identification.blocks import Table
-from tunnel_lab.terminal.outputs import (
-    bar,
-    console,
-    say,
-    say_written,
-    show_tables,
-    step_display,
-    truth_table,
-)
+from tunnel_lab.terminal.outputs import console, say, say_written, show
+from tunnel_lab.terminal.progress import bar, step_display
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate
+    from identification.estimate import Estimate, Quantity
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.plan import CampaignPlan
 
@@ -140,13 +134,13 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
     )
     for effect in plan.effects:
         sizes = (
-            f"{info.name} {info.symbol} = {effect.parameters[info.name]:g}{_spaced(info.unit)}"
+            f"{info.name} {info.symbol} = {effect.parameters[info.name]:g}{beside(info.unit)}"
             for info in effect_class(effect.name).parameters()
             if info.name in effect.parameters
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{document['verdict']}\n")
-    show_tables(found_table(plan, document), waterfall_table(document))
+    show([found_table(plan, document), waterfall_table(document)])
 
 
 def found_table(plan: CampaignPlan, document: Document) -> Table:
@@ -211,10 +205,6 @@ def missed_faults(plan: CampaignPlan, document: Document) -> list[str]:
         if found is None
         or not isclose(found["value"], truth, abs_tol=CHECK_STDS * (found["std"] or 0.0), rel_tol=1e-9)
     ]
-
-
-def _spaced(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
 
 
 def _listed(values: Iterable[float]) -> str:
@@ -301,7 +291,31 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
     from identification.printing import status_lines
 
     say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
-    show_tables(*(truth_table(estimate, vars(plan.truth)) for estimate in estimates))
+    show([truth_table(estimate, vars(plan.truth)) for estimate in estimates])
     for estimate in estimates:
         for line in status_lines(estimate.to_json_dict()):
             say(f"Note, {estimate.estimator}: {line}")
+
+
+def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> Table:
+    """An estimate beside the injected values.
+
+    Args:
+        truth: injected values by name, each in the unit of the estimate's quantity of that name.
+    """
+    from identification.estimate import UNITS
+    from identification.printing import SYMBOLS, in_stds, significant, unit, with_std
+
+    rows = []
+    for name, value in truth.items():
+        cells = (f"{SYMBOLS[name]} {unit(UNITS[name])}", significant(value))
+        quantity: Quantity | None = getattr(estimate, name)
+        if quantity is None:
+            rows.append((*cells, estimate.status.name.lower().replace("_", " "), "", ""))
+            continue
+        error = quantity.value - value
+        relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
+        rows.append((*cells, with_std(quantity.value, quantity.std), relative, in_stds(error, quantity.std)))
+    heads = ("quantity", "truth", "estimate ± std", "error", "error/std")
+    right = ("truth", "error", "error/std")
+    return Table(f"{estimate.estimator} against the injected truth", heads, tuple(rows), right)

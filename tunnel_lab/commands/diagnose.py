@@ -25,8 +25,10 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.outputs import say, say_written, show, show_tables, step_display
+from tunnel_lab.terminal.outputs import say, say_written, show
+from tunnel_lab.terminal.progress import step_display
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -285,7 +287,7 @@ def compare(
         names = stems
     if len(set(names)) < len(names):
         names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
-    show_tables(*comparison_tables(names, diagnoses))
+    show(comparison_tables(names, diagnoses))
 
 
 def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[Table]:
@@ -322,7 +324,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         answer, texts = document["candidates"][0], {}
         for full, given in answer["parameters"].items():
             owner, _, name = full.rpartition(".")
-            mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
+            mark = unit_mark(beside(given["unit"], ""))
             owner = owner or answer["effect"]
             texts[owner, name] = spread_estimate(document, owner, given) or estimated(given, mark)
         parameters.append(texts)

@@ -14,7 +14,7 @@ from typer import Argument, Option
 from identification.blocks import Table
 from identification.printing import unit_mark
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import say, say_written, show_tables
+from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def run(
         say_written(json, markdown)
         return
     if name is None:
-        show_tables(listing(kinds))
+        show([listing(kinds)])
         say(ABOUT_DIRECTIONS)
         say("Details of one effect: tunnel effects NAME")
         return
@@ -163,7 +163,7 @@ def run(
         )
         for info in kind.parameters()
     )
-    show_tables(Table("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right))
+    show([Table("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right)])
     say(ABOUT_DIRECTIONS)
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 
@@ -202,7 +202,8 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
         parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]
         rows.append((kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters])))
     names = ("effect", "channel", "condition")
-    return Table("Effects beyond the nominal model", (*names, last), tuple(rows), names=names, ruled=True)
+    groups = tuple(kinds)
+    return Table("Effects beyond the nominal model", (*names, last), tuple(rows), names=names, groups=groups)
 
 
 def example(kind: type[Effect]) -> str:

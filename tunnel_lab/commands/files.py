@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
-from tunnel_lab.terminal.outputs import parts_table, say, show_tables
+from tunnel_lab.terminal.outputs import say, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
@@ -185,7 +186,7 @@ def import_files(
     given = kept | {key: value for key, value in stated.items() if value is not None}
     choices = validate(ImportChoices, given, Path("options"))
     imported = read_records(files, choices, conditions=conditions, name=out.resolve().name if out else "")
-    show_tables(parts_table(imported))
+    show([parts_table(imported)])
     for line in imported.remarks():
         say(f"Note: {line}")
     if preview is not None:

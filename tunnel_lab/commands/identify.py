@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 import textwrap
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,8 +15,9 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Block, Paragraph, Table
 from identification.estimators import SUMMARIES, make_estimator
+from identification.printing import budget_blocks, estimate_blocks
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
@@ -28,23 +31,17 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.outputs import (
-    bar,
-    budget_lines,
-    budget_table,
-    console,
-    say,
-    say_written,
-    show,
-    show_estimate,
-    show_tables,
-)
+from tunnel_lab.terminal.outputs import console, say, say_written, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from identification.estimators import Estimator
+    from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.turning_points import TurningPoints
 
+DIAGNOSE = "run the diagnosis"
+"""The ending of notes whose remedy is a diagnosis."""
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
 ESTIMATORS = "  {estimators}"
@@ -152,7 +149,7 @@ def run(
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
     with own_code([estimator]), bar("identifying runs", len(data.runs)) as progress:
         estimate = identify(whole, chosen, leave_out=left_out, throw=False, progress=progress)
-    found = None
+    made = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
         from identification.uncertainty import budget as budgets
 
@@ -160,7 +157,7 @@ def run(
         if uncertainties is not None:
             inputs = budgets.load_uncertainties(uncertainties)
         with own_code([estimator, *models]), console(stderr=True).status("uncertainty budget") as status:
-            found = budgets.make_budget(
+            made = budgets.make_budget(
                 data,
                 estimate,
                 partial(identify, estimator=chosen, throw=False),
@@ -172,22 +169,36 @@ def run(
                 },
                 progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
             )
-        estimate = budgets.with_budget(estimate, found)
-    document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
+        estimate = budgets.with_budget(estimate, made)
+    document = estimate.to_json_dict() | ({} if made is None else {"budget": made.to_json_dict()})
     if to_stdout:
         typer.echo(printable_json(json_text(document)), nl=False)
     else:
         if json is not None:
             write_json(json, document)
         detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
-        show_estimate(data, estimate, windows=detailed, source=campaign)
-        if found is not None:
+        show(estimate_shown(data, document, campaign, windows=detailed))
+        if made is not None:
             say("")
-            show((budget_table(document["budget"]), *map(Paragraph, budget_lines(document["budget"]))))
-            say("The standard deviations above are the combined ones.")
+            show(
+                (*budget_blocks(document), Paragraph("The standard deviations above are the combined ones."))
+            )
         say_written(json)
     if estimate.status.failed:
         raise typer.Exit(1)
+
+
+def estimate_shown(
+    campaign: Campaign, document: Mapping[str, Any], source: Path, *, windows: bool
+) -> Iterator[Block]:
+    """The blocks of an estimate, with the conditions of all runs, and with commands to copy in its notes."""
+    conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign.runs}
+    command = f"run tunnel diagnose {shlex.quote(str(source))}"
+    for block in estimate_blocks(document, conditions, windows=windows):
+        if isinstance(block, Paragraph):
+            yield replace(block, text=block.text.replace(DIAGNOSE, command))
+        else:
+            yield block
 
 
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
@@ -200,10 +211,10 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
 
     for line in points.said:
         say(f"Note: {points.name}: {line}", stderr=True)
-    found = fit_turning_points(points)
-    omega = Quantity(found.omega_n.value, found.omega_n.std, "rad/s")
-    zeta = Quantity(found.zeta.value, found.zeta.std, "1")
-    zero = Quantity(found.zero.value, found.zero.std, "rad")
+    fit = fit_turning_points(points)
+    omega = Quantity(fit.omega_n.value, fit.omega_n.std, "rad/s")
+    zeta = Quantity(fit.zeta.value, fit.zeta.std, "1")
+    zero = Quantity(fit.zero.value, fit.zero.std, "rad")
     run = RunEstimate(points.name, omega_n=omega, zeta=zeta, sensor_zero=zero)
     document = Estimate(points.name, "turning_points", (run,), (Status.NO_STIFFNESS,)).to_json_dict()
     if json is not None and str(json) == "-":
@@ -212,18 +223,18 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     if json is not None:
         write_json(json, document)
     rows = [
-        ("natural frequency ωn [rad/s]", found.omega_n),
-        ("damping ratio ζ", found.zeta),
-        ("period of the swing [s]", found.period),
-        ("logarithmic decrement of a period", found.decrement),
-        ("angle at rest [rad]", found.zero),
-        ("first swing from there [rad]", found.first_swing),
+        ("natural frequency ωn [rad/s]", fit.omega_n),
+        ("damping ratio ζ", fit.zeta),
+        ("period of the swing [s]", fit.period),
+        ("logarithmic decrement of a period", fit.decrement),
+        ("angle at rest [rad]", fit.zero),
+        ("first swing from there [rad]", fit.first_swing),
     ]
     cells = tuple((name, with_std(one.value, one.std)) for name, one in rows)
     heading = "value ± one standard deviation"
     title = f"{points.name}: {points.time_s.size} turning points"
-    show_tables(Table(title, ("quantity", heading), cells, right=(heading,)))
-    for line in found.said:
+    show([Table(title, ("quantity", heading), cells, right=(heading,))])
+    for line in fit.said:
         say(f"Note: {line}")
     say(
         "Note: turning points give ωn and ζ alone; a campaign, and a diagnosis, need the angle between them too"

@@ -17,7 +17,8 @@ from tunnel_lab.terminal.inputs import (
     estimator_option,
     refuse_unwritable_files,
 )
-from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import console, say, say_written, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def score(
     from tunnel_lab.experiments.score import score_grid, write_trials
     from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
     from tunnel_lab.experiments.score_view import check as checked
-    from tunnel_lab.experiments.score_view import score_view, verdict_lines, worse_table
+    from tunnel_lab.experiments.score_view import score_view, verdict_blocks
 
     names = chosen_estimators(estimators) or ALL_ESTIMATORS
     workers = crew(jobs, scheduler, usual=_JOBS)
@@ -159,9 +160,7 @@ def score(
     if baseline is not None:
         verdict = checked(baseline, results)
         say("")
-        show_tables(worse_table(verdict))
-        for line in verdict_lines(verdict):
-            say(line)
+        show(verdict_blocks(verdict))
         if failed or not verdict.passed:
             raise typer.Exit(1)
 

@@ -11,7 +11,8 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, split_names
-from tunnel_lab.terminal.outputs import bar, say, say_written
+from tunnel_lab.terminal.outputs import say, say_written
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, installing, library, shown
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from typer import Argument, Option
 
 from identification.blocks import Table
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import say, say_written, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
@@ -265,15 +266,15 @@ def plan_drive(
             duration=duration,
             progress=lambda: progress(next(tried), None),
         )
-    found = plan_from(best, rig, where)
-    driven = plan_bound(found, rig)
+    proposed = plan_from(best, rig, where)
+    driven = plan_bound(proposed, rig)
     write_whole(out, tomli_w.dumps(best.model_dump(exclude_none=True, exclude_defaults=True)).encode())
     bounds = _bounds(
         (rig_time(best) - changes) / (spent - changes),
         ("free decays", run_count(document), document.duration, spent, free),
         ("planned drive", cells, duration, rig_time(best), driven),
     )
-    show_tables(bounds)
+    show([bounds])
     if minutes is not None:
         say("The last row is for free decays repeated to the same rig time.")
     chosen = best.drive
@@ -282,7 +283,7 @@ def plan_drive(
     between = " to " if chosen.from_hz else ", "
     hertz = between.join(f"{rate:g}" for rate in rates)
     words = f"Drive: {chosen.kind.replace('_', ' ')}, {hertz} Hz, {chosen.amplitudes_nm[0]:g} N m peak"
-    say(f"{words}; response up to {peak_response(found, rig):.3g} rad")
+    say(f"{words}; response up to {peak_response(proposed, rig):.3g} rad")
     say_written(out)
 
 

@@ -10,7 +10,8 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import SchedulerOption, chosen_estimators, estimator_option
-from tunnel_lab.terminal.outputs import bar, say
+from tunnel_lab.terminal.outputs import say
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
+from identification.blocks import Table
 from tunnel_lab.terminal.inputs import SchedulerOption, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import bar, say, show_tables, table
+from tunnel_lab.terminal.outputs import say, show
+from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -132,16 +134,17 @@ def train(
     partial.unlink(missing_ok=True)
     record = trained.record
     headings = ("γ [1]", "α [1]", "β [1]", "ln evidence")
-    result = table(f"Trained with seed {record['seed']}", "network", "start", *headings, right=headings)
-    for name, network in record["networks"].items():
-        for number, start in enumerate(network["starts"], 1):
-            result.add_row(
-                f"{name} {'-'.join(map(str, network['sizes']))}",
-                f"{number}{' kept' if number == network['chosen_start'] else ''}",
-                f"{start['effective_parameters']:.1f} of {network['parameters']}",
-                f"{start['alpha']:.3f}", f"{start['beta']:.2e}", f"{start['log_evidence']:.1f}",
-            )  # fmt: skip
-    show_tables(result)
+    rows = tuple(
+        (
+            f"{name} {'-'.join(map(str, network['sizes']))}",
+            f"{number}{' kept' if number == network['chosen_start'] else ''}",
+            f"{start['effective_parameters']:.1f} of {network['parameters']}",
+            f"{start['alpha']:.3f}", f"{start['beta']:.2e}", f"{start['log_evidence']:.1f}",
+        )
+        for name, network in record["networks"].items()
+        for number, start in enumerate(network["starts"], 1)
+    )  # fmt: skip
+    show([Table(f"Trained with seed {record['seed']}", ("network", "start", *headings), rows, headings)])
     errors = record["errors"]
     say(
         f"On {record['data']['test_count']} test responses: errors of ζ up to {errors['zeta']:.1e} "

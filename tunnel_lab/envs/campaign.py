@@ -44,6 +44,7 @@ from tunnel_sim.vocabulary.arguments import (
 from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import beside
 
 Observation = dict[str, Array]
 WIDTH, HEIGHT = 960, 480
@@ -277,7 +278,7 @@ def _checked_severities(
         kind = Number(above=True, unit=severity.unit)
         low, high = checked_numbers(bounds, f"severities[{name!r}]", WHERE, kind, length=2)
         if low > high:
-            remedy = f"give the lower end of {severity.name} first, in {severity.unit}"
+            remedy = f"give the lower end of {severity.name} first{beside(severity.unit, ', in ')}"
             raise refusal(f"severities[{name!r}] = {bounds!r} is not a range", remedy)
         ranges[name] = (low, high)
     return ranges

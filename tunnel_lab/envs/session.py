@@ -199,13 +199,13 @@ class CampaignSession:
         conditions, truth = self._conditions, self.truth
         costs = (*known.costs, known.cost(choice))
         known = replace(known, choices=(*known.choices, choice), costs=costs, status="ok")
-        rng, own = self._rng.spawn(1)[0], self._deviations(len(known.choices) - 1)
-        zero = truth.sensor_zero + own.pop("zero", 0.0)
+        rng, deviations = self._rng.spawn(1)[0], self._deviations(len(known.choices) - 1)
+        zero = truth.sensor_zero + deviations.pop("zero", 0.0)
         condition = choice.condition(f"r{len(known.choices):02d}", conditions.rig.air.density)
         if conditions.linear:
             # closed form of the linear model; the belief is updated to first order
             link, time = conditions.link(choice), conditions.sample_times(choice.duration)
-            true, values = _deviating(choice, truth.values, own)
+            true, values = _deviating(choice, truth.values, deviations)
             decay = Decay(*map(float, conditions.link(true) @ shared_parameters(values)))
             if decay.stiffness <= 0.0 or decay.rate <= 0.0:
                 return replace(known, status="lost: the motion grows without bound")
@@ -222,7 +222,9 @@ class CampaignSession:
         settings = run_settings(truth.coefficients, condition)
         sensor = replace(conditions.sensor, zero=zero)
         try:
-            record = simulate(conditions.rig, settings, sensor, rng, effects=truth.effects, deviations=own)
+            record = simulate(
+                conditions.rig, settings, sensor, rng, effects=truth.effects, deviations=deviations
+            )
             known = replace(known, runs=(*known.runs, stated_run(condition, record)))
         except TunnelError as error:
             return replace(known, status=f"lost: {error.what}")

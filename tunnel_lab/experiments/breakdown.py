@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
-from rich.text import Text
 
+from identification.blocks import Paragraph, Table
 from identification.printing import significant
 from identification.scoring import score
 from tunnel_lab.experiments.answers import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, trials_of
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import figure, styled
-from tunnel_lab.terminal.outputs import table
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -36,7 +35,6 @@ from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
 
     from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -272,7 +270,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
     return View(
         "Bias caused by each unmodelled effect",
-        [*tables, ABOUT, *not_given_lines(not_given(results))],
+        [*tables, Paragraph(ABOUT), *not_given_notes(not_given(results))],
         {f"breakdown-{one.replace('_', '-')}": partial(breakdown_figure, frame, one) for one in given},
         {"breakdown.parquet": parquet(frame)},
     )
@@ -292,12 +290,12 @@ def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
     tables = []
     for first in range(0, len(estimators), _SIDE_BY_SIDE):
         some = estimators[first : first + _SIDE_BY_SIDE]
-        one_table = table(f"Bias of {NAMES[quantity]} [%]", "effect", "×", *some, right=("×", *some))
-        one_table.columns[0].no_wrap = True
-        for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows():
-            biases = [cells[effect, severity, name] for name in some]
-            one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *biases)
-        tables.append(one_table)
+        rows = tuple(
+            (effect, f"{severity:g}" if severity else "", *(cells[effect, severity, name] for name in some))
+            for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows()
+        )
+        title = f"Bias of {NAMES[quantity]} [%]"
+        tables.append(Table(title, ("effect", "×", *some), rows, right=("×", *some), names=("effect",)))
     return tables
 
 

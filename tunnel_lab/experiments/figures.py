@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import polars as pl
 
+from identification.blocks import Paragraph
 from identification.estimate import Quantity
 from identification.printing import SYMBOLS
 from identification.scoring import Score, Trials
@@ -71,10 +72,13 @@ def share_text(share: Proportion | None) -> str:
     return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
 
 
-def not_given_lines(absent: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Quantities that estimators do not give, a line for each estimator.
+def not_given_notes(absent: Mapping[str, tuple[str, ...]]) -> list[Paragraph]:
+    """Quantities that estimators do not give, a paragraph for each estimator.
 
     Args:
         absent: names of quantities by estimator.
     """
-    return [f"Not given by {name}: {', '.join(NAMES[one] for one in some)}." for name, some in absent.items()]
+    return [
+        Paragraph(f"Not given by {name}: {', '.join(NAMES[one] for one in some)}.")
+        for name, some in absent.items()
+    ]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
-from rich.text import Text
 
+from identification.blocks import Block, Paragraph, Table
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing import concise, significant
@@ -27,14 +26,10 @@ from identification.scoring import (
 )
 from identification.statistics import Proportion
 from tunnel_lab.experiments.experiment import parquet
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, share_text
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text
 from tunnel_lab.experiments.score import Results, groups_of
 from tunnel_lab.experiments.view import View
-from tunnel_lab.terminal.outputs import table
 from tunnel_sim.vocabulary.errors import TunnelError, counted
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 ABOUT = (
     "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter. Worst: of the cells. In "
@@ -171,34 +166,38 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
 def summary_tables(results: Results) -> list[Table]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
-    tables = []
-    trials = results.trials
-    for group, cells in groups_of(results.grid).items():
-        many = counted(len(cells), "cell")
-        result = table(
-            f"{group[0].upper()}{group[1:]} ({many})",
-            *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
-            right=("worst",),
+    heads = ("RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]")
+
+    def figures(name: str, cells: Sequence[int], quantity: str) -> tuple[str, ...]:
+        return pooled_figures([results.trials[name, cell, quantity] for cell in cells])
+
+    return [
+        _table(
+            results, f"{group[0].upper()}{group[1:]} ({counted(len(cells), 'cell')})", heads, cells, figures
         )
-        for name in results.estimators:
-            given = [q for q in results.grid.cells[cells[0]].quantities if results.gives(name, q)]
-            if given:
-                _section(result, results, name, cells)
-            for quantity in given:
-                result.add_row(
-                    f"  {NAMES[quantity]}", *pooled_figures([trials[name, cell, quantity] for cell in cells])
-                )
-        tables.append(result)
-    return tables
+        for group, cells in groups_of(results.grid).items()
+    ]
 
 
-def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -> None:
-    """The estimator's name and time, both in the first column, which has no heading."""
-    if result.row_count:
-        result.add_section()
-    result.columns[0].no_wrap = True
-    result.add_row(Text(name, style="bold"))
-    result.add_row(f"  {significant(results.milliseconds(name, cells), 2)} ms/record")
+def _table(
+    results: Results,
+    title: str,
+    heads: tuple[str, ...],
+    cells: Sequence[int],
+    figures: Callable[[str, Sequence[int], str], tuple[str, ...]],
+) -> Table:
+    """Each estimator's name and time in the first column, which has no heading, and a row for each quantity."""
+    rows: list[tuple[str, ...]] = []
+    groups: list[str] = []
+    for name in results.estimators:
+        given = [q for q in results.grid.cells[cells[0]].quantities if results.gives(name, q)]
+        if not given:
+            continue
+        time = f"  {significant(results.milliseconds(name, cells), 2)} ms/record"
+        rows += [(text, *[""] * len(heads)) for text in (name, time)]
+        rows += [(f"  {NAMES[quantity]}", *figures(name, cells, quantity)) for quantity in given]
+        groups += [name] * (2 + len(given))
+    return Table(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
 
 
 def score_view(results: Results, *, cells: bool = False) -> View:
@@ -211,26 +210,28 @@ def score_view(results: Results, *, cells: bool = False) -> View:
 
     return View(
         f"Score on the grid {results.grid.name}",
-        [*summary_tables(results), *(cell_tables(results) if cells else ()), *lines_below(results)],
+        [*summary_tables(results), *(cell_tables(results) if cells else ()), *notes_below(results)],
         {"score": partial(score_figure, results)},
         {"scores.parquet": parquet(scores_frame(results))},
     )
 
 
-def lines_below(results: Results) -> list[str]:
-    """Lines below the tables: the meaning of the figures, missing quantities, and the accuracy of few trials."""
-    return [ABOUT, *not_given_lines(results.not_given), *_few_trials(results)]
+def notes_below(results: Results) -> list[Paragraph]:
+    """Below the tables: the meaning of the figures, missing quantities, and the accuracy of few trials."""
+    return [Paragraph(ABOUT), *not_given_notes(results.not_given), *_few_trials(results)]
 
 
-def _few_trials(results: Results) -> list[str]:
+def _few_trials(results: Results) -> list[Paragraph]:
     """Uncertainty of the RMSE from the smallest number of trials."""
     fewest = min(results.grid.trials_for(name) for name in results.estimators)
     if fewest >= _FEW:
         return []
     low, high = reach_of_rmse(fewest)
     return [
-        f"Few trials: with {fewest} in a cell, the RMSE of many would be {low:.2g} to {high:.2g} times the one "
-        "shown (95 % interval for normal errors), which its standard error does not tell. --trials gives more."
+        Paragraph(
+            f"Few trials: with {fewest} in a cell, the RMSE of many would be {low:.2g} to {high:.2g} times the one "
+            "shown (95 % interval for normal errors), which its standard error does not tell. --trials gives more."
+        )
     ]
 
 
@@ -254,18 +255,13 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 
 def cell_tables(results: Results) -> list[Table]:
     """One table for each cell: a section for each estimator, a row for each quantity."""
-    trials = results.trials
-    tables = []
-    for index, cell in enumerate(results.grid.cells):
-        result = table(cell.label, "", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
-        for name in results.estimators:
-            given = [quantity for quantity in cell.quantities if results.gives(name, quantity)]
-            if given:
-                _section(result, results, name, [index])
-            for quantity in given:
-                result.add_row(f"  {NAMES[quantity]}", *cell_figures(score(trials[name, index, quantity])))
-        tables.append(result)
-    return tables
+    heads = ("RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
+
+    def figures(name: str, cells: Sequence[int], quantity: str) -> tuple[str, ...]:
+        return cell_figures(score(results.trials[name, cells[0], quantity]))
+
+    cells = results.grid.cells
+    return [_table(results, cell.label, heads, [index], figures) for index, cell in enumerate(cells)]
 
 
 def cell_figures(judged: Score) -> tuple[str, ...]:
@@ -283,28 +279,23 @@ def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
-def worse_table(verdict: Verdict) -> Table:
+def _worse_table(verdict: Verdict) -> Table:
     """The findings that are worse, the most significant first."""
-    result = table(
-        "Worse than the baseline",
-        *("estimator", "", "aspect", "before", "now", "p", "where"),
-        right=("before", "now", "p"),
-    )
+    rows = []
     for finding in verdict.worse[:_SHOWN_WORSE]:
         change = finding.change
         if change.aspect in ("bias", "spread"):
             before, now = significant(change.before, 3), significant(change.now, 3)
         else:
             before, now = f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
-        result.add_row(
-            Text(finding.estimator), NAMES[finding.quantity], change.aspect, before, now, f"{change.p_value:.1g}",
-            Text(finding.where),
-        )  # fmt: skip
-    return result
+        cells = (finding.estimator, NAMES[finding.quantity], change.aspect, before, now)
+        rows.append((*cells, f"{change.p_value:.1g}", finding.where))
+    right = ("before", "now", "p")
+    return Table("Worse than the baseline", ("estimator", "", "aspect", *right, "where"), tuple(rows), right)
 
 
-def verdict_lines(verdict: Verdict) -> list[str]:
-    """The result of a check in words."""
+def verdict_blocks(verdict: Verdict) -> list[Block]:
+    """The result of a check: the worse findings, and the verdict in words."""
     rate = f"{100 * verdict.false_alarm_rate:g} %"
     tests = f"{counted(len(verdict.findings), 'test')}, false-alarm rate {rate} of all together"
     worse = verdict.worse
@@ -322,4 +313,4 @@ def verdict_lines(verdict: Verdict) -> list[str]:
         lines = [f"No estimator is worse beyond sampling error ({tests})."]
     if verdict.added:
         lines.append(f"Not in the baseline, so not checked: {', '.join(verdict.added)}")
-    return lines
+    return [_worse_table(verdict), *map(Paragraph, lines)]

@@ -10,25 +10,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from identification.blocks import Paragraph, Table
 from identification.printing import concise, significant, unit
 from identification.scoring import Score, score
 from tunnel_lab.experiments.answers import NOT_ASKED, not_given
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_lines, share_text, trials_of
+from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text, trials_of
 from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_lab.terminal.outputs import table
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
 
     from identification.estimate import Quantity
 
@@ -128,7 +128,7 @@ def sweep_view(results: pl.LazyFrame, name: str) -> View:
     tables = (overall_table(lines), *map(axis_table, along.values()))
     return View(
         f"Sweep {name}",
-        [*tables, BRACKETS, *not_given_lines(unanswered(results))],
+        [*tables, Paragraph(BRACKETS), *not_given_notes(unanswered(results))],
         {name: partial(error_figure, part) for name, part in along.items()},
         {"summary.csv": csv.encode()},
     )
@@ -258,37 +258,39 @@ def overall_table(lines: Iterable[Line]) -> Table:
     # if only some cases have scatter, the table has only the others
     scattering = {line.at for line in every if line.axis in SCATTER_COLUMNS and line.at is not None}
     repeating = " and without scatter" if 0.0 in scattering else ""
-    result = table(
-        f"All cases {pooled}{repeating}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
-        "95 % covers\n[%]", "failed\n[%]", right=("trials",),
-    )  # fmt: skip
-    last = ""
-    for line in kept:
-        if last not in ("", line.estimator):
-            result.add_section()
-        last = line.estimator
-        score = line.score
-        result.add_row(
-            line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
-            _figure(score.rmse_over_bound), share_text(score.coverage), share_text(score.failures),
-        )  # fmt: skip
-    return result
+    heads = ("bias", "RMSE", "RMSE/\nbound", "95 % covers\n[%]", "failed\n[%]")
+    rows = tuple(
+        (
+            line.estimator,
+            NAMES[line.quantity],
+            str(line.score.count),
+            *map(_figure, (line.score.bias, line.score.rmse, line.score.rmse_over_bound)),
+            *map(share_text, (line.score.coverage, line.score.failures)),
+        )
+        for line in kept
+    )
+    return Table(
+        f"All cases {pooled}{repeating}",
+        ("estimator", "quantity", "trials", *heads),
+        rows,
+        right=("trials",),
+        groups=tuple(line.estimator for line in kept),
+    )
 
 
 def axis_table(lines: Sequence[Line]) -> Table:
     """RMSE along one axis, a column for each quantity that has a panel in the figures."""
     label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
-    heads = [f"RMSE {NAMES[name]}" for name in quantities]
-    result = table(f"Error against {label}", f"{label} {unit(at_unit)}", "estimator", *heads)
+    heads = (f"{label} {unit(at_unit)}", "estimator", *(f"RMSE {NAMES[name]}" for name in quantities))
     cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
-    for at in sorted({line.at for line in lines if line.at is not None}):
-        if result.row_count:
-            result.add_section()
-        for estimator in dict.fromkeys(line.estimator for line in lines):
-            figures = [_figure(cells.get((at, estimator, name))) for name in quantities]
-            result.add_row(significant(at), estimator, *figures)
-    return result
+    places = sorted({line.at for line in lines if line.at is not None})
+    pairs = list(product(places, dict.fromkeys(line.estimator for line in lines)))
+    rows = tuple(
+        (significant(at), name, *(_figure(cells.get((at, name, quantity))) for quantity in quantities))
+        for at, name in pairs
+    )
+    return Table(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
 
 
 def _figure(quantity: Quantity | None) -> str:

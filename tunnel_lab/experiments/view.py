@@ -1,4 +1,4 @@
-"""The view of an experiment: tables and lines for a terminal, files of figures and data, and a page of them."""
+"""The view of an experiment: blocks for a terminal, files of figures and data, and a page of them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.blocks import Block, Paragraph, as_html
+from identification.blocks import Block, Figure, as_html
 from tunnel_lab.plotting.style import save_both
 from tunnel_lab.report.page import page_of
-from tunnel_lab.terminal.outputs import block_table, show, show_tables
+from tunnel_lab.terminal.outputs import show
 from tunnel_sim.files.writing import output_folder, write_whole
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from rich.table import Table as RichTable
+    from matplotlib import figure
 
 
 @dataclass(frozen=True)
@@ -25,49 +24,31 @@ class View:
     """What an experiment has found.
 
     Args:
-        parts: blocks, tables of a terminal and lines, in their order.
         figures: by name of their files, without suffix; drawn when they are written.
         data: contents of further files, by name.
     """
 
     title: str
-    parts: Sequence[Block | RichTable | str]
-    figures: Mapping[str, Callable[[], Figure | None]] = field(default_factory=dict)
+    blocks: Sequence[Block]
+    figures: Mapping[str, Callable[[], figure.Figure | None]] = field(default_factory=dict)
     data: Mapping[str, bytes] = field(default_factory=dict)
 
     def write(self, folder: Path) -> str:
         """Write data, figures (PNG and PDF) and the page ``index.html`` to a folder; a line that names them."""
         output_folder(folder)
         written = [write_whole(folder / name, content) for name, content in self.data.items()]
-        pictures = []
+        images = {}
         for name, draw in self.figures.items():
             drawn = draw()
             if drawn is not None:
                 written += save_both(drawn, folder / f"{name}.png")
-                pictures.append(written[-2])
-        written.append(write_whole(folder / "index.html", self._page(pictures).encode()))
+                content = b64encode(written[-2].read_bytes()).decode()
+                images[name] = f'<img alt="{escape(name)}" src="data:image/png;base64,{content}">'
+        captioned = [Figure(name, name.replace("-", " ")) for name in images]
+        page = page_of(self.title, as_html([*self.blocks, *captioned], images))
+        written.append(write_whole(folder / "index.html", page.encode()))
         return f"Written to {folder}: {', '.join(path.name for path in written)}"
 
     def show(self) -> None:
-        """Print tables and lines."""
-        for part in self.parts:
-            if isinstance(part, str):
-                show([Paragraph(part)])
-            elif isinstance(part, Block):
-                show([part])
-            else:
-                show_tables(part)
-
-    def _page(self, pictures: Sequence[Path]) -> str:
-        blocks: list[Block] = []
-        for part in self.parts:
-            if isinstance(part, str):
-                blocks.append(Paragraph(part))
-            else:
-                blocks.append(part if isinstance(part, Block) else block_table(part))
-        parts = [as_html(blocks)]
-        for path in pictures:
-            name = escape(path.stem.replace("-", " "))
-            content = b64encode(path.read_bytes()).decode()
-            parts.append(f'<figure><img alt="{name}" src="data:image/png;base64,{content}"></figure>')
-        return page_of(self.title, "\n".join(parts))
+        """Print the blocks."""
+        show(self.blocks)

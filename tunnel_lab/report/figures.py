@@ -125,31 +125,32 @@ def waterfall_figure(document: Document) -> Figure | None:
     if len(steps) < 2:
         return None
     unit, size = misfit_scale(document)
-    left = np.array([size(step["excess"]) for step in steps], np.float64)
+    misfits = np.array([size(step["excess"]) for step in steps], np.float64)
     without = {name: size(value) for name, value in document.get("without", {}).items()}
     alone = [without.get(step["effect"], np.nan) if len(without) > 1 else np.nan for step in steps]
-    fig = figure(NARROW, 1.2 + 0.36 * (left.size + 1))
+    fig = figure(NARROW, 1.2 + 0.36 * (misfits.size + 1))
     axes = fig.add_subplot()
-    rows, upper = np.arange(left.size + 1), np.maximum(left[:-1], left[1:])
-    lower = np.minimum(left[:-1], left[1:])
-    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
-    axes.vlines(left, rows[:-1], rows[1:], color=QUIET, linewidth=0.8, zorder=0.9)
+    rows, upper = np.arange(misfits.size + 1), np.maximum(misfits[:-1], misfits[1:])
+    lower = np.minimum(misfits[:-1], misfits[1:])
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(misfits)]
+    axes.vlines(misfits, rows[:-1], rows[1:], color=QUIET, linewidth=0.8, zorder=0.9)
     axes.barh(rows[1:-1], upper - lower, left=lower, color=colours, height=0.55)
-    for row, value, colour in ((0, left[0], BEFORE), (rows[-1], left[-1], ACCENT)):
+    for row, value, colour in ((0, misfits[0], BEFORE), (rows[-1], misfits[-1], ACCENT)):
         axes.plot(value, row, "o", color=colour, ms=8, clip_on=False)
     if np.isfinite(alone).any():
         label = "without this cause alone"
         axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
     names = [textwrap.fill(f"+ {plain(answer_name(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(rows, ["nominal model", *names, "the rest"])
-    axes.set(ylim=(left.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
+    axes.set(ylim=(misfits.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
     axes.locator_params(axis="x", nbins=6)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
     axes.axvline(0.0, color=QUIET, linewidth=0.8, zorder=0.8)
     grid(axes, "x")
     shown = [
-        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}" for value in left.tolist()
+        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}"
+        for value in misfits.tolist()
     ]
     rest = document.get("rest") or {}
     if rest.get("significant") is False:
@@ -158,7 +159,7 @@ def waterfall_figure(document: Document) -> Figure | None:
         shown[-1] += ", material" if rest.get("material") else ", immaterial"
     # The residual after the last cause is given in the row of the rest.
     words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
-    _place_texts(axes, words, [left[0], *upper, left[-1]], [*alone, np.nan])
+    _place_texts(axes, words, [misfits[0], *upper, misfits[-1]], [*alone, np.nan])
     noise = size(SIGMAS * (excess_std(document) or _LEAST_EXCESS))
     seen = noise > _VISIBLE * axes.get_xlim()[1]
     axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)

@@ -21,21 +21,21 @@ _MOST = 1.6  # times the law's greatest friction: very uncertain points lie beyo
 @styled
 def friction_figure(document: Document) -> Figure | None:
     """Friction against rate with 95 % intervals; None for an answer without friction."""
-    found = (document.get("maps") or {}).get("friction")
-    if found is None:
+    curve = (document.get("maps") or {}).get("friction")
+    if curve is None:
         return None
-    rate, moment, std = (np.array(found[name], np.float64) for name in ("rate_rad_s", "moment", "std"))
+    rate, moment, std = (np.array(curve[name], np.float64) for name in ("rate_rad_s", "moment", "std"))
     fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
     low, high = moment - INTERVAL * std, moment + INTERVAL * std
     axes.fill_between(rate, np.maximum(low, 0.0), high, color=AFTER, alpha=0.25, lw=0)
-    load = found.get("per_load", 0.0)
+    load = curve.get("per_load", 0.0)
     more = f" without load; {100.0 * load:.2g} % of the load comes on top" if load else ""
     axes.plot(rate, moment, color=AFTER, label=f"law, fitted{more}")
     tops = [float(high.max())]
-    if found["points"]:
+    if curve["points"]:
         at, mean, error = (
-            np.array([point[name] for point in found["points"]], np.float64)
+            np.array([point[name] for point in curve["points"]], np.float64)
             for name in ("rate_rad_s", "moment", "std")
         )
         axes.errorbar(
@@ -44,8 +44,8 @@ def friction_figure(document: Document) -> Figure | None:
         )  # fmt: skip
         tops.append(min(float((mean + INTERVAL * error).max()), _MOST * float(moment.max())))
     axes.set_ylim(0.0, _ROOM * max(tops))
-    mark = "N m" if found["unit"] == "N m" else f"{unit_mark(found['unit'])}, over inertia"
-    axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(found['effect'])} [{mark}]")
+    mark = "N m" if curve["unit"] == "N m" else f"{unit_mark(curve['unit'])}, over inertia"
+    axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(curve['effect'])} [{mark}]")
     log_axis(axes, "x")
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if load else 2, borderpad=0.0, borderaxespad=0.3

@@ -44,7 +44,8 @@ def given_campaign(path: Path) -> Campaign:
 
     A summary of an imported file of a data logger is printed on standard error.
     """
-    from tunnel_lab.terminal.outputs import bar, say
+    from tunnel_lab.terminal.outputs import say
+    from tunnel_lab.terminal.progress import bar
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:

@@ -1,22 +1,18 @@
-"""The base class of all effects: parameters, hooks where an effect acts, traits for finding it.
+"""The base class of all effects: its traits, and hooks where an effect acts.
 
 Only the chain of a run's effects (`tunnel_sim.effects.chain`) calls their hooks.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import itertools
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, TypeAlias, cast
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from tunnel_sim.effects.evidence import Residuals, Sought
-from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
+from tunnel_sim.effects.traits import Traits
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -38,306 +34,27 @@ MULTIPLES = (1.0, 2.0, 3.0)
 REFERENCE_RELEASE = 0.35
 """Release at which all forms of a second mode have the same amplitude, rad."""
 
-Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
-Condition = Literal["always", "wind_on"]
 
 #: Parameters of the moment law by name.
 Law: TypeAlias = Mapping[str, float]
-Text: TypeAlias = Callable[[float, float | None, str], str]
 
 #: Random draw of a run for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Traits):
     """An effect that the nominal model leaves out.
 
     The first parameter is the severity; at zero severity (the null) the effect does nothing. A hook does nothing
     unless an effect overrides it. ``stated`` is the run as the campaign states it, without any effect; ``drawn`` is
     the value of `draw` for the run.
-
-    Every effect states ``example``, values of its parameters in their order at which it is visible. A built-in one
-    also states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect takes the
-    next number).
-
-    Traits, with defaults that an effect overrides:
-
-    - ``law_terms``: the moment law's parameters for the effect's own, in their order; empty: none.
-    - ``random``: kind of spectrum of a random moment. Vortex shedding also has a line: its phase may wander or not.
-    - ``line``: the cause of a periodic effect's frequency, in a word; its phase differs from run to run.
-    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
-    - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
-    - ``fitted``: whether a fit of the deterministic motion can find it; else records or spectra show it.
-    - ``on_spring``: whether its moment is proportional to the spring's stiffness.
-    - ``parts``: whether it separates the body from its support, as play does.
-    - ``driven``: whether it acts on driven runs only.
-    - ``delays``: whether it shifts the input of driven runs in time.
-    - ``of_moment``: whether it changes an input that an actuator exerts, not the motion of a root or a base.
-    - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
-      neither is included where a base turns with a known acceleration.
-    - ``lattice``: whether it changes the quantisation step.
-    - ``scatters``: the property of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
-      ``mechanical_damping``; empty: none.
-    - ``keeps_time``: the parameter of the moment law whose frequency is proportional to the wind speed; empty:
-      none.
-    - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
-      integration step across it is less accurate, and the tests allow for this.
-    - ``remembers``: whether a reading depends on earlier samples.
-    - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
-    - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
-    - ``resembles``: other channels that its residual may point to.
-    - ``tries``: how many starting points of a fit are worth trying.
-    - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
-    - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
-      a parameter in braces stands for its value.
-    - ``caveat``: how to read the coefficients that are reported with it.
     """
-
-    name: ClassVar[str]
-    place: ClassVar[int]
-    channel: ClassVar[Channel]
-    condition: ClassVar[Condition]
-    equation: ClassVar[str]
-    signature: ClassVar[str]
-    references: ClassVar[tuple[str, ...]]
-    example: ClassVar[tuple[float, ...]]
-
-    law_terms: ClassVar[tuple[str, ...]] = ()
-    random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
-    line: ClassVar[str] = ""
-    skips: ClassVar[bool] = False
-    autonomous: ClassVar[bool] = True
-    fitted: ClassVar[bool] = True
-    on_spring: ClassVar[bool] = False
-    parts: ClassVar[bool] = False
-    driven: ClassVar[bool] = False
-    delays: ClassVar[bool] = False
-    of_moment: ClassVar[bool] = False
-    by_angle_in_room: ClassVar[bool] = False
-    lattice: ClassVar[bool] = False
-    scatters: ClassVar[str] = ""
-    keeps_time: ClassVar[str] = ""
-    jumps: ClassVar[bool] = False
-    remembers: ClassVar[bool] = False
-    ahead_of_sensor: ClassVar[bool] = False
-    turns: ClassVar[str] = ""
-    resembles: ClassVar[tuple[Channel, ...]] = ()
-    tries: ClassVar[int] = 1
-    size: ClassVar[str] = ""
-    advice: ClassVar[str] = ""
-    caveat: ClassVar[str] = ""
-
-    def __post_init__(self) -> None:
-        """Refuse a parameter that is not a finite number within its bounds, or not whole where it selects cases."""
-        for info in self.parameters():
-            value = getattr(self, info.name)
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
-                what = f"{info.name} = {value!r} is out of range"
-                remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
-                raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
-            if info.of_input and value != round(value):
-                what = f"{info.name} = {value!r} is not a valid case"
-                remedy = f"give a whole number from {info.lower:g} to {info.upper:g}"
-                raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
-
-    @classmethod
-    @functools.cache
-    def parameters(cls) -> tuple[ParameterInfo, ...]:
-        """The effect's parameters, the severity first."""
-        return tuple(
-            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-            for own in dataclasses.fields(cls)
-        )
-
-    @classmethod
-    def forms(cls) -> tuple[tuple[str, ...], ...]:
-        """The general forms, each by the names of its parameters; a fit frees one of them, the first by default."""
-        names = tuple(info.name for info in cls.parameters() if info.form)
-        return (names,) if names else ()
 
     @classmethod
     def column(cls, effects: Sequence[Effect], name: str) -> Array:
         """A parameter of several effects of the class, in its unit, shape (effects,)."""
         return np.array([getattr(effect, name) for effect in effects], np.float64)
-
-    @property
-    def severity(self) -> float:
-        """Value of the first parameter, in its unit."""
-        return float(getattr(self, self.parameters()[0].name))
-
-    @classmethod
-    def own_numbers(cls, instants: int) -> tuple[str, ...]:
-        """Names of the effect's unknowns of every run: the phase of a periodic effect, or instants.
-
-        Args:
-            instants: number of instants of an effect that skips samples.
-        """
-        if cls.skips:
-            return tuple(f"instant_{number + 1}" for number in range(instants))
-        return ("phase",) if cls.line else ()
-
-    @classmethod
-    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
-        """Starting points of a fit, for an effect that has a phase or instants of its own in every run.
-
-        Args:
-            residuals: of a fit without it.
-
-        Returns:
-            The result of the search in the residuals, for each way in which the effect may act.
-        """
-        del residuals
-        return ()
-
-    @property
-    def is_null(self) -> bool:
-        """Whether the effect does nothing."""
-        return self.severity == 0.0
-
-    @property
-    def depends_on_release(self) -> bool:
-        """Whether its moment or its reading depends on more than angle and rate: on time, or on the release."""
-        return not self.autonomous
-
-    @classmethod
-    def chosen_spring(cls) -> str | None:
-        """Name of the parameter that is a spring's stiffness; None if there is none."""
-        return next((info.name for info in cls.parameters() if info.chosen_spring), None)
-
-    @classmethod
-    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """Its size in plain words, such as ``dry friction of 0.0040 N m``; empty without ``size``.
-
-        Args:
-            values: of its parameters, in their units.
-            stds: standard deviations of these, in the same units; None where not known.
-            text: writes a value with its standard deviation and its unit.
-        """
-        said = cls.size
-        for info in cls.parameters():
-            if info.name in values:
-                shown = text(values[info.name], stds.get(info.name), info.unit)
-                said = said.replace(f"{{{info.name}}}", shown)
-        return said
-
-    @classmethod
-    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Starting values for a fit.
-
-        Args:
-            campaign: circumstances on which the values depend.
-
-        Returns:
-            Starting values, the most promising first; empty where such a campaign cannot show the effect.
-        """
-        severity = cls.parameters()[0]
-        return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
-
-    @classmethod
-    def departure(
-        cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float, float]:
-        """Change of the runs' linear motions by a relative deviation of 1 of the scattering property.
-
-        Args:
-            spring: Kr, N m/rad, shape (runs,).
-            damping: Cr, N m s/rad, shape (runs,).
-            air_stiffness: Ka of the run, N m/rad, shape (runs,).
-            air_damping: Ca of the run, N m s/rad, shape (runs,).
-
-        Returns:
-            Changes of the stiffness Kr − Ka, N m/rad, of the damping Cr − Ca, N m s/rad, and of the wind speed, a
-            share of it.
-        """
-        del spring, damping, air_stiffness, air_damping
-        return 0.0, 0.0, 0.0
-
-    @classmethod
-    def small_swings(
-        cls, stiffness: float, damping: float, values: Mapping[str, float]
-    ) -> tuple[float, float]:
-        """Stiffness and damping of a rigid body with the same small swings as the body with the effect.
-
-        Args:
-            stiffness: without it, per unit inertia, 1/s².
-            damping: without it, per unit inertia, 1/s.
-            values: its parameters by name, per unit inertia.
-        """
-        del values
-        return stiffness, damping
-
-    def plausible(self, omega: float) -> bool:
-        """Whether a fitted effect still deserves its name.
-
-        Args:
-            omega: angular frequency of the motion, rad/s.
-
-        Returns:
-            False where its parameters make it part of the motion itself.
-        """
-        del omega
-        return True
-
-    def alike(self) -> Sequence[Trial]:
-        """Other values of its parameters with the same effect on the slow motion.
-
-        Returns:
-            Values, with the one that linear theory may scale; χ² may have another minimum near any of them. Empty
-            if there is only one minimum.
-        """
-        return ()
-
-    def stands(self, stiffness: float) -> float:
-        """Greatest angle from rest at which the effect holds a body that has stopped.
-
-        Args:
-            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment.
-
-        Returns:
-            The angle, rad; 0 for an effect that cannot hold a body.
-        """
-        del stiffness
-        return 0.0
-
-    def sliding(self, rate: Array) -> Array | None:
-        """The effect's friction while the body moves at a steady rate, against the motion.
-
-        Args:
-            rate: above 0, rad/s, shape (n,).
-
-        Returns:
-            The moment, N m, shape (n,); None for an effect other than friction.
-        """
-        del rate
-        return None
-
-    def moment_density(self, rate: float, reference_moment: float) -> float:
-        """Spectral intensity of the effect's random moment, as if it were white.
-
-        Args:
-            rate: angular frequency of the motion, rad/s.
-            reference_moment: ½ρV²Al of the run, N m; 0 with the wind off.
-
-        Returns:
-            q of the moment, ⟨M(t)M(t′)⟩ = q δ(t − t′), (N m)² s; 0 without a broad spectrum.
-        """
-        del rate, reference_moment
-        return 0.0
-
-    def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Uncertainty of Cnβ and Cnr due to the part of the effect's form that free decays do not show.
-
-        Args:
-            cn_beta: Cnβ as fitted, 1/rad.
-            runs: the campaign's wind-on runs.
-
-        Returns:
-            Standard deviations of Cnβ and Cnr, 1/rad.
-        """
-        del cn_beta, runs
-        return 0.0, 0.0
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
         """Draw the random part of the effect in one run.
@@ -383,11 +100,6 @@ class Effect:
             where=f"effect {self.name}",
             remedy="draw it with EffectChain.draw, or leave the effect out",
         )
-
-    @property
-    def stiffness_at_rest(self) -> float:
-        """Stiffness that the effect adds to the rig at rest, N m/rad: 0 unless it acts as a spring."""
-        return 0.0
 
     def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""

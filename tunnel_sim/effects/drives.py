@@ -11,8 +11,9 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Drawn, Effect, Text
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
+from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics.run_settings import RunSettings
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"

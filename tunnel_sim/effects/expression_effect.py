@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tunnel_sim.effects.base import Channel, Condition, Drawn, Effect
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
+from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -143,12 +144,12 @@ def expression_effect(
     _check_names(parameters)
     formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))
     expected = "N m" if reading is None else "rad"
-    units = _UNITS | {own: quantity.unit for own, quantity in parameters.items()}
-    found = formula.dimension({own: dimension(unit) for own, unit in units.items()})
+    units = _UNITS | {symbol: quantity.unit for symbol, quantity in parameters.items()}
+    found = formula.dimension({symbol: dimension(unit) for symbol, unit in units.items()})
     if found != dimension(expected):
         what = f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})"
         raise TunnelError(what, remedy="correct the expression or the units of its parameters")
-    unused = [own for own in parameters if own not in formula.names]
+    unused = [symbol for symbol in parameters if symbol not in formula.names]
     if unused:
         raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
     # refused where it acts at its null, does nothing beyond it or has no value somewhere
@@ -172,11 +173,11 @@ def expression_effect(
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
     fields = []
-    for own, q in parameters.items():
+    for symbol, q in parameters.items():
         field = parameter(
-            own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
+            symbol, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
         )
-        fields.append((own, float, field))
+        fields.append((symbol, float, field))
     first, *others = parameters.values()
     namespace: dict[str, Any] = {
         "name": name,
@@ -224,7 +225,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
     missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
     tables = validate(EffectsDocument, load_toml(path, missing=missing), path).effects
     names = [table.name for table in tables]
-    found = []
+    effects = []
     for table in tables:
         where = f"{shown(path)}, effect '{table.name}'"
         if names.count(table.name) > 1:
@@ -240,7 +241,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
             stated = {
                 key: getattr(table, key) for key in ("channel", "condition", "moment", "reading", "summary")
             }
-            found.append(expression_effect(table.name, parameters=quantities, **stated))
+            effects.append(expression_effect(table.name, parameters=quantities, **stated))
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from error
-    return tuple(found)
+    return tuple(effects)

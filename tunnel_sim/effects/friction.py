@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect, Text
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -120,24 +121,24 @@ class CoulombFriction(Effect):
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
         """The friction, and its dependence on the rate or the load."""
-        said = super().phrase(values, stds, text)
+        words = super().phrase(values, stds, text)
         if (load := values.get("load", 0.0)) > 0.0:
             std = stds.get("load")
             share = text(100.0 * load, None if std is None else 100.0 * std, "%")
-            said = f"{said} and {share} of the moment carried by the joint"
+            words = f"{words} and {share} of the moment carried by the joint"
         power, saturation, peak = (values.get(name, 0.0) for name in ("exponent", "saturation", "peak"))
         if power > 0.0:
-            return f"{said} that rises as the rate to the power of {text(power, stds.get('exponent'), '1')}"
+            return f"{words} that rises as the rate to the power of {text(power, stds.get('exponent'), '1')}"
         if saturation > 0.0:
-            return f"{said} that fades below a rate of {text(saturation, stds.get('saturation'), 'rad/s')}"
+            return f"{words} that fades below a rate of {text(saturation, stds.get('saturation'), 'rad/s')}"
         if peak > 0.0:
             std, rate = stds.get("peak"), text(values["peak_rate"], stds.get("peak_rate"), "rad/s")
             more = text(100.0 * peak, None if std is None else 100.0 * std, "%")
-            return f"{said} and up to {more} more below a rate of {rate}"
+            return f"{words} and up to {more} more below a rate of {rate}"
         presliding, std = values.get("presliding", 0.0), stds.get("presliding")
         if std is not None and presliding > _SHOWN * std:
-            return f"{said} whose contact deflects by {text(presliding, std, 'rad')} before it slides"
-        return said
+            return f"{words} whose contact deflects by {text(presliding, std, 'rad')} before it slides"
+        return words
 
     def stands(self, stiffness: float) -> float:
         """The angle at which the spring's moment equals the friction at rest, rad; 0 where the latter vanishes."""

@@ -9,8 +9,9 @@ from math import ceil, cos, exp, isclose, log, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Text
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
+from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings

@@ -65,6 +65,11 @@ class ParameterInfo:
     along_run: bool
     of_load: bool
 
+    @property
+    def form_start(self) -> float:
+        """Where a fit frees a form: its default, or half a step inside a bound, where its slope may vanish."""
+        return self.default + 0.5 * self.scale if self.default == self.lower else self.default
+
     def fit_range(self, swing: float) -> tuple[float, float]:
         """Least and greatest value that a fit may take.
 

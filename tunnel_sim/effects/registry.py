@@ -12,7 +12,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, TypeVar, cast, get_args
 
-from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
+from tunnel_sim.effects.base import Effect, make_effect
+from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
 from tunnel_sim.vocabulary.units import dimension
 
@@ -63,7 +64,7 @@ def check_described(kind: object) -> None:
         except TunnelError as error:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-    if (kind.line or kind.skips) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
+    if kind.own_numbers(1) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
         what = "has a phase or instants in every run, and does not say how they are found"
         raise TunnelError(what, where=where, remedy="override sought")
     if kind.random and len(kind.parameters()) != _OF_SPECTRUM:

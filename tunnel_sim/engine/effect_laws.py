@@ -28,6 +28,7 @@ from tunnel_sim.vocabulary.plan import (
     aerodynamic_stiffness,
 )
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.units import beside
 
 INTEGRATION_TOLERANCE = 2e-5
 """Greatest error of the integration, rad: a twenty-fifth of the sensor's noise, as decision 0006 states it."""
@@ -141,7 +142,7 @@ def bounds(kind: type[Effect]) -> str:
             except TunnelError:
                 continue
             if math.isfinite(bound):
-                return f"{info.name} beyond {bound:g} {info.unit} is accepted"
+                return f"{info.name} beyond {bound:g}{beside(info.unit)} is accepted"
     return ""
 
 

@@ -268,10 +268,10 @@ def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
     """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
-    own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
+    spring = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
-    total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
-    total -= (1.0 - weight) * own(offset)  # the spring carries the weight
+    total = spring(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
+    total -= (1.0 - weight) * spring(offset)  # the spring carries the weight
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
     if not total.degree():
         moment, own_actuator = -float(total.coef[0]), model.law.actuator
@@ -293,7 +293,7 @@ def _write_spring(
     if real.size == 0:
         remedy = "add a spring to the joint"
         raise TunnelError("the patched model would have no rest position", remedy=remedy)
-    usual = -offset if np.any(own.coef) else 0.0
+    usual = -offset if np.any(spring.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
     joint = spec.joint(model.joint)
@@ -309,7 +309,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
     damping = model.dof_damping[0], *model.dof_dampingpoly[0]
     affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
     constant = np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0])
-    found = {
+    attributes = {
         ("joint armature", "kg m2"): [model.dof_armature[0]],
         ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
         ("joint springref", "rad"): [model.qpos_spring[0]],
@@ -330,7 +330,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
         ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
         ("plugin vwt.yaw_moment", "1"): [model.nplugin],
     }
-    return {name: tuple(map(float, values)) for name, values in found.items()}
+    return {name: tuple(map(float, values)) for name, values in attributes.items()}
 
 
 def _filters(model: mujoco.MjModel, actuator: int) -> bool:

@@ -67,9 +67,9 @@ def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
     names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
     documents: dict[str, bytes] = {}
     assets: dict[str, bytes] = {}
-    left = [("", text)]
-    while left:
-        folder, document = left.pop()
+    unread = [("", text)]
+    while unread:
+        folder, document = unread.pop()
         first, *others = document.split("<!--")
         document = first + "".join(one.partition("-->")[2] for one in others)
         folders.update(_values(_FOLDER, document))
@@ -84,7 +84,7 @@ def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
                 documents[place] = content
                 size = sum(map(len, documents.values()))
                 check_count(size, limits.MODEL_BYTES, "bytes of XML", where, _SMALLER)
-                left.append((posixpath.dirname(place), decoded(content, shown(path.parent / place))))
+                unread.append((posixpath.dirname(place), decoded(content, shown(path.parent / place))))
     if len(folders) > _MOST_FOLDERS:
         raise TunnelError(f"names {len(folders) - 1} folders", where=where, remedy="use one meshdir")
     missing = []

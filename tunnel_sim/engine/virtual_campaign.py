@@ -24,6 +24,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
+from tunnel_sim.vocabulary.units import beside
 
 
 def simulate_campaign(
@@ -183,7 +184,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         effect = effect_from(setting.name, setting.parameters)
         severity = effect.parameters()[0]
         if severity.name not in setting.parameters:  # its default severity has no effect
-            remedy = f"give the {severity.meaning} in {severity.unit}, such as {severity.scale:g}"
+            remedy = f"give the {severity.meaning}{beside(severity.unit, ' in ')}, such as {severity.scale:g}"
             raise TunnelError(f"{severity.name} is missing", where=f"effect {effect.name}", remedy=remedy)
         effects.append(effect)
     names = [effect.name for effect in effects]

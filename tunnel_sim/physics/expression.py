@@ -176,23 +176,23 @@ def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
         return of[0] or of[1]
     if operation in ("negative", "abs"):
         return of[0]
-    one, other = of[0] or NUMBER, of[-1] or NUMBER
+    first, other = of[0] or NUMBER, of[-1] or NUMBER
     if operation in ("multiply", "divide"):
-        return product(one, other, -1.0 if operation == "divide" else 1.0)
+        return product(first, other, -1.0 if operation == "divide" else 1.0)
     if operation == "power":
         if other != NUMBER:
             raise TunnelError(f"an exponent in {in_si(other)}", remedy="an exponent is a number")
-        if one == NUMBER:
+        if first == NUMBER:
             return NUMBER
         power = _folded(parts[1], {})
         if not isinstance(power, float):
-            what = f"a quantity in {in_si(one)} to the power of a parameter"
+            what = f"a quantity in {in_si(first)} to the power of a parameter"
             raise TunnelError(what, remedy="divide it by one of the same unit")
-        return product(NUMBER, one, power)
+        return product(NUMBER, first, power)
     if operation == "sqrt":
-        return product(NUMBER, one, 0.5)
-    if one != NUMBER and operation != "sign":
-        raise TunnelError(f"{operation} of a quantity in {in_si(one)}", remedy="its argument is a number")
+        return product(NUMBER, first, 0.5)
+    if first != NUMBER and operation != "sign":
+        raise TunnelError(f"{operation} of a quantity in {in_si(first)}", remedy="its argument is a number")
     return NUMBER
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean
+from tunnel_sim.vocabulary.units import beside
 
 
 class EnvError(TunnelError, ValueError):
@@ -37,14 +38,14 @@ class Number:
         least, most: bounds, in the unit; infinite: none.
         above: whether the number must exceed ``least``.
         whole: whether it must be a whole number.
-        unit: for the remedy; empty: none.
+        unit: for the remedy.
     """
 
     least: float = 0.0
     most: float = inf
     above: bool = False
     whole: bool = False
-    unit: str = ""
+    unit: str = "1"
 
     @property
     def words(self) -> str:
@@ -69,7 +70,7 @@ class Number:
             enough = number > self.least if self.above else number >= self.least
             if isfinite(number) and enough and number <= self.most and (not self.whole or number % 1 == 0.0):
                 return number
-        remedy = f"give {self.words}{self.unit and f', in {self.unit}'}"
+        remedy = f"give {self.words}{beside(self.unit, ', in ')}"
         raise EnvError(f"{name} = {value!r} is not {self.words}", where=where, remedy=remedy)
 
 
@@ -89,7 +90,7 @@ def checked_numbers(
         EnvError: when it is not a list, or one of its numbers is refused.
     """
     example = "one number or more" if length is None else counted(length, "number")
-    remedy = f"give {example} in a list or tuple{kind.unit and f', in {kind.unit}'}"
+    remedy = f"give {example} in a list or tuple{beside(kind.unit, ', in ')}"
     if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or np.ndim(values) == 0:
         raise EnvError(f"{name} = {values!r} is not a list of numbers", where=where, remedy=remedy)
     found = tuple(kind.checked(value, f"{name}[{place}]", where) for place, value in enumerate(list(values)))

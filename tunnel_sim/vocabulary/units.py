@@ -26,6 +26,15 @@ _FACTOR = re.compile(r"([A-Za-z]+|1)\^?(\d?)", re.ASCII)
 _FORM = "write it of kg, m, s, rad, N and Hz, such as 1, rad, N m/rad, 1/rad2 or rad/(N m)"
 
 
+def beside(unit: str, joint: str = " ") -> str:
+    """A unit in a sentence, such as `` N m`` after a number; empty for a dimensionless quantity.
+
+    Args:
+        joint: stands before the unit.
+    """
+    return "" if unit == "1" else f"{joint}{unit}"
+
+
 def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
     """The dimension of one quantity times a power of another.
 

@@ -26,7 +26,7 @@ class _Change:
 
 
 def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
-    found = []
+    changes = []
     for swing in swings:
         same = [
             s for s in swings if not s.run.wind_on and s.run.spring_stiffness == swing.run.spring_stiffness
@@ -40,7 +40,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
         )
         if not a > 0.0:
             continue
-        found.append(
+        changes.append(
             _Change(
                 swing,
                 stiffness=float(swing.stiffness / k - 1.0),
@@ -49,7 +49,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
                 damping_std=float(np.hypot(swing.rate_std, a_std) / a),
             )
         )
-    return found
+    return changes
 
 
 @dataclass(frozen=True)

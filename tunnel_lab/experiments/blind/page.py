@@ -140,10 +140,10 @@ _OF_SCATTER = {
 
 def _scatter_sections(score: Score) -> list[ScoreSection]:
     """Findings on the scatter between runs; empty where there are none."""
-    found = score.scatter()
-    if found is None:
+    scatter = score.scatter()
+    if scatter is None:
         return []
-    shares = ((text, getattr(found, name)) for name, text in _OF_SCATTER.items())
+    shares = ((text, getattr(scatter, name)) for name, text in _OF_SCATTER.items())
     return [
         _section(
             "Scatter between runs",
@@ -167,7 +167,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
                     *map(_brief, (one.named, one.false, one.within)),
                     _brief(one.covered),
                 )
-                for one in found.by_number
+                for one in scatter.by_number
                 if any(share.total for share in (one.named, one.false, one.within, one.covered))
             ),
         ),
@@ -230,10 +230,10 @@ def _other_sections(score: Score) -> list[ScoreSection]:
 
 def blind_view(score: Score) -> View:
     """The view of a score, each table with its note."""
-    parts: list[Block] = [Paragraph(line) for line in origin_lines(score)]
+    blocks: list[Block] = [Paragraph(line) for line in origin_lines(score)]
     for section in sections(score):
-        parts += [section, Paragraph(section.note)]
-    return View("Blind check", parts)
+        blocks += [section, Paragraph(section.note)]
+    return View("Blind check", blocks)
 
 
 def origin_lines(score: Score) -> list[str]:

@@ -211,25 +211,25 @@ class Score:
 
     def exact(self) -> dict[str, Proportion]:
         """Exact match of the causes, by kind of campaign and severity (in noise variances)."""
-        found = {}
+        shares = {}
         for kind in ("single", "pair", "three", "four", "none", "outside", "withheld"):
             cases = [c for c in self.cases if c.kind == kind]
-            found[kind] = Proportion.of([c.right for c in cases])
+            shares[kind] = Proportion.of([c.right for c in cases])
             if kind == "single":
                 for level in ("below 1", "1 to 10", "above 10"):
-                    found[f"single, {level}"] = Proportion.of(
+                    shares[f"single, {level}"] = Proportion.of(
                         [c.right for c in cases if c.severity_class == level]
                     )
-        found["all"] = Proportion.of([c.right for c in self.cases])
-        return {name: share for name, share in found.items() if share.total}
+        shares["all"] = Proportion.of([c.right for c in self.cases])
+        return {name: share for name, share in shares.items() if share.total}
 
     def confusion(self) -> dict[str, dict[str, int]]:
         """Numbers by truth and answer; pairs and ``no answer`` have their own rows and columns."""
-        found: dict[str, dict[str, int]] = {}
+        counts: dict[str, dict[str, int]] = {}
         for c in self.cases:
-            row = found.setdefault(_truth(c), {})
+            row = counts.setdefault(_truth(c), {})
             row[label(c.causes)] = row.get(label(c.causes), 0) + 1
-        return found
+        return counts
 
     def right_by_truth(self) -> dict[str, Proportion]:
         """Proportion of right answers, by truth as in the rows of `confusion`."""
@@ -240,7 +240,7 @@ class Score:
 
     def pairs(self) -> dict[str, int]:
         """The answers where two effects act."""
-        found = dict.fromkeys(
+        counts = dict.fromkeys(
             ("both", "one of them", "one of them and another", "unknown", "none", "others"), 0
         )
         for c in self.cases:
@@ -257,8 +257,8 @@ class Score:
                 outcome = "others"  # or no answer
             else:
                 outcome = "one of them" if named < set(c.truth) else "one of them and another"
-            found[outcome] += 1
-        return found
+            counts[outcome] += 1
+        return counts
 
     def calibration(self) -> tuple[float, tuple[CalibrationBin, ...]]:
         """Expected calibration error of the probability of the answer given, and its table."""

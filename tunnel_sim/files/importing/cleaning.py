@@ -60,22 +60,22 @@ def restarts(time: Times) -> list[int]:
 
 def cleaned(time: Times, reading: Readings) -> Cleaned:
     """Times and readings as recorded in the form of a campaign."""
-    said: list[str] = []
+    remarks: list[str] = []
     rows = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
     if rows.size < time.size:
         inside = int(rows[-1] - rows[0] + 1 - rows.size) if rows.size else 0
         if inside:
-            said.append(f"{counted(inside, 'sample')} without a number left out")
+            remarks.append(f"{counted(inside, 'sample')} without a number left out")
         time, reading = time[rows], reading[rows]
     if (np.diff(time) < 0.0).any():
         order = np.argsort(time, kind="stable")
         rows, time, reading = rows[order], time[order], reading[order]
-        said.append("rows out of order sorted by time")
+        remarks.append("rows out of order sorted by time")
     same = np.diff(time) == 0.0
     repeated = same & (np.diff(reading) == 0.0)
     differing = np.count_nonzero(same & ~repeated)
     if differing > _COARSE * time.size and time[0] < time[-1]:
-        said.append(
+        remarks.append(
             f"{differing} stamps equal the one before though the readings differ: the stamps are coarser than "
             f"the sampling, and evenly spaced times take their place"
         )
@@ -87,11 +87,11 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
             if differing
             else ""
         )
-        said.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
+        remarks.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
         rows, time, reading = rows[keep], time[keep], reading[keep]
     first = float(time[0]) if time.size else 0.0
     if first != 0.0:
-        said.append(
+        remarks.append(
             f"times here are the file's, whose first sample is at {clock_text(first)} s; those of the campaign "
             "count from the first sample of each run"
         )
@@ -103,12 +103,12 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         if gaps.any():
             missing = int(np.round(steps[gaps] / usual - 1.0).sum())
             where = f"in {counted(int(gaps.sum()), 'gap')}, up to {steps.max():.4g} s long"
-            said.append(f"about {counted(missing, 'sample')} missing {where}")
+            remarks.append(f"about {counted(missing, 'sample')} missing {where}")
         spread = float(np.abs(steps[~gaps] - usual).max())
         if spread > _UNEVEN * usual:
             share = f"{100.0 * spread / usual:.0f} % of a step"
-            said.append(f"time stamps differ from an even clock by up to {share}; kept")
-    return Cleaned(time, reading, rows, tuple(said), first)
+            remarks.append(f"time stamps differ from an even clock by up to {share}; kept")
+    return Cleaned(time, reading, rows, tuple(remarks), first)
 
 
 def clock_text(time: Seconds) -> str:

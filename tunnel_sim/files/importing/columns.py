@@ -102,7 +102,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
         blocks = [table.channels[start:end] for start, end in zip(starts, ends, strict=True)]
     pairs = []
     for block in blocks:
-        said: list[str] = []
+        remarks: list[str] = []
         named = [channel for channel in block if is_time(channel)]
         time = None  # where the samples follow at a stated rate
         if choices.time is not None:
@@ -110,7 +110,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
         elif named:
             time = named[0]
             if len(named) > 1:
-                said.append(f"times from '{time.name}', the first of {len(named)} columns of times")
+                remarks.append(f"times from '{time.name}', the first of {len(named)} columns of times")
         elif choices.rate is None:
             for channel in _unconditional(block, choices):
                 numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
@@ -124,13 +124,13 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
                     why = "evenly stepped numbers" + (
                         "" if table.headed else ", and the file names no columns"
                     )
-                    said.append(f"times from '{time.name}': {why}")
+                    remarks.append(f"times from '{time.name}': {why}")
                     break
-        readings = _readings(block, time, choices, said, where)
+        readings = _readings(block, time, choices, remarks, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
             run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
-            pairs.append(ColumnPair(run, time, reading, tuple(said)))
+            pairs.append(ColumnPair(run, time, reading, tuple(remarks)))
     if not pairs:
         what = f"no column of angles (columns found: {listed(table.channels)})"
         refuse_without_unit(table.channels, where)

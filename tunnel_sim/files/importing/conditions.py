@@ -128,7 +128,7 @@ def from_facts(
     Returns:
         Values by key of `Conditions`, in its units, and hints.
     """
-    found: dict[str, float] = {}
+    conditions: dict[str, float] = {}
     names: dict[str, str] = {}
     hints = []
     for heading, value in facts.items():
@@ -138,7 +138,7 @@ def from_facts(
         key = key or condition_of(name, unit, alone=True)
         if key is not None and (factor := in_si(key, unit)) is not None:
             if sure or names.get(key) not in claimed.values():
-                found[key], names[key] = float(value) * factor, name
+                conditions[key], names[key] = float(value) * factor, name
         elif sure:
             what = f"'{one_line(heading, 60)}' is not in a unit of {key} ({units_of(key or '')})"
             raise TunnelError(what, where=where, remedy=f"give --set {key}=NUMBER")
@@ -146,13 +146,13 @@ def from_facts(
             hints.append(hint)
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
     # A density is stated for the wind alone: the only symbol of a speed beside it means the wind.
-    if "air_density" in found and "wind_speed" not in found and len(symbols) == 1:
-        found["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
+    if "air_density" in conditions and "wind_speed" not in conditions and len(symbols) == 1:
+        conditions["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
         hints.remove(symbols[0])
-    for key, value in found.items():
+    for key, value in conditions.items():
         named = "" if names[key] == key else f" ({names[key]})"
         said.append(f"{key} = {value:g} from the file{named}")
-    return found, hints
+    return conditions, hints
 
 
 def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:

@@ -79,34 +79,34 @@ def imported_run(
         return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
     kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
-    said, clock = [], raw.cleaned.file_time_s[kept]
+    remarks, clock = [], raw.cleaned.file_time_s[kept]
     if piece.first:
         at = (
             "at the largest rate after the release"
             if raw.quantity == "rate"
             else "where the body is released"
         )
-        said.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
+        remarks.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
     if piece.last < raw.cleaned.time_s.size:
-        said.append(f"ends at {clock_text(float(clock[-1]))} s, with the motion or before the next run")
+        remarks.append(f"ends at {clock_text(float(clock[-1]))} s, with the motion or before the next run")
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
-        reading = from_rest(reading, rest, sensor.unit, said, where)
+        reading = from_rest(reading, rest, sensor.unit, remarks, where)
     rows = raw.rows(float(time[0]), float(time[-1]))
-    stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, said, where)
+    stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, remarks, where)
     hints = [*raw.stated.unused(rows), *named]
-    check_wind(stated, hints, raw.source, name, said, where, driven=raw.input is not None)
+    check_wind(stated, hints, raw.source, name, remarks, where, driven=raw.input is not None)
     rig = choices.conditions
     scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     held: dict[str, float] = {}
     windy = needs_density(stated.get("wind_speed", 0.0), *scales) and "air_density" not in stated
     if windy and later:
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
-        said.append(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)")
+        remarks.append(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)")
     elif windy:
         what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
         raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
-    drive = _drive(raw, kept, choices, said)
+    drive = _drive(raw, kept, choices, remarks)
     without_spring_needs_drive((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
@@ -120,9 +120,9 @@ def imported_run(
         if record is None:
             record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
-        return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
+        return ImportedRun(name, raw, piece, None, (*remarks, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
-    return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes, held, windy)
+    return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
 
 
 def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:

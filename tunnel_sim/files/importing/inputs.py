@@ -58,7 +58,7 @@ def find_input(
     beside: Sequence[Channel | None],
     reading: Rows,
     choices: ImportChoices,
-    said: list[str],
+    remarks: list[str],
     where: str,
 ) -> RunInput | None:
     """The input of a run; None for a free decay. ``beside`` are the columns of times and reading."""
@@ -79,10 +79,10 @@ def find_input(
             what = f"no column '{one_line(choices.input, 40)}' for the input"
             remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
             raise TunnelError(what, where=where, remedy=remedy)
-        return _as_input(stated, reading, choices, said)
+        return _as_input(stated, reading, choices, remarks)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
-    found = exact
+    candidates = exact
     for channel in () if exact else others:
         good = np.isfinite(channel.values) & np.isfinite(reading)
         plausible = _claimed(channel) or _NAMES.search(channel.name)
@@ -93,12 +93,12 @@ def find_input(
         with suppress(TunnelError):  # it is not the motion itself
             checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
             if chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
-                found.append(channel)
-    if len(found) > 1:
-        listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
-        remedy = f'give --input "{one_line(found[0].name, 40)}", another of them, or --input none'
-        raise TunnelError(f"{len(found)} columns may be the input: {listed}", where=where, remedy=remedy)
-    return _as_input(found[0], reading, choices, said) if found else None
+                candidates.append(channel)
+    if len(candidates) > 1:
+        listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in candidates)
+        remedy = f'give --input "{one_line(candidates[0].name, 40)}", another of them, or --input none'
+        raise TunnelError(f"{len(candidates)} columns may be the input: {listed}", where=where, remedy=remedy)
+    return _as_input(candidates[0], reading, choices, remarks) if candidates else None
 
 
 def _as_input(channel: Channel, reading: Rows, choices: ImportChoices, said: list[str]) -> RunInput:

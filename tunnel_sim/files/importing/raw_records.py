@@ -111,22 +111,24 @@ def _records(
     kept: NDArray[np.bool_],
     stated: Stated,
     choices: ImportChoices,
-    said: list[str],
+    remarks: list[str],
     where: str,
 ) -> list[RawRecord]:
     """The cleaned records of the columns of a run: one, or one from each start of the clock."""
-    found = []
+    records = []
     driven = columns.input
     time, readings = columns.time[kept], columns.reading[kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
     starts = [0, *restarts(time), time.size]
     if len(starts) > 2:
-        said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
+        remarks.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
     for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
         clean = cleaned(time[a:b], readings[a:b])
         rows = np.flatnonzero(kept)[a:b]
         if columns.quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
-            raise HoldsTurningPoints(_turning_points(name, table, columns, rows, clean, said, choices), where)
+            raise HoldsTurningPoints(
+                _turning_points(name, table, columns, rows, clean, remarks, choices), where
+            )
         if clean.time_s.size < 2:
             raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
         given = None
@@ -140,7 +142,7 @@ def _records(
                     remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )
             given = driven.column, values
-        found.append(
+        records.append(
             RawRecord(
                 id=name if len(starts) == 2 else f"{name}-{place}",
                 source=path,
@@ -149,14 +151,14 @@ def _records(
                 quantity=columns.quantity,
                 unit=columns.unit,
                 stated=stated.of_rows(slice(a, b)),
-                said=(*said, *clean.said),
+                said=(*remarks, *clean.said),
                 clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                 whole=table.named and len(starts) == 2,
                 input=given,
                 input_facts=facts,
             )
         )
-    return found
+    return records
 
 
 def _turning_points(
@@ -165,19 +167,19 @@ def _turning_points(
     columns: RunColumns,
     rows: NDArray[np.intp],
     clean: Cleaned,
-    said: Sequence[str],
+    remarks: Sequence[str],
     choices: ImportChoices,
 ) -> TurningPoints:
     """The turning points in some rows of a table, with the standard deviations in its columns."""
     pair, unit = columns.pair, columns.unit  # the unit also of uncertainties without a known one
-    time, said = clean.time_s, [*table.said, *said]
+    time, remarks = clean.time_s, [*table.said, *remarks]
     if pair.time is not None and not pair.time.unit and choices.time_unit is None:
         # The step of a clock is short, and half a period of a swing is not.
         size = float(np.median(np.diff(np.sort(pair.time.values[rows]))))
         own = "s" if size < _LONGEST_SWING else "ms"
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
-        said = [line for line in said if "no unit of the times" not in line]
-        said.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
+        remarks = [line for line in remarks if "no unit of the times" not in line]
+        remarks.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
     found: dict[str, PerSample] = {}
     for channel in table.channels:
         mark = _STD.match(channel.name)
@@ -188,4 +190,4 @@ def _turning_points(
         if kind in ("time", "angle"):
             factor = UNITS[kind].get(channel.unit) or (1.0 if kind == "time" else UNITS[kind].get(unit, 1.0))
             found.setdefault(kind, values * factor)
-    return TurningPoints(name, time, clean.reading, found.get("time"), found.get("angle"), tuple(said))
+    return TurningPoints(name, time, clean.reading, found.get("time"), found.get("angle"), tuple(remarks))

@@ -62,7 +62,7 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
     # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
     moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
     # the excursions in which a hand moves the body, each with the one from which on the motion is free
-    found: list[tuple[int, int]] = []
+    spans: list[tuple[int, int]] = []
     for k in np.flatnonzero(lengths[:-1] > _LONGER * usual).tolist():
         before = peaks[k - 1] if k else 0.0
         if max(peaks[k], peaks[k + 1]) <= _GROWN * before:
@@ -70,27 +70,27 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
         at = k
         while at + 1 < peaks.size and peaks[at + 1] > _STILL_GROWING * peaks[at]:
             at += 1
-        if not found or at > found[-1][1]:
-            found.append((k, at))
-    if found and found[0][0] >= _LEAST_HALVES:  # the record begins in free motion
-        found.insert(0, (0, 0))
-    until = [*(k for k, _ in found), peaks.size][1:]
-    found = [
+        if not spans or at > spans[-1][1]:
+            spans.append((k, at))
+    if spans and spans[0][0] >= _LEAST_HALVES:  # the record begins in free motion
+        spans.insert(0, (0, 0))
+    until = [*(k for k, _ in spans), peaks.size][1:]
+    spans = [
         (k, at)
-        for (k, at), end in zip(found, until, strict=True)
+        for (k, at), end in zip(spans, until, strict=True)
         if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
     ]
-    if not found:
+    if not spans:
         return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
     pieces = []
-    for place, (_, released) in enumerate(found):
+    for place, (_, released) in enumerate(spans):
         # From the first sample of the largest reading, or from the last one of a hold.
         size = np.abs(away[starts[released] : ends[released]])
         near = int(starts[released]) + np.flatnonzero(size >= (1.0 - _AT_TURN) * size.max())
         held = time_s[near[-1]] - time_s[near[0]] > _HELD * usual
         first = int(near[-1]) if held else int(starts[released]) + int(np.argmax(size))
-        if place + 1 < len(found):
-            hand = found[place + 1][0]
+        if place + 1 < len(spans):
+            hand = spans[place + 1][0]
             last = max(int(ends[hand - 1]), int(np.searchsorted(time_s, time_s[starts[hand]] - usual)))
             halves = hand - released
         else:

@@ -106,7 +106,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
-    found = []
+    readable = []
     for table in (table for table in tables if table.channels):
         channels, said = [], [*table.said]
         for channel in table.channels:
@@ -120,10 +120,10 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         table = replace(table, channels=tuple(channels), said=tuple(said))
         parts = (with_input_facts(part) for part in by_run(table))
         # A column that names the runs, or states the input, may be alone in its table.
-        found += [part for part in parts if part.channels]
-    if not found:
+        readable += [part for part in parts if part.channels]
+    if not readable:
         remedy = "name a file with times and angles"
         raise TunnelError("no column of numbers", where=where, remedy=remedy)
-    count = sum(table.channels[0].values.size for table in found)
+    count = sum(table.channels[0].values.size for table in readable)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
-    return Source(path, hashlib.sha256(content).hexdigest(), tuple(found), known)
+    return Source(path, hashlib.sha256(content).hexdigest(), tuple(readable), known)

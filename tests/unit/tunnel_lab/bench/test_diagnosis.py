@@ -22,7 +22,7 @@ from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work
 from tunnel_lab.bench.parts import Frame
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.terminal import outputs
+from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -56,11 +56,11 @@ def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
 def test_sets_are_printed_where_they_are_asked_for(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], every: float | None, sets: int
 ) -> None:
-    monkeypatch.setattr(outputs, "_sets_every", None)
+    monkeypatch.setattr(progress, "_sets_every", None)
     if every is not None:
-        outputs.print_sets(every)
+        progress.print_sets(every)
     long = " + ".join(["coulomb_friction", "quadratic_damping", "nonlinear_yaw_moment", "vortex_shedding"])
-    with outputs.step_display() as show:
+    with progress.step_display() as show:
         show("effects")
         for name in ("free_play", "mains_hum", long):
             show(name)
@@ -72,11 +72,11 @@ def test_sets_are_printed_where_they_are_asked_for(
 
 
 def test_a_step_that_is_taken_twice_is_printed_once(capsys: pytest.CaptureFixture[str]) -> None:
-    with outputs.step_display() as show:
+    with progress.step_display() as show:
         for name in ("effects", "pruning", "coulomb_friction", "pruning", "polishing"):
             show(name)
     said = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
-    assert said == [outputs.STEPS[name] for name in ("effects", "pruning", "polishing")]
+    assert said == [progress.STEPS[name] for name in ("effects", "pruning", "polishing")]
 
 
 def session(folder: Path) -> Session:

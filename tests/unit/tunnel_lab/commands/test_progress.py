@@ -33,11 +33,11 @@ def test_an_identification_reports_every_run(estimator: str) -> None:
 
 
 def test_the_command_shows_bars_of_reading_and_identifying(tiny_campaign, monkeypatch, tunnel) -> None:
-    from tunnel_lab.terminal import outputs
+    from tunnel_lab.terminal import progress
 
-    shown, real = [], outputs.bar
+    shown, real = [], progress.bar
     monkeypatch.setattr(command, "bar", lambda what, *rest: shown.append(what) or real(what, *rest))
-    monkeypatch.setattr(outputs, "bar", lambda what, *rest: shown.append(what) or real(what, *rest))
+    monkeypatch.setattr(progress, "bar", lambda what, *rest: shown.append(what) or real(what, *rest))
     status, _, err = tunnel("identify", tiny_campaign)
     assert (status, err, shown) == (0, "", ["reading runs", "identifying runs"])
 

@@ -66,7 +66,7 @@ def test_the_map_is_a_table_and_a_figure(found):
     frame = found
     assert frame.height == 3 * 2 * 4
     assert frame["bias_percent"].is_finite().all()
-    assert [one.row_count for one in view.breakdown_tables(found, "cn_r")] == [3]
+    assert [len(one.rows) for one in view.breakdown_tables(found, "cn_r")] == [3]
     buffer = io.BytesIO()
     view.breakdown_figure(frame, "cn_r").savefig(buffer, format="png")
     assert buffer.getvalue()[:4] == b"\x89PNG"

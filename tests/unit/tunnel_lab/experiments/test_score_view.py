@@ -9,7 +9,7 @@ import pytest
 
 from identification.scoring import Trials, score
 from tunnel_lab.experiments.score import packaged_baseline
-from tunnel_lab.experiments.score_view import cell_figures, lines_below, pooled_figures, summary_tables
+from tunnel_lab.experiments.score_view import cell_figures, notes_below, pooled_figures, summary_tables
 
 
 def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Trials:
@@ -42,18 +42,17 @@ def test_two_trials_have_a_bias_and_one_has_none() -> None:
 def test_the_time_is_not_under_a_heading_of_another_figure() -> None:
     """In a narrow terminal a row is printed as headings and values: a time is not one of an RMSE."""
     decays, *_ = summary_tables(packaged_baseline())
-    texts = [list(map(str, column.cells)) for column in decays.columns]
-    times = [place for place, text in enumerate(texts[0]) if text.strip().endswith("ms/record")]
+    times = [others for first, *others in decays.rows if first.endswith("ms/record")]
     assert len(times) == len(packaged_baseline().estimators)
-    assert not any(column[place].strip() for column in texts[1:] for place in times)
+    assert not any(cell for others in times for cell in others)
 
 
 def test_few_trials_are_said() -> None:
     results = packaged_baseline()
-    assert not any(line.startswith("Few trials") for line in lines_below(results))
+    assert not any(note.text.startswith("Few trials") for note in notes_below(results))
     few = replace(results, grid=replace(results.grid, trials=4))
-    (line,) = (line for line in lines_below(few) if line.startswith("Few trials"))
-    assert line.startswith(
+    (note,) = (note for note in notes_below(few) if note.text.startswith("Few trials"))
+    assert note.text.startswith(
         "Few trials: with 4 in a cell, the RMSE of many would be 0.6 to 2.9 times the one shown"
     )
 

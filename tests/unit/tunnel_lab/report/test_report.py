@@ -178,18 +178,6 @@ def test_figures_have_words_for_those_who_cannot_see_them(page):
     assert page.count("<figcaption>") == len(pictures)
 
 
-def test_numbers_are_those_of_the_document(page):
-    text = Page(page).text.replace("\u00a0", " ")
-    assert "0.91" in text
-    assert "91.2" not in text
-    assert "98.7 %" in text
-    assert "0.003000 ± 0.000010 N m" in text
-    assert "−0.310 ± 0.020" in text
-    assert "an error of the clock" in text
-    assert "A run that could: spring of 80 N m/rad, wind off" in text
-    assert effect_class(CAUSE).signature in text
-
-
 def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
     text = Page(page).text
     assert "What could be explained: A moment." in text

@@ -56,6 +56,7 @@ def test_score_writes_before_it_prints(tmp_path: Path) -> None:
     status = unheard(*words, "--out", tmp_path / "s", "--write-baseline", tmp_path / "b.parquet")
     assert status == 0
     assert sorted(path.name for path in (tmp_path / "s").iterdir()) == [
+        "index.html",
         "score.pdf",
         "score.png",
         "scores.parquet",

@@ -12,18 +12,17 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from tunnel_lab.terminal import outputs
-from tunnel_lab.terminal.outputs import is_too_wide, stacked, table
+from identification.blocks import Table
+from tunnel_lab.terminal import progress
+from tunnel_lab.terminal.tables import is_too_wide, stacked
 from tunnel_sim.files.reading import inside, nearest
 
 Tunnel = Callable[..., tuple[int, str, str]]
 
 
 def two_columns():
-    rows = table("Title", "run", "value\n[N m]", "remark")
-    rows.add_row("first", "12.5 ± 0.1", "")
-    rows.add_row("second", "3", "a remark of more than thirty characters is a sentence")
-    return rows
+    second = ("second", "3", "a remark of more than thirty characters is a sentence")
+    return Table("Title", ("run", "value\n[N m]", "remark"), (("first", "12.5 ± 0.1", ""), second))
 
 
 def test_a_table_is_stacked_where_a_cell_would_be_broken() -> None:
@@ -44,9 +43,8 @@ def test_a_stacked_table_has_every_cell_with_its_heading_and_wraps_sentences() -
 
 
 def test_a_stacked_table_of_two_columns_has_a_line_for_each_row() -> None:
-    rows = table("Title", "part", "found")
-    rows.add_row("plugin", "/a/path/that/is/longer/than/the/terminal/is/wide")
-    assert stacked(rows, 20).splitlines() == [
+    row = ("plugin", "/a/path/that/is/longer/than/the/terminal/is/wide")
+    assert stacked(Table("Title", ("part", "found"), (row,)), 20).splitlines() == [
         "Title",
         " plugin:",
         " /a/path/that/is/longer/than/the/terminal/is/wide",
@@ -57,8 +55,8 @@ def test_what_was_finished_before_does_not_count_for_the_time_left(monkeypatch: 
     terminal = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
     now = 0.0
     monkeypatch.setattr(terminal, "get_time", lambda: now)
-    monkeypatch.setattr(outputs, "console", lambda **_: terminal)
-    with outputs.bar("scoring") as advance:
+    monkeypatch.setattr(progress, "console", lambda **_: terminal)
+    with progress.bar("scoring") as advance:
         now = 5.0
         advance(90, 100)
         now = 25.0
@@ -67,13 +65,13 @@ def test_what_was_finished_before_does_not_count_for_the_time_left(monkeypatch: 
 
 
 def test_work_of_minutes_says_where_it_is_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with outputs.bar_or_lines("diagnosing", 4, every=0.05) as advance:
+    with progress.bar_or_lines("diagnosing", 4, every=0.05) as advance:
         advance(3, 4)
         time.sleep(0.2)
     lines = capsys.readouterr().err.splitlines()
     assert lines
     assert all(line == "0 s: diagnosing, 3 of 4" for line in lines)
-    with outputs.bar_or_lines("diagnosing", 4):
+    with progress.bar_or_lines("diagnosing", 4):
         pass
     assert capsys.readouterr().err == ""
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tunnel_lab.terminal import outputs
+from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.time_left import LEFT, Reached
 
 
@@ -37,7 +37,7 @@ def test_nothing_is_said_at_first_and_where_a_stage_takes_unusually_long() -> No
 
 
 def test_every_stage_with_a_range_is_one_of_the_diagnosis_and_they_shrink() -> None:
-    order = [name for name in outputs.STEPS if name in LEFT]
+    order = [name for name in progress.STEPS if name in LEFT]
     assert set(order) == set(LEFT)
     assert (
         LEFT["where"][1] > LEFT["effects"][1] > LEFT["random moments"][1] > LEFT["what no effect explains"][1]
@@ -64,9 +64,9 @@ def test_the_range_is_rounded(monkeypatch: pytest.MonkeyPatch, left: tuple[float
 def test_a_terminal_shows_the_step_the_set_and_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Console(file=io.StringIO(), force_terminal=True, width=160, color_system=None)
     clock = [100.0]
-    monkeypatch.setattr(outputs, "console", lambda **_: terminal)
-    monkeypatch.setattr(outputs.time, "perf_counter", lambda: clock[0])
-    with outputs.step_display() as show:
+    monkeypatch.setattr(progress, "console", lambda **_: terminal)
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    with progress.step_display() as show:
         show("noise")
         for at, report in ((102.0, "where"), (104.0, "effects"), (105.0, "free_play")):
             clock[0] = at

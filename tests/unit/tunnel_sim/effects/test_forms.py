@@ -229,3 +229,19 @@ def test_a_presliding_range_is_said_where_it_is_more_than_its_error() -> None:
 
     assert said(0.001) == "dry friction of 0.02 N m whose contact deflects by 0.01 rad before it slides"
     assert said(0.006) == said(None) == "dry friction of 0.02 N m"
+
+
+def test_a_form_of_the_load_shows_only_where_the_load_varies() -> None:
+    friction = effect_class("coulomb_friction")
+    assert set(friction.forms()) - set(friction.shown_forms(load_varies=False)) == {("load",)}
+    assert all(kind.shown_forms(load_varies=True) == kind.forms() for kind in ALL_EFFECTS)
+
+
+def test_an_effect_of_the_wind_acts_with_the_wind_on() -> None:
+    acts = {(kind.condition, on, kind.acts(wind_on=on)) for kind in ALL_EFFECTS for on in (True, False)}
+    assert acts == {
+        ("always", True, True),
+        ("always", False, True),
+        ("wind_on", True, True),
+        ("wind_on", False, False),
+    }

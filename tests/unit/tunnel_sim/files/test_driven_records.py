@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tunnel_lab.terminal.outputs import parts_table
+from tunnel_lab.report.import_table import parts_table
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.exporting import export_campaign
 from tunnel_sim.files.importing.choices import ImportChoices

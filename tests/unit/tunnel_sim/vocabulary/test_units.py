@@ -6,7 +6,7 @@ import pytest
 
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import angle_power, dimension, in_si
+from tunnel_sim.vocabulary.units import angle_power, beside, dimension, in_si
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,8 @@ def test_what_is_not_a_unit_is_refused(unit: str) -> None:
 )
 def test_moments_grow_with_the_angles(unit: str, power: float) -> None:
     assert angle_power(unit) == power
+
+
+@pytest.mark.parametrize(("unit", "shown"), [("N m", "in N m"), ("1", "")])
+def test_a_dimensionless_number_is_not_in_a_unit(unit: str, shown: str) -> None:
+    assert beside(unit, "in ") == shown

@@ -203,7 +203,7 @@ def read_text_tables(
         what = f"no numbers in the first {counted(len(head), 'line')}"
         raise TunnelError(what, where=where, remedy="remove the lines above the table")
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
-    said = (
+    remark = (
         f"text ({encoding}), {counted(dialect.width, 'column')} separated by {_SAID[dialect.delimiter]}, decimal "
         f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}"
     )
@@ -239,7 +239,7 @@ def read_text_tables(
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
             texts = dict.fromkeys(names, pl.String)
             frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
-        table = Table((), said=(said,), facts=layout.facts)
+        table = Table((), said=(remark,), facts=layout.facts)
         return tables_of(frame, layout, dialect.decimal, labels, table), known
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"

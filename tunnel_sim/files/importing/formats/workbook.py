@@ -49,8 +49,8 @@ def _read(content: bytes, where: str) -> list[Table]:
         sheets = [_sheet(book, name, where) for name in book.sheet_names]
         records = [sheet for sheet in sheets if sheet.is_record]
         others = [sheet for sheet in sheets if sheet not in records] if records else []
-        found = [(sheet, table) for sheet in records or sheets for table in _tables(book, sheet)]
-        names = {_same(name) for sheet, table in found for name in (sheet.name, table.part) if name}
+        tables = [(sheet, table) for sheet in records or sheets for table in _tables(book, sheet)]
+        names = {_same(name) for sheet, table in tables for name in (sheet.name, table.part) if name}
         described: dict[str, dict[str, Any]] = {}
         covers: dict[str, float] = {}
         short = []
@@ -60,13 +60,13 @@ def _read(content: bytes, where: str) -> list[Table]:
             else:
                 covers |= facts_in(["\t".join(filter(None, row)) for row in sheet.rows]) | _one_row(sheet)
             # The import reports that conditions without a run are not used.
-            if not rows or len(rows) < len(found):
+            if not rows or len(rows) < len(tables):
                 # the texts of a cover are read above, and are not columns of a record
                 short += [
                     replace(table, part=sheet.name, said=table.said[:1]) for table in _tables(book, sheet)
                 ]
         several = len(book.sheet_names) > 1
-        return [_with(table, sheet, described, covers, several) for sheet, table in found] + short
+        return [_with(table, sheet, described, covers, several) for sheet, table in tables] + short
 
 
 def _check_archive(content: bytes, where: str) -> None:

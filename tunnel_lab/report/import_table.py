@@ -1,0 +1,35 @@
+"""The runs of an import as a table."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from identification.blocks import Table
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.records import Imported
+
+
+def parts_table(imported: Imported) -> Table:
+    """The runs of an import: samples, rate, begin and end, swing, conditions, and the file where several."""
+    swing = f"swing\n[{imported.campaign.sensor.unit}]"
+    used = [part.run for part in imported.parts if part.run is not None]
+    windless = all(run.drive is not None and run.wind_speed == 0.0 for run in used)  # a joint
+    wind = () if windless else ("V\n[m/s]",)
+    headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, *wind, "Kr\n[N m/rad]")
+    several = len(imported.sources) > 1
+    rows = []
+    for part in imported.parts:
+        time, run = part.raw.cleaned.file_time_s[part.piece.first : part.piece.last], part.run
+        cells = [f"{time.size}", "left out", *[""] * (len(headings) - 2)]
+        if run is not None:
+            cells[1:] = [
+                f"{run.record.sample_rate:.4g}",
+                f"{time[0]:.2f}",
+                f"{time[-1]:.2f}",
+                f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
+                *([f"{run.wind_speed:g}"] if wind else []),
+                "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            ]
+        rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
+    return Table("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)

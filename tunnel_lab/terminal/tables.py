@@ -1,0 +1,140 @@
+"""Tables in a terminal: in columns, or row by row where it is too narrow; or as CSV, Markdown or JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from html import escape
+from itertools import pairwise
+from textwrap import wrap
+
+from rich import box
+from rich.cells import cell_len
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from identification.blocks import Table
+from tunnel_lab.terminal.encoding import printable_json
+from tunnel_lab.terminal.inputs import TableFormat
+from tunnel_sim.vocabulary.text_cells import as_text_cell
+
+PROSE = 30
+"""Columns: a longer cell is a sentence, which may be wrapped."""
+_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
+
+
+def rendered(table: Table, kind: TableFormat) -> str:
+    """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
+    title = _on_one_line(table.title)
+    heads, *rows = [list(map(_on_one_line, row)) for row in (table.columns, *table.rows)]
+    if kind is TableFormat.JSON:
+        from tunnel_sim.files.writing import json_line
+
+        records = [
+            {
+                head: cell if not _NUMBER.fullmatch(cell) else int(cell) if cell.isdecimal() else float(cell)
+                for head, cell in zip(heads, row, strict=True)
+            }
+            for row in rows
+        ]
+        return printable_json(json_line({"table": title, "rows": records})) + "\n"
+    if kind is TableFormat.MD:
+        cells = (" | ".join(map(_as_markdown, line)) for line in (heads, ["---"] * len(heads), *rows))
+        body = "\n".join(f"| {line} |" for line in cells)
+        return f"**{_as_markdown(title)}**\n\n{body}\n"
+    stream = io.StringIO()
+    stream.write(f"# {title}\n")
+    texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
+    csv.writer(stream, lineterminator="\n").writerows(texts)
+    return stream.getvalue()
+
+
+def _as_markdown(text: str) -> str:
+    """Text of a cell without HTML, links and ends of cells."""
+    marked = escape(text.replace("\\", "\\\\"), quote=False)
+    return marked.replace("|", "\\|").replace("](", "]\\(")
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def in_columns(table: Table) -> RichTable:
+    """A table in columns, wide enough that only headings and sentences are wrapped."""
+    result = RichTable(
+        title=Text(table.title),
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+    )
+    for heading, width in zip(table.columns, _least_widths(table), strict=True):
+        # As text, not markup: units are in brackets. Folded, not cut, so that no digit is lost.
+        result.add_column(
+            Text(heading),
+            justify="right" if heading in table.right else "left",
+            overflow="fold",
+            min_width=width,
+            no_wrap=heading in table.names,  # for copying
+        )
+    ends = [one != other for one, other in pairwise(table.groups)]
+    for row, is_end in zip(table.rows, [*ends, False] if ends else [False] * len(table.rows), strict=True):
+        result.add_row(*map(Text, row), end_section=is_end)
+    return result
+
+
+def is_too_wide(table: Table, width: int) -> bool:
+    """Whether cells other than sentences, or words of a heading, would be broken at this width."""
+    needed = sum(least + _PADDING for least in _least_widths(table))
+    return needed + _BETWEEN * (len(table.columns) - 1) > width
+
+
+def _least_widths(table: Table) -> list[int]:
+    """Of each column: the longest word of its heading, line of a cell or word of a sentence."""
+    return [
+        max(
+            (
+                *map(cell_len, heading.split()),
+                *(cell_len(part) for cell in cells for part in _unbroken(cell)),
+            ),
+            default=0,
+        )
+        for heading, *cells in zip(table.columns, *table.rows, strict=True)
+    ]
+
+
+def _unbroken(cell: str) -> list[str]:
+    """The parts of a cell that are not wrapped: its lines, or the words of a sentence."""
+    is_prose = any(cell_len(line) > PROSE for line in cell.splitlines())
+    return cell.split() if is_prose else cell.splitlines()
+
+
+def stacked(table: Table, width: int) -> str:
+    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
+
+    Sentences are wrapped to the width of the terminal; words are never broken.
+    """
+    heads = list(map(_on_one_line, table.columns))
+    lines = [table.title]
+    for first, *others in table.rows:
+        named = [(head, cell) for head, cell in zip(heads[1:], others, strict=True) if cell]
+        if len(heads) == 2:
+            named, first = [], f"{first}: {others[0]}"
+        else:
+            first = f"{heads[0]} {first}"
+        lines += _wrapped(first, " ", width)
+        room = max((cell_len(head) for head, _ in named), default=0)
+        for head, cell in named:
+            lines += _wrapped(cell, f"   {head}{' ' * (room - cell_len(head))}  ", width)
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
+    """Lines of a text after a prefix; later lines are indented by the length of the prefix."""
+    room = max(width - cell_len(prefix), PROSE)
+    lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
+    for number, line in enumerate(lines or [""]):
+        yield f"{prefix if number == 0 else ' ' * cell_len(prefix)}{line}".rstrip()
