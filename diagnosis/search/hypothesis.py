@@ -290,14 +290,19 @@ def with_forms(
 
 
 def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
-    """All combinations of one form of every effect that the runs can show; a form that is free already is kept."""
+    """All combinations of one form of every effect."""
+    by_effect = _forms_by_effect(fitted)
+    return itertools.product(*by_effect) if by_effect else iter(())
+
+
+def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
+    """The forms of every effect that the runs can show; where one of them is free already, that one alone."""
     free, load_varies = fitted.problem.free_forms, fitted.problem.carries_load
     by_effect = [
         [tuple(f"{kind.name}.{name}" for name in form) for form in kind.shown_forms(load_varies=load_varies)]
         for kind in fitted.problem.effects
     ]
-    by_effect = [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
-    return itertools.product(*by_effect) if by_effect else iter(())
+    return [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
 
 
 def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:
@@ -342,17 +347,24 @@ def polish(chosen: Hypothesis) -> Hypothesis:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first forms of all effects; others where these leave a significant residual and others less of it."""
-    choices = list(_choices(fitted))
-    weighing = fitted.settings.weighing
+    """The first form of every effect; another where these leave a significant residual and it explains more."""
+    by_effect, weighing = _forms_by_effect(fitted), fitted.settings.weighing
+    best = tuple(forms[0] for forms in by_effect)
+
+    def total(forms: tuple[Form, ...]) -> float:
+        freed = _free_forms(fitted, forms)
+        return fitted.total if freed is None else freed.total
+
     by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * fitted.count)
-    if len(choices) < 2 or fitted.total - fitted.count < by_chance:
-        return choices[0] if choices else ()
-    totals = [
-        fitted.total if (freed := _free_forms(fitted, forms)) is None else freed.total for forms in choices
-    ]
-    best = int(np.argmin(totals))
-    return choices[best if totals[best] < totals[0] - weighing.needless_chi2 else 0]
+    if all(len(forms) == 1 for forms in by_effect) or fitted.total - fitted.count < by_chance:
+        return best
+    least = total(best)
+    for place, forms in enumerate(by_effect):
+        for form in forms[1:]:
+            tried = (*best[:place], form, *best[place + 1 :])
+            if (left := total(tried)) < least - weighing.needless_chi2:
+                best, least = tried, left
+    return best
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:
