@@ -313,12 +313,12 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 
     show_facts(
         [
-            (share(closure.closed), f"share closed, {closure.held_out}"),
+            (share(closure.closed), f"explained {closure.held_out}"),
             (misfit_shown(document, closure.after), "residual misfit, root mean square"),
             (misfit_shown(document, closure.before), "with the nominal model"),
         ]
     )
-    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
+    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap explained"')
     with ui.element("ul").classes("notes"):
         show_items(
             f"{name.replace('_', ' ').replace('.', ': ')} = {size(given)}"

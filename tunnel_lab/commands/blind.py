@@ -128,7 +128,7 @@ def make(
 
     Springs, speeds, releases, coefficients and noise of every campaign are drawn
     at random. It has up to four effects that matter, or one outside the vocabulary,
-    in the textbook form or another, each sized to 1–100 times the noise power. No
+    in the textbook form or another, each sized to 1–100 times the noise variance. No
     two of them imitate each other. Small effects beside them need not be found.
     In half of all campaigns wind speed, springs or damping differ from run to run:
     the causes count without that, and how it is named is scored beside them.

@@ -306,12 +306,12 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     explained = [document["causes"] not in ([], ["unknown"]) for document in documents]
     pairs = list(zip(documents, explained, strict=True))
     answers = (
-        ("gap [× noise power]", *(excess(d, "excess_before") for d in documents)),
+        ("gap [× noise variance]", *(excess(d, "excess_before") for d in documents)),
         (
-            "residual gap [× noise power]",
+            "residual gap [× noise variance]",
             *(excess(d, "excess_after") if known else _NONE for d, known in pairs),
         ),
-        ("share closed", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
+        ("share explained", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
         ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
         ("decided", *("yes" if d["decided"] else "no" for d in documents)),
         ("or instead", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
