@@ -62,10 +62,10 @@ CAUTIONS: Mapping[str, Sentence] = {
     "stated": "{words}",
     "stiffness not stated": f"{_LEFT_OUT.format('no', 'do')}diagnose these separately.",
     "stiffness stated": f"{_LEFT_OUT.format('their', 'do not')}diagnose these separately.",
-    "other springs": "Left out, because different frequencies at one wind speed show more than one spring, and these "
-    "runs may have another spring: {runs}. State spring_stiffness, or diagnose these separately.",
-    "another mode": "Left out, because they oscillate in another mode, at least {ratio:g} times as fast as the same spring "
-    "with the wind off: {runs}. Diagnose these separately.",
+    "other springs": "Left out, because different frequencies at one wind speed show more than one spring, and "
+    "these runs may have another spring: {runs}. State spring_stiffness, or diagnose these separately.",
+    "another mode": "Left out, because they oscillate in another mode, at least {ratio:g} times as fast as the "
+    "same spring with the wind off: {runs}. Diagnose these separately.",
     "no sensor effect tried": "No effect of the sensor is tried on {quantity}s.",
     "only a second mode tried": "A second mode is the only effect of the sensor that is tried on {quantity}s.",
     "by moment": "The body has no restoring moment, so small errors of a moment accumulate in its angle, and every "
@@ -88,11 +88,11 @@ CAUTIONS: Mapping[str, Sentence] = {
     "not confirmed": _not_confirmed,
     "few runs": _few_runs,
     "none held out": _none_held_out,
-    "some not held out": "Not held out of the fit, because no other run has the same spring or wind: {runs}. Their gap "
-    "with the causes is the gap of the fit. Repeat these runs.",
-    "cut": "The nominal model fits poorly, so each record is used only from its second passage through the "
-    "centre until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the causes may "
-    "therefore differ from those of identify, which uses the whole record.",
+    "some not held out": "Not held out of the fit, because no other run has the same spring or wind: {runs}. Their "
+    "gap with the causes is the gap of the fit. Repeat these runs.",
+    "cut": "The nominal model fits poorly, so each record is used only from its second passage through the centre "
+    "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
+    "causes may therefore differ from those of identify, which uses the whole record.",
     "unresolved": _unresolved,
     "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
@@ -164,12 +164,12 @@ PATCH: Mapping[str, Sentence] = {
     "tunnel_sim.load_plugin() before MuJoCo reads the file.",
     "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it acts as a damper, "
     "and a joint at rest by friction creeps. Its time constant is set to two steps, the shortest allowed.",
-    "presliding": "The presliding of the friction is left out: it has no native element, and the plugin acts on hinges "
-    "only.",
+    "presliding": "The presliding of the friction is left out: it has no native element, and the plugin acts on "
+    "hinges only.",
     "friction against rate": "The dependence of the friction on the rate is left out: it has no native element, "
     "and the plugin acts on hinges only.",
-    "friction against load": "The dependence of the friction on the load of the joint is left out: it has no native "
-    "element, and the plugin supports only gravity's moment on a hinge.",
+    "friction against load": "The dependence of the friction on the load of the joint is left out: it has no "
+    "native element, and the plugin supports only gravity's moment on a hinge.",
     "rod": "The twist of the rod is left out: it needs a further body and joint.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",
@@ -178,8 +178,9 @@ PATCH: Mapping[str, Sentence] = {
         f"Effects of the sensor are not part of the model: {', '.join(plain(name) for name in given['effects'])}; "
         "the comparison applies them to the reading."
     ),
-    "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input; RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from "
-    "the value written.",
+    "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input; "
+    "RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from the value "
+    "written.",
 }
 """Differences between the patched model and the law found."""
 

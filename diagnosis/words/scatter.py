@@ -155,7 +155,10 @@ def trend_words(trend: Mapping[str, Any]) -> str:
     moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
     if trend.get("only"):
         return f"The runs drift but do not scatter: {moved} ({_DRIFTS[number]})."
-    return f"Part of this is a drift: {moved} ({_DRIFTS[number]}). The remaining scatter is {percent_of(trend['left'])}."
+    return (
+        f"Part of this is a drift: {moved} ({_DRIFTS[number]}). "
+        f"The remaining scatter is {percent_of(trend['left'])}."
+    )
 
 
 def stated_words(document: Document) -> str:
@@ -182,7 +185,8 @@ def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> 
         ]
     if poorly:
         return [
-            "These runs hardly distinguish the wind speed from the spring: add wind-off runs, or log the wind speed."
+            "These runs hardly distinguish the wind speed from the spring: add wind-off runs, or log the wind "
+            "speed."
         ]
     return []
 

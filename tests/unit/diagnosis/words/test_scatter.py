@@ -33,8 +33,8 @@ def alone(given: Document) -> Document:
 def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document) -> None:
     text = verdict(given, "What remains is small.")
     assert (
-        "Quadratic damping explains the gap (probability 91 %). The misfit of the nominal model is 0.135° root mean "
-        "square, 2.9 % of the swing. The cause acts on the damping, with the wind on and off. In addition"
+        "Quadratic damping explains the gap (probability 91 %). The misfit of the nominal model is 0.135° root "
+        "mean square, 2.9 % of the swing. The cause acts on the damping, with the wind on and off. In addition"
         in text
     )
     assert (

@@ -203,7 +203,8 @@ def test_what_remains(given: Document) -> None:
     rest = given["rest"]
     large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
     assert rest_words(large).startswith(
-        "Part of the gap remains: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less than"
+        "Part of the gap remains: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less "
+        "than"
     )
     assert rest_words(given | {"causes": ["unknown"]}).startswith("The gap is immaterial: it changes Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."

@@ -244,9 +244,9 @@ def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_tab
     after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
     line = coefficients_line(given)
     assert line == (
-        "± includes noise of the readings (most of the variance of Cnr), effects that could hide (most of the variance of Cnβ) and "
-        "other answers, weighted by probability. The ± of tunnel identify includes the noise, the scatter "
-        "between runs and the misfit of its model, so it may be far smaller or larger."
+        "± includes noise of the readings (most of the variance of Cnr), effects that could hide (most of the "
+        "variance of Cnβ) and other answers, weighted by probability. The ± of tunnel identify includes the noise, "
+        "the scatter between runs and the misfit of its model, so it may be far smaller or larger."
     )
     assert Paragraph(line) in printed(given)
     assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
