@@ -233,8 +233,8 @@ def notes(document: Document) -> list[str]:
 Conditions = Mapping[str, tuple[float | None, float]]
 """Of runs, by id: the stiffness of the spring (N m/rad; None: not stated) and the wind speed (m/s)."""
 BRACKETS = (
-    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
-    "tunnel diagnose adds what the model may miss."
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise "
+    "only; tunnel diagnose adds the error of the model."
 )
 """Stands below tables in the short notation."""
 
@@ -295,7 +295,7 @@ def repeatability_lines(document: Document) -> list[str]:
             return []
         return [
             f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
-            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]."
+            "scatter, so the intervals include the noise only; repeat a run, or state [repeatability]."
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():

@@ -177,7 +177,7 @@ def _turning_points(
         own = "s" if size < _LONGEST_SWING else "ms"
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
         said = [line for line in said if "no unit of the times" not in line]
-        said.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
+        said.append(f"the file states no unit of the times: half periods of {size:.4g} are taken as {own}")
     found: dict[str, PerSample] = {}
     for channel in table.channels:
         mark = _STD.match(channel.name)

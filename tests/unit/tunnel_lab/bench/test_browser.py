@@ -112,7 +112,7 @@ def test_a_resting_angle_is_dragged_and_typed(browser: Any, served: Bench, tmp_p
         assert read_recipe(session.choices).stretches[0].rest == pytest.approx(0.2, abs=0.1)
         page.get_by_text("Resting angles as numbers").click()
         field = page.get_by_label("Rest of hung, to be subtracted [rad]")
-        for text, words in (("9", "never passes the stated rest of 9 rad"), ("0.05", "rest, 0.05 rad, is")):
+        for text, words in (("9", "do not include the stated rest of 9 rad"), ("0.05", "rest, 0.05 rad, is")):
             field.fill(text)
             field.press("Enter")
             page.wait_for_selector(f"text={words}")
