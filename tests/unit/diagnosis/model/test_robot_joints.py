@@ -153,7 +153,7 @@ def test_inputs_that_are_not_the_joints_are_refused_in_one_line(tmp_path: Path, 
         refuse_undiagnosable(*with_law(free, law))
     rates = replace(swung, sensor=replace(swung.sensor, quantity="rate"))
     sprung = replace(law, stiffness=5.0)  # else the spring is missing
-    with pytest.raises(TunnelError, match="do not say where the model's joint moves"):
+    with pytest.raises(TunnelError, match="do not determine the position of the model's joint"):
         refuse_undiagnosable(*with_law(rates, sprung))
 
 
