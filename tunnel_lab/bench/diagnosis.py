@@ -214,7 +214,7 @@ class Answer:
         parts = {section.key: section.blocks for section in sections(document)}
         for keys in _FIRST:
             show_blocks(block for key in keys for block in parts.pop(key))
-        with ui.expansion("What remains, the runs, and caveats"):
+        with ui.expansion("Residual gap, runs and caveats"):
             for key in (key for key in parts if key not in _ELSEWHERE):
                 show_blocks(parts[key])
         if document["gap"]["detected"]:

@@ -214,7 +214,7 @@ def diagnose(
         return
     show(printed(document))
     if propose is not None and proposed is None:
-        nothing = "nothing remains beyond chance, or beside a random moment, or nothing holds the body"
+        nothing = "no residual gap is significant, a random moment is a cause, or the body has no spring"
         say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
     say_written(json, report, summary, patch, proposed)
 

@@ -121,7 +121,7 @@ def _records(
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
     starts = [0, *restarts(time), time.size]
     if len(starts) > 2:
-        said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
+        said.append(f"the clock restarts {counted(len(starts) - 2, 'time')}: a new run each time")
     for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
         clean = cleaned(time[a:b], readings[a:b])
         rows = np.flatnonzero(kept)[a:b]
