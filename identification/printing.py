@@ -311,8 +311,8 @@ def repeatability_lines(document: Document) -> list[str]:
     ways = [f"as stated, {', '.join(stated)}"] if stated else []
     told = ""
     if seen:
-        ways.append(f"as if by chance, {', '.join(seen)}")
-        told = "; tunnel diagnose tells chance from a cause"
+        ways.append(f"attributed to chance, {', '.join(seen)}")
+        told = "; tunnel diagnose distinguishes chance from a cause"
     differs = f"frequency differs by {percent(found['frequency'])} and damping by {percent(found['damping'])}"
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "

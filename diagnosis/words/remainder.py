@@ -61,7 +61,7 @@ def rest_words(document: Document) -> str:
 
 def _each(sizes: dict[str, str]) -> str:
     """Coefficients with the sizes of their changes."""
-    return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items())
+    return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
 def closable_words(document: Document) -> str:

@@ -137,11 +137,12 @@ def _answer(document: Document, rest: str) -> str:
     last = (explained, rest, _immaterial(found["immaterial"]) or consequence(document))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
-    sources = []
+    acting = []
     for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
         wind = f", {CONDITIONS[kind.condition]}" if found["both_winds"] else ""
-        sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
+        subject = plain(name) if len(proper) > 1 else "the cause"
+        acting.append(f"{subject} acts on {CHANNELS[kind.channel]}{wind}")
     they = "They" if len(proper) > 1 else "It"
     part = "part of the gap" if document["rest"]["material"] else "the gap"
     if document["ambiguous_with"]:
@@ -150,7 +151,7 @@ def _answer(document: Document, rest: str) -> str:
         likely = probability(document["credible"][0]["probability"])
         said = f"{_sentence(plain(*proper))} {_explain(proper)} {part} (probability {likely})."
     misfit_words = f"The misfit of the nominal model is {size}."
-    acts = f"The {'causes act' if len(proper) > 1 else 'cause acts'} on {'; '.join(sources)}."
+    acts = f"{_sentence('; '.join(acting))}."
     by_all = f"{they} {_explain(proper)}"
     if len(causes) > len(proper):
         by_all = f"Together with these differences {they.lower()} {_explain(proper)}"
@@ -174,7 +175,8 @@ def undecided_words(document: Document) -> str:
     channels = {kind.name: kind.channel for kind in known_effects()}
     effects = {name: common["effects"][name] for name in without_scatter(common["effects"])}
     named = {channels[name] for name in effects}
-    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in effects.items()]
+    common_to_all = [f"{plain(name)} ({probability(value)})" for name, value in effects.items()]
+    parts = [f"contain {listed(common_to_all)}"] if common_to_all else []
     for name, value in common["channels"].items():
         if name not in named:
             parts.append(f"act on {CHANNELS[name]} ({probability(value)})")

@@ -139,7 +139,10 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
 def test_every_cause_of_several_is_named_with_what_it_acts_on():
     text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
     assert "Coulomb friction, cubic stiffness and mains hum explain the gap (probability 90 %)" in text
-    for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
+    for words in (
+        "Coulomb friction acts on the damping; cubic stiffness acts on the restoring moment; ",
+        "mains hum acts on the sensor reading.",
+    ):
         assert words in text
     assert "They explain 95.0 % of the gap" in text
     assert "It explains 95.0 % of the gap" in said("coulomb_friction")
