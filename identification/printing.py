@@ -231,7 +231,7 @@ def notes(document: Document) -> list[str]:
 
 
 Conditions = Mapping[str, tuple[float | None, float]]
-"""Of runs, by id: the stiffness of the spring (N m/rad; None: not stated) and the wind speed (m/s)."""
+"""Stiffness of the spring (N m/rad; None: not stated) and wind speed (m/s), by run id."""
 BRACKETS = (
     "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise "
     "only; tunnel diagnose adds the error of the model."

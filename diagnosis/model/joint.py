@@ -174,7 +174,7 @@ class Joint(_OfLaw, Rig):
     }  # fmt: skip
 
     def starts(self, data: Data) -> Iterator[Start]:
-        """Of driven runs, which need not show a resonance, from the response to known moments; then as a rig."""
+        """For driven runs, which may lack a resonance, the response to known moments first; then as for a rig."""
         if data.driven and not self.own_zeros:
             yield self._driven_start(data)
             yield self._start(data, Shown.of(data))
