@@ -53,8 +53,8 @@ _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
 _ABOUT = (
-    "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for runs, or "
-    "stretches of time, held out of the fit. The diagnosis itself does not change; it also frees the forms."
+    "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for "
+    "held-out runs, or stretches of time. The diagnosis does not change; it also frees the forms."
 )
 _CONVERGE = "Free the forms, and fit to convergence (up to a minute)"
 _NO_SPRING = "no run can be planned without a stated spring"

@@ -145,7 +145,7 @@ def diagnose(
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (none of these effects explains it), each with a probability.
     The gap and the coefficients are given before and after the effects are added.
-    The gap is predicted for runs, or stretches of time, held out of the fit. For a
+    The gap is predicted for held-out runs, or stretches of time. For a
     significant residual gap, the answer states whether it could change the
     coefficients, and which kind of moment or error of the reading, and which
     formula, could explain it; --propose writes the formula for --effects-file.

@@ -119,7 +119,7 @@ class DiagnosisDocument(Document):
     where: Table = Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words")
     inclusion: dict[str, float] = Field(description="by effect, the probability that it is among the causes")
     waterfall: list[Table] = Field(description="effect and excess, as the causes are added one by one")
-    waterfall_on: str = Field(description="what was held out of the fits for it")
+    waterfall_on: str = Field(description="its held-out readings")
     without: dict[str, float] = Field(description="by cause, the excess when it alone is taken out")
     sizes: list[Table] = Field(description="what each fitted cause does to a swing of a stated amplitude")
     rest: Table | None = Field(description="what remains after the causes")

@@ -1,4 +1,4 @@
-"""What could be explained of a gap, and the law proposed; the reference simulator gives the truth."""
+"""The explainable share of a gap, and the proposed law; the reference simulator gives the truth."""
 
 from __future__ import annotations
 
