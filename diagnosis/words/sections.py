@@ -114,7 +114,7 @@ def _place(document: Document) -> Section:
         f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
         "hold no sample or are within three standard deviations of the noise."
     )
-    return Section("place", "Where it is", (Figure("place", caption),))
+    return Section("place", "Where the gap is", (Figure("place", caption),))
 
 
 def _closes(document: Document) -> Section:
