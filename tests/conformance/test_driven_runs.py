@@ -253,7 +253,9 @@ def test_what_is_planted_is_named_with_its_size(
     assert found.where.words is not None
     assert "along the decay" not in found.where.words
     assert not any("MuJoCo" in said for said in found.cautions)
-    assert any("its loss depends on that motion" in said for said in found.cautions) == (name == "root")
+    assert any(
+        "their loss depends on the motion of the spring's root" in said for said in found.cautions
+    ) == (name == "root")
 
 
 def of_first(**change: Any) -> Callable[[Campaign], Campaign]:

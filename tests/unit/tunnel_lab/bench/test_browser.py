@@ -65,7 +65,7 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
         session = Session(served.folder, "img_src_x_onerror_alert_1")
         assert [path.name for path in session.uploads.iterdir()] == ["img_src_x_onerror_alert_1_.csv"]
         page.set_viewport_size({"width": 390, "height": 900})
-        page.get_by_text("What the files do not say").click()
+        page.get_by_text("Missing information and corrections").click()
         page.get_by_label("Conditions in the file names").wait_for()
         page.wait_for_function(SETTLED, polling=300)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390

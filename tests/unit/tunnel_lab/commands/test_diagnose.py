@@ -172,7 +172,7 @@ def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_predictio
     assert document["gap"]["closed_on"] in document["verdict"]
     for text in (out, document["verdict"], page.read_text(encoding="utf-8")):
         assert "on held-out stretches of time" in text
-        assert "on runs held out" not in text
+        assert "on held-out runs" not in text
         assert "with the wind on and off" not in text
 
 
