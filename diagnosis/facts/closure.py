@@ -12,7 +12,6 @@ from tunnel_sim.files.writing import as_json
 ON_RUNS = "on held-out runs"
 ON_STRETCHES = "on held-out stretches of time"
 ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
-PATCHED = "simulated with the patched model"
 FITTED = "in the fitted runs (none could be held out)"
 """The readings on which a gap before and after is measured, as in the document."""
 
