@@ -196,11 +196,11 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
         "output error",
         "neural",
         "ratio",
-        "held by OE",
-        "held by neural",
+        "coverage, OE",
+        "coverage, neural",
         "refused",
     )
-    table = Table(*heads, title="Median absolute error, 1/rad; 95 % intervals that hold the truth")
+    table = Table(*heads, title="Median absolute error, 1/rad; coverage of the 95 % intervals")
     for title, own in groups.items():
         for name in NAMES:
             both = [r for r in own if name in r["output_error"] and name in r["neural_posterior"]]

@@ -1,4 +1,4 @@
-"""The diagnosis of the sim-to-real gap: where the nominal model departs, why, and how far it closes.
+"""The diagnosis of the sim-to-real gap: where the nominal model departs, why, and the share explained.
 
 The names below load on first use.
 """

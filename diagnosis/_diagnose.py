@@ -54,7 +54,7 @@ def diagnose(
     settings: Settings = Settings(),
     rivals: Sequence[Rival] = RIVALS,
 ) -> Diagnosis:
-    """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
+    """Find where the nominal model departs from the runs, which effect causes it, and the share that it explains.
 
     Args:
         campaign: the runs; or their folder, or one file of a data logger.

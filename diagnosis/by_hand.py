@@ -47,7 +47,7 @@ class Closure:
 
     @property
     def closed(self) -> float:
-        """Share of the gap that closes, 0 to 1."""
+        """Explained share of the gap, 0 to 1."""
         return share_closed(self.before, self.after)
 
 

@@ -206,12 +206,12 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
         quantity = campaign.sensor.quantity or "angle"
         refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
         if run.spring_stiffness == 0.0 and run.wind_on:
-            what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
+            what = "driven runs without a spring are not diagnosed with the wind on"
             raise TunnelError(what, where=where, remedy="leave the run out")
         if run.record.yaw_rad.size < LEAST_SAMPLES:
             size = counted(run.record.yaw_rad.size, "sample")
             raise TunnelError(
-                f"the run is driven and has {size}: too few to tell its noise from its response",
+                f"the run is driven and has {size}: too few to separate noise from response",
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
@@ -252,7 +252,7 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
-                remedy="check its sign, and that all moments on the body are in it; or leave the run out",
+                remedy="check its sign, and that it includes all moments on the body; or leave the run out",
             )
         if not known and (found is None or not found[1] > 0.0):
             raise TunnelError(
@@ -313,7 +313,7 @@ def refuse_indefinite(fit: Fit) -> None:
     if not np.isfinite(numbers).all():
         raise TunnelError(
             "the runs do not determine the nominal model",
-            remedy="check that they are free decays of springs and wind speeds that differ",
+            remedy="use free decays with different springs and wind speeds",
         )
     if values.get("yaw_inertia", 1.0) <= 0.0:
         what, _, remedy = Status.INERTIA_NOT_POSITIVE.value.partition(": ")

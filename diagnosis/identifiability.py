@@ -39,7 +39,10 @@ class Identifiability:
         driven: whether the runs were driven, as an effect of the input needs.
     """
 
-    LAW: ClassVar[str] = "The nominal model does not hide it, and no other effect moves the rig as it does"
+    LAW: ClassVar[str] = (
+        "The nominal model does not absorb it, and no other effect has the same influence on the "
+    )
+    "motion"
 
     share: float
     cosines: Mapping[str, float]
@@ -51,7 +54,7 @@ class Identifiability:
         if self.share < ABSORBED:
             return f"the nominal model absorbs all but {100.0 * self.share:.2g} % of it"
         alike = [name for name, cosine in self.cosines.items() if cosine > ALIKE]
-        return f"it moves the rig as {' and '.join(alike)} does" if alike else ""
+        return f"it has the same influence on the motion as {' and '.join(alike)}" if alike else ""
 
     def lines(self) -> list[str]:
         """The figures in words."""
@@ -60,7 +63,7 @@ class Identifiability:
             f"On 12 simulated {'driven ' if self.driven else ''}runs (3 springs, wind off and on, 2 releases) the "
             "nominal model cannot absorb "
             f"{100.0 * self.share:.1f} % of its change of the readings.",
-            f"Cosine of that with the nearest effects: {', '.join(nearest)}.",
+            f"Cosine of this part with the nearest effects: {', '.join(nearest)}.",
         ]
 
 

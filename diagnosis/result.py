@@ -97,7 +97,7 @@ class GapSummary:
     """The gap of the campaign.
 
     Args:
-        excess_before: of the nominal model, in units of the noise variance, on readings held out of the fits; where
+        excess_before: of the nominal model, in units of the noise variance, on held-out readings; where
             nothing is found, in the fitted runs.
         excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap that is closed, 0 to 1.

@@ -129,7 +129,7 @@ def _assumed(campaign: Campaign) -> tuple[Remark, ...]:
         return ()
     half = 500.0 * max(run.record.sample_interval for run in runs)
     what = (
-        "drive_hold is not stated, and the input is taken as linear between samples; an input that is held acts "
+        "drive_hold is not stated, so the input is assumed linear between samples; a held input would act "
         f"half a sample ({half:.3g} ms) later, which changes stiffness and damping"
     )
     remedy = 'state drive_hold = "zero" or "linear"'

@@ -80,7 +80,7 @@ class _Subject:
     def _check_form(self, answer: object, campaign: Campaign, of: str) -> None:
         found = checked_return(answer, self.estimator.name, campaign, of)
         if (found.estimator, found.campaign) != (self.estimator.name, campaign.name):
-            what = f"signs its estimate {found.estimator!r} of {found.campaign!r}"
+            what = f"labels its estimate {found.estimator!r} of {found.campaign!r}"
             raise self.refuse(what, "write Estimate(campaign.name, self.name, runs, …)")
         self._check_deviations(found, CAMPAIGN_UNITS, f"with {of}")
         for run in found.runs:
@@ -174,7 +174,7 @@ def _check_values(subject: _Subject) -> None:
     for name, true in TRUTH.items():
         _compare(subject, name, getattr(found, name), true)
     if subject.estimate(_campaign(), "noisy runs") != found:
-        what = "gives another answer when it is asked again for the same runs"
+        what = "gives a different answer for the same runs"
         raise subject.refuse(what, "make the generator in estimate: numpy.random.default_rng(self.seed)")
 
 

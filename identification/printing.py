@@ -235,10 +235,10 @@ def notes(document: Document) -> list[str]:
 
 
 Conditions = Mapping[str, tuple[float | None, float]]
-"""Of runs, by id: the stiffness of the spring (N m/rad; None: not stated) and the wind speed (m/s)."""
+"""Stiffness of the spring (N m/rad; None: not stated) and wind speed (m/s), by run id."""
 BRACKETS = (
-    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
-    "tunnel diagnose adds what the model may miss."
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise "
+    "only; tunnel diagnose adds the error of the model."
 )
 """Stands below tables in the short notation."""
 
@@ -299,7 +299,7 @@ def repeatability_lines(document: Document) -> list[str]:
             return []
         return [
             f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
-            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]."
+            "scatter, so the intervals include the noise only; repeat a run, or state [repeatability]."
         ]
     stated, seen = [], []
     for name, words in DEVIATIONS.items():
@@ -315,11 +315,9 @@ def repeatability_lines(document: Document) -> list[str]:
     ways = [f"as stated, {', '.join(stated)}"] if stated else []
     told = ""
     if seen:
-        ways.append(f"as if by chance, {', '.join(seen)}")
-        told = "; tunnel diagnose tells chance from a cause"
-    differs = (
-        f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
-    )
+        ways.append(f"attributed to chance, {', '.join(seen)}")
+        told = "; tunnel diagnose distinguishes chance from a cause"
+    differs = f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
         f"it{told}."

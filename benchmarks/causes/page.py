@@ -100,8 +100,8 @@ def page_text(
         *_coefficients_table(found),
         *_scatter_table(scattering),
         "\n## The methods\n",
-        "The columns and the threshold that LISDD's recipe, the spike-and-slab regression and PySINDy use "
-        "were chosen with the truths of the first 40 campaigns in sight; no other setting was tuned on the set, "
+        "The columns and the threshold that LISDD's recipe, the spike-and-slab regression and PySINDy use were "
+        "chosen with knowledge of the truths of the first 40 campaigns; no other setting was tuned on the set, "
         "unless its row says so.\n",
         *[_about(r, found) for r in found],
     ]

@@ -139,7 +139,7 @@ def assemble(
 
 @dataclass(frozen=True)
 class _Closes:
-    """How far the gap closes on held-out readings."""
+    """The explained share of the gap on held-out readings."""
 
     gap: GapSummary
     steps: Waterfall

@@ -1,4 +1,4 @@
-"""How far the gap closes with each cause, on held-out runs or stretches of time (decision 0016)."""
+"""The gap with each cause added, on held-out runs or stretches of time (decision 0016)."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ def remainder(
     Args:
         stated: the coefficients of the answer's fit with their standard deviations.
         moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
-        excess: on readings held out of the fit, in noise variances of a sample.
+        excess: on held-out readings, in noise variances of a sample.
         hidden: the effects that could hide beside the answer.
     """
     random, chosen = study.random, study.settings.answer

@@ -1,4 +1,4 @@
-"""The size of a gap, its measure, and how far it closes with each cause."""
+"""The size of a gap, its measure, and the share that each cause explains."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 from tunnel_sim.files.writing import as_json
 
-ON_RUNS = "on runs held out of the fit"
-ON_STRETCHES = "on stretches of time held out of the fit"
+ON_RUNS = "on held-out runs"
+ON_STRETCHES = "on held-out stretches of time"
 ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
 FITTED = "in the fitted runs (none could be held out)"
 """The readings on which a gap before and after is measured, as in the document."""
@@ -36,7 +36,7 @@ class Misfit:
 
 
 def share_closed(before: float, after: float) -> float:
-    """Share of a gap that closes, 0 to 1.
+    """Explained share of a gap, 0 to 1.
 
     Args:
         before: excess of the nominal model, in noise variances of a sample.
@@ -51,7 +51,7 @@ class Step:
 
     Args:
         effect: name of the cause added; None for the nominal model.
-        excess: with it and all causes before it, on readings held out of the fit, in noise variances of a sample.
+        excess: with it and all causes before it, on held-out readings, in noise variances of a sample.
     """
 
     effect: str | None
@@ -60,7 +60,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Waterfall:
-    """How far the gap closes as the causes are added one after another.
+    """The residual gap as the causes are added one after another.
 
     Args:
         steps: the nominal model first; then the cause that closes most, and so on.

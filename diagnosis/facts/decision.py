@@ -15,7 +15,7 @@ class Decision:
     """The decision that the probabilities of the answers allow.
 
     Args:
-        decided: whether the answer is probable enough, and predicts the readings held out of the fit.
+        decided: whether the answer is probable enough, and predicts held-out readings.
         credible: the fewest answers that together are credible, with their probabilities, most probable first.
         effects: effects common to the likely answers, with their probabilities.
         channels: channels on which all likely answers act, with their probabilities.
@@ -46,7 +46,7 @@ def decision(
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
-        closed: share of the gap that the answer explains on readings held out of the fit; None: not known.
+        closed: share of the gap that the answer explains on held-out readings; None: not known.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):

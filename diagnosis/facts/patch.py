@@ -1,4 +1,4 @@
-"""The user's model with the causes written into it, and the share of the gap that it closes by itself."""
+"""The user's model with the causes written into it, and the share of the gap that it explains by itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class NativeClosure:
-    """How far the gap closes on readings held out of the fit.
+    """The explained share of the gap on held-out readings.
 
     Args:
         before: mean squared residual of the nominal model, in units of a block mean's noise variance.
@@ -33,12 +33,12 @@ class NativeClosure:
 
     @property
     def fit_closed(self) -> float:
-        """Share of the gap that the fit closes."""
+        """Share of the gap that the fit explains."""
         return self._closed(self.fit)
 
     @property
     def native_closed(self) -> float:
-        """Share of the gap that the patched model closes."""
+        """Share of the gap that the patched model explains."""
         return self._closed(self.native)
 
     def _closed(self, after: float) -> float:

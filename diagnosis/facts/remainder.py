@@ -40,7 +40,7 @@ class Remainder:
 
     Args:
         significant: whether it is beyond chance, by the tests of the gap.
-        excess: on readings held out of the fit, in noise variances of a sample.
+        excess: on held-out readings, in noise variances of a sample.
         p_value: of the strongest test, corrected for the number of tests.
         material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
         words: the remainder in sentences; empty until they are written.
@@ -62,7 +62,7 @@ class Ceiling:
 
     Args:
         kind: of `KINDS`.
-        closed: share of the residual, on readings held out of the fit; negative where the prediction is worse.
+        closed: share of the residual, on held-out readings; negative where the prediction is worse.
         std: its standard deviation from the scatter of the runs, a share.
     """
 
@@ -123,7 +123,7 @@ class Law:
     Args:
         effect: table of an effects file that states it.
         parameters: value and standard deviation by name, in the unit that the table states.
-        closed: share of the residual that it explains, on runs held out of the fit.
+        closed: share of the residual that it explains, on held-out runs.
         std: its standard deviation from the scatter of the runs, a share.
     """
 

@@ -1,4 +1,4 @@
-"""Share of the residual that each kind of law could explain, on readings held out of the fit.
+"""Share of the residual that each kind of law could explain, on held-out readings.
 
 A law is a sum of the columns of a basis, fitted by regularised least squares with the noise known.
 """

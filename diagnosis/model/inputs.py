@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 
-_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
+_MOVING_ROOT = "These effects are not tried, since their loss depends on the motion of the spring's root: {}."
 _TURNING_BASE = (
-    "Where the base turns, these effects depend on more than its acceleration, and are not tried: {}."
+    "These effects are not tried, since they depend on more than the acceleration of the base: {}."
 )
 
 

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
 _FEW = 5  # blocks whose readings say how fast a run begins
-_OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
+_OF_SERVO = "These effects of a spring are not tried, because the actuator is a servo: {}."
 _OF_GEAR = (
-    "Gravity holds the joint, so that play would be in the gears between motor and link: that takes a model of two "
-    "bodies, and is not tried: {}."
+    "Gravity holds the joint. Play would be in the gears between motor and link, which requires a model of two "
+    "bodies, so these effects are not tried: {}."
 )
 _SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
 
@@ -116,16 +116,17 @@ class _OfLaw(NominalModel):
         if campaign.driven and campaign.sensor.derivative:
             (run, *_) = (run for run in campaign.runs if run.drive is not None)
             raise TunnelError(
-                "the run is driven and its sensor reads rates, which do not say where the model's joint moves",
+                "the run is driven and its sensor reads rates, which do not determine the position of the model's "
+                "joint",
                 where=f"{campaign.name}, run '{run.id}'",
                 remedy="record the angle, or leave --model out",
             )
         free = [run.id for run in campaign.runs if run.drive is None]
         if self.law.stiffness == 0.0 and free:
             raise TunnelError(
-                f"nothing holds the joint of the model, and nothing drives {', '.join(free)}",
+                f"the joint of the model has no restoring moment, and {', '.join(free)} have no input",
                 where=campaign.name,
-                remedy="leave these runs out, or add the spring, or gravity, that restores it",
+                remedy="leave these runs out, or add a spring or gravity to the model",
             )
         super().refuse(campaign)
 
@@ -155,8 +156,8 @@ class _OfLaw(NominalModel):
             return ()
         lead, step = (1e3 * change.own(value, "s") for value in (self.law.lead, self.law.step))
         return (
-            f"The motion leads its input by {lead:.2g} ms, at most half of the model's step of {step:.3g} ms, as "
-            "that of MuJoCo's integrators of first order does. This is taken off and is not counted as a cause.",
+            f"The motion leads its input by {lead:.2g} ms. MuJoCo's first-order integrators cause a lead of up to "
+            f"half the step of {step:.3g} ms, so it is subtracted and is not a cause.",
         )
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:
@@ -173,7 +174,7 @@ class Joint(_OfLaw, Rig):
     }  # fmt: skip
 
     def starts(self, data: Data) -> Iterator[Start]:
-        """Of driven runs, which need not show a resonance, from the response to known moments; then as a rig."""
+        """For driven runs, which may lack a resonance, the response to known moments first; then as for a rig."""
         if data.driven and not self.own_zeros:
             yield self._driven_start(data)
             yield self._start(data, Shown.of(data))
@@ -219,9 +220,7 @@ class Joint(_OfLaw, Rig):
     @property
     def unseen_scale(self) -> str:
         """The clause on a common scale that driven runs cannot show."""
-        return (
-            "a scale on the moment of the input as opposed to one on the inertia and all moments of the model"
-        )
+        return "a scale of the input moment as opposed to a scale of the inertia and all moments of the model"
 
     def planned_springs(self, data: Data) -> tuple[float, ...]:
         """That of the law, which cannot be chosen."""
@@ -353,9 +352,7 @@ def _as_control(drive: Drive, actuator: Actuator, where: str) -> Drive:
     """
     kp, said = -actuator.servo[1], f"actuator {one_line(actuator.name)!r}"
     if not kp > 0.0:
-        what = (
-            f"the input is command_rad, and {said} holds no position: without control its moment is the same"
-        )
+        what = f"the input is command_rad, but {said} does not hold a position"
         raise TunnelError(what, where=where, remedy="name the position actuator, or name the input drive")
     return Drive("drive", drive.values * (kp / actuator.gain), drive.hold)
 
@@ -364,17 +361,17 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
     """The input of a run with the gain of the joint's actuator; refused where the actuator could not follow it."""
     where, actuator = f"run {run.id}", law.actuator
     if drive.column == "base_rad":
-        what, remedy = "the joint of a model has no root that moves", "name the input moment_nm or drive"
+        what, remedy = "the joint of a model has no moving root", "name the input moment_nm or drive"
         raise TunnelError(f"{what}, and the input is base_rad", where=where, remedy=remedy)
     if drive.kind.of_base:
-        what = f"the base of a model's joint stands still, and the input is {drive.column}"
+        what = f"the base of a model's joint is fixed, but the input is {drive.column}"
         remedy = "diagnose without the model, or record the moment of the base's motion as moment_nm"
         raise TunnelError(what, where=where, remedy=remedy)
     if drive.column == "moment_nm":
         return drive
     if actuator is None:
         if drive.gain is None:
-            what = f"the joint has no actuator in the model that the column {drive.column} could be the control of"
+            what = f"the model has no actuator of the joint for the column {drive.column}"
             raise TunnelError(
                 what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm"
             )
@@ -383,7 +380,7 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
     if drive.column == "command_rad":
         drive = _as_control(drive, actuator, where)
     if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
-        what = f"drive_gain = {drive.gain:g} is stated, and {named} gives {actuator.gain:g} N m per unit of control"
+        what = f"drive_gain = {drive.gain:g} is stated, but {named} gives {actuator.gain:g} N m per unit of control"
         raise TunnelError(
             what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model"
         )

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 _NO_MOMENT = (
-    "Without a spring these effects have no moment, and are not tried: {}. Play shows where a spring of stated "
-    "stiffness preloads the joint."
+    "These effects are not tried, because they have no moment without a spring: {}. Play is visible if a spring of "
+    "stated stiffness preloads the joint."
 )
 _NO_ZERO = (
-    "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
+    "These effects of the sensor are not tried, because its zero is not determined without a spring: {}."
 )
 
 
@@ -130,7 +130,7 @@ class LooseBody(NominalModel):
     def unseen(self, data: Data) -> Sequence[str]:
         """The zero."""
         del data
-        return ("the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring",)
+        return ("the sensor's zero, and its drift as opposed to a constant moment: there is no spring",)
 
     @property
     def unseen_scale(self) -> str:

@@ -400,7 +400,7 @@ class NominalModel:
             found.append("how well runs repeat: a single run shows no scatter between runs")
         last = (_OF_WIND,) if data.wind_on else ()
         if data.driven:
-            found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
+            found.append("a lag of the sensor as opposed to a delay of the input: only their sum is visible")
             return *found, ALWAYS_BLIND[1], self.unseen_scale, *last
         return *found, *ALWAYS_BLIND, *last
 

@@ -341,9 +341,9 @@ class Data:
 
     Args:
         runs: prepared runs.
-        frontal_area: A, m²; 1 in the measured campaign's units where it does not state it.
-        reference_length: l, m; likewise.
-        width: m; likewise.
+        frontal_area: A, m². This and the two lengths are 1 in the measured campaign's units where not stated.
+        reference_length: l, m.
+        width: m.
         model: nominal model of the campaign, whose parameters a part of its runs has, too.
         similarity: how the campaign was made from the measured one.
         settings: of the diagnosis.

@@ -25,11 +25,11 @@ from tunnel_sim.vocabulary.record import Array
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
 
-_NO_SPRING = "The servo is no spring, and these effects of one are not tried: {}."
+_NO_SPRING = "These effects of a spring are not tried, because the servo is not a spring: {}."
 #: Why play is not tried where a servo holds the joint.
 OF_GEAR = (
-    "The servo holds the motor, so that play would be between motor and link: that takes a model of two bodies, "
-    "and is not tried: {}."
+    "The servo holds the motor. Play would be between motor and link, which requires a model of two bodies, so "
+    "these effects are not tried: {}."
 )
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 
@@ -69,7 +69,7 @@ class _OfServo(NominalModel):
         for run in campaign.runs:
             if not _commanded(run):
                 raise TunnelError(
-                    "the run has no command_rad, and other runs do: the servo may not have held the joint in it",
+                    "the run has no command_rad, but other runs do: the servo may have been off",
                     where=f"{campaign.name}, run '{run.id}'",
                     remedy="diagnose the runs without the servo separately",
                 )
@@ -100,7 +100,7 @@ class _OfServo(NominalModel):
         which = (
             "which part of the damping is the servo's kv" if self.kv == 0.0 else "an error of the servo's kv"
         )
-        return (f"{which}: only its sum with the joint's damping shows",)
+        return (f"{which}: only its sum with the joint's damping is visible",)
 
     def planned_springs(self, data: Data) -> tuple[float, ...]:
         """None: the servo cannot be exchanged."""
@@ -167,6 +167,6 @@ class ServoPerInertia(_OfServo, PerInertia):
         """
         super().refuse(campaign)
         if any(run.drive is not None and run.drive.servo_kv for run in campaign.runs):
-            what = "servo_kv is stated, and no kp: without it moments are known per unit inertia only"
+            what = "servo_kv is stated without kp; moments are then known per unit inertia only"
             remedy = "state the kp as spring_stiffness, or leave servo_kv out"
             raise TunnelError(what, where=campaign.name, remedy=remedy)

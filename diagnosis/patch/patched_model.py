@@ -1,4 +1,4 @@
-"""The user's own model with the causes written into it, and the share of the gap that it closes."""
+"""The user's own model with the causes written into it, and the share of the gap that it explains."""
 
 from __future__ import annotations
 

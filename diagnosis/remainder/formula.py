@@ -332,7 +332,7 @@ def effect_table(formula: Formula, name: str) -> dict[str, Any]:
         "channel": "sensor" if formula.of_reading else channel,
         "condition": "wind_on" if windy else "always",
         **({"reading": f"y + {whole}"} if formula.of_reading else {"moment": whole}),
-        "summary": "A formula that tunnel diagnose proposed for what no effect explains.",
+        "summary": "A formula proposed by tunnel diagnose for the residual gap.",
         "parameters": parameters,
     }
 

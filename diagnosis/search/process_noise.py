@@ -68,7 +68,7 @@ class ProcessNoise:
 
     @property
     def drop(self) -> float:
-        """Of −2 ln L of all runs, dimensionless."""
+        """Drop of −2 ln L of all runs, dimensionless."""
         return float(self.drops.sum())
 
     @property

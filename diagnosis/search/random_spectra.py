@@ -1,7 +1,7 @@
 """Spectra of random moments: where a moment comes from, its parts, and the forms of a part that are tried.
 
 The stream's moment is in proportion to its pressure and acts with the wind on; that of the surroundings is the same
-in every run. The runs with the wind off tell them apart, and so do several wind speeds.
+in every run. The runs with the wind off distinguish them, and so do several wind speeds.
 """
 
 from __future__ import annotations

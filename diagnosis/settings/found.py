@@ -9,169 +9,173 @@ from diagnosis.settings.origin import ONE_IN_1000, setting
 
 @dataclass(frozen=True)
 class SelectionSettings:
-    """The runs, and the parts of them, that are compared."""
+    """Selection of runs and of their parts."""
 
     other_mode: float = setting(
         1.5,
-        "Ratio of the frequencies with and without wind from which a run swings in another mode.",
+        "Minimum ratio of the frequencies with and without wind at which a run counts as another mode.",
         "judgement",
     )
     same_spring: float = setting(
         1.1,
-        "Ratio of frequencies at one wind speed above which runs have different springs.",
+        "Maximum ratio of the frequencies at one wind speed between runs of one spring.",
         "judgement",
-        "Stiffnesses a fifth apart. Effects of the amplitude change a frequency gradually, and seldom as "
-        "much.",
+        "The stiffnesses then differ by a fifth. Effects of the amplitude change a frequency gradually, and seldom "
+        "by this much.",
     )
     long_rest: float = setting(
         0.1,
-        "Length of a rest at the end of a run, as a share of it, from which it is cut off.",
+        "Minimum duration of a rest at the end of a run, as a share of the run, for it to be cut off.",
         "judgement",
         "The angle at which friction stops a body says little about its motion.",
     )
     rest_stds: float = setting(
         5.0,
-        "Distance from the end of a run within which the body counts as at rest.",
+        "Maximum deviation from the final reading at which the body counts as at rest.",
         "convention",
         unit="std of a block mean",
     )
     blocks_in_cycle: int = setting(
         24,
-        "Fewest block means in a cycle of the motion to which causes are fitted.",
+        "Minimum number of block means per cycle of the motion in the fits of causes.",
         "physics",
-        "They keep all but 0.6 % of the information at the frequency of the motion.",
+        "24 blocks retain 99.4 % of the information at the frequency of the motion.",
         unit="blocks",
     )
     block_loss: float = setting(
         0.01,
-        "Share of the gap that wider blocks may hide.",
+        "Maximum share of the gap that wider blocks may average out.",
         "judgement",
         "Causes differ by much larger shares.",
     )
     fast_rate: float = setting(
         0.001,
-        "Rate at which noise alone counts as a motion that is too fast for wider blocks.",
+        "False-alarm rate of the test for a motion too fast for wider blocks.",
         "convention",
         ONE_IN_1000,
     )
     disturbed_rate: float = setting(
         0.001,
-        "Rate of campaigns without a disturbance in which a run is called disturbed.",
+        "False-alarm rate of the test for a disturbed run, per campaign.",
         "convention",
         ONE_IN_1000,
     )
     disturbed_fewest: int = setting(
         3,
-        "Fewest free decays among which a disturbed one is sought.",
+        "Minimum number of free decays in which a disturbed run is sought.",
         "judgement",
-        "A feature of one of two runs may as well be one of all.",
+        "With two runs, a disturbance of one cannot be distinguished from a property of all.",
         unit="runs",
     )
     disturbed_share: float = setting(
         0.25,
-        "Share of the runs that may be disturbed, at least one.",
+        "Maximum share of the runs that may be disturbed; at least one run.",
         "judgement",
         "The others show the common behaviour.",
     )
     disturbed_scatter: float = setting(
         0.5,
-        "Expected standard deviation between runs of the logarithm of the greatest jump in χ².",
+        "Prior standard deviation between runs of the logarithm of the largest jump in χ².",
         "judgement",
-        "By chance alone it is 0.25; causes act more in some runs than in others.",
+        "Chance alone gives 0.25; causes act more strongly in some runs than in others.",
     )
     disturbed_prior: float = setting(
         4.0,
-        "Weight of this expectation, as a number of runs.",
+        "Weight of this prior, in runs.",
         "judgement",
-        "Few runs do not determine their scatter.",
+        "A few runs do not determine their scatter.",
         unit="runs",
     )
     disturbed_kept: float = setting(
         6.0,
-        "Cycles before a disturbance from which that part of a run is used; with fewer the run is left out.",
+        "Minimum number of cycles before a disturbance for that part of the run to be used. Otherwise the run is "
+        "left out.",
         "judgement",
-        "A record needs three cycles, and its damping twice as many.",
+        "A record needs three cycles, and its damping needs twice as many.",
         unit="cycles",
     )
     gross_misfit: float = setting(
         0.01,
-        "Residual, as a share of the readings' power, from which a fit misses the motion itself.",
+        "Minimum residual, as a share of the power of the readings, at which a fit fails to describe the motion.",
         "judgement",
     )
 
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """How the noise of the sensor is found."""
+    """Noise of the sensor."""
 
     stated_rate: float = setting(
         0.001,
-        "Rate at which correctly stated noise is said to contradict the statement.",
+        "False-alarm rate of the test that the noise contradicts the stated noise.",
         "convention",
         ONE_IN_1000,
     )
     own_rate: float = setting(
         0.001,
-        "Rate at which runs of equal noise are said to differ in noise.",
+        "False-alarm rate of the test that the noise differs between runs.",
         "convention",
         ONE_IN_1000,
     )
     colour_rate: float = setting(
-        0.001, "Rate at which white noise is said to be coloured.", "convention", ONE_IN_1000
+        0.001, "False-alarm rate of the test for coloured noise.", "convention", ONE_IN_1000
     )
     colour_flat: float = setting(
         0.03,
-        "Departure of a band from a flat spectrum that does not count as colour.",
+        "Maximum deviation of a band from a flat spectrum that does not count as colour.",
         "judgement",
-        "Quantisation colours the noise as much.",
+        "Quantisation causes a deviation of this size.",
     )
     colour_parts: int = setting(
         4,
-        "Fewest parts of the records in which a colour is sought.",
+        "Minimum number of parts of the records for the test for colour.",
         "judgement",
-        "Fewer agree by chance.",
+        "Fewer parts may agree by chance.",
         unit="parts",
     )
     colour_amplitudes: float = setting(
         2.0,
-        "Ratio of the greatest to the smallest motion among the parts, from which the noise is known not "
-        "to follow it.",
+        "Minimum ratio of the largest to the smallest motion among these parts, to show that the noise does not "
+        "follow the motion.",
         "judgement",
         "The power of noise that follows the motion then differs by a factor of four.",
     )
     colour_band_rate: float = setting(
         0.01,
-        "Rate at which a steady band of the noise is excluded from its spectrum as unsteady.",
+        "False-alarm rate at which a stationary band is excluded from the spectrum as non-stationary.",
         "convention",
         "One in a hundred.",
     )
     colour_bands: float = setting(
         0.75,
-        "Share of the bands that must be steady where the colour shows in still air alone.",
+        "Minimum share of stationary bands where only the wind-off runs show the colour.",
         "judgement",
-        "Few parts are compared there, so that an unsteady band is easily overlooked.",
+        "Few parts are compared in that case, so non-stationary bands are easily missed.",
     )
     colour_slope_stds: float = setting(
         2.0,
-        "Excess of the slope assumed below the lowest band over the one found.",
+        "Margin by which the slope assumed below the lowest band exceeds the estimated slope.",
         "convention",
         unit="std",
     )
     colour_beyond: float = setting(
         3.5,
-        "Multiple of the motion's frequency beyond which the spectrum must be coloured where a gap remains.",
+        "Multiple of the frequency of the motion above which the spectrum must be coloured where a gap remains.",
         "judgement",
-        "The bands below belong to the motion.",
+        "The bands below contain the motion.",
     )
     wandering_rate: float = setting(
-        0.001, "Rate at which stationary noise is said to be a wandering zero.", "convention", ONE_IN_1000
+        0.001, "False-alarm rate of the test for a wandering zero.", "convention", ONE_IN_1000
     )
     repeated_rate: float = setting(
-        0.001, "Rate at which noise is said to repeat from run to run.", "convention", ONE_IN_1000
+        0.001,
+        "False-alarm rate of the test for noise that repeats from run to run.",
+        "convention",
+        ONE_IN_1000,
     )
     oscillation_rate: float = setting(
         0.001,
-        "Rate at which noise is said to be an oscillation that the input excites.",
+        "False-alarm rate of the test for an oscillation excited by the input.",
         "convention",
         ONE_IN_1000,
     )
@@ -179,84 +183,82 @@ class NoiseSettings:
 
 @dataclass(frozen=True)
 class GapSettings:
-    """Whether there is a gap."""
+    """Detection of a gap."""
 
     detection_rate: float = setting(
         0.001,
-        "Rate at which a campaign without a gap is said to have one, all tests together.",
+        "False-alarm rate of the detection of a gap, all tests combined.",
         "convention",
         ONE_IN_1000,
     )
     noise_tolerance: float = setting(
         0.03,
-        "Share by which the noise below 60 Hz may exceed the noise measured above it.",
+        "Allowed excess of the noise below 60 Hz over the noise above 60 Hz, as a share.",
         "judgement",
         "Quantisation colours the noise.",
     )
     noise_tails: float = setting(
         1.15,
-        "Factor by which tails heavier than those of white noise are accepted.",
+        "Allowed ratio of the tails of the noise to those of a normal distribution.",
         "judgement",
-        "Sensor noise is not quite normal.",
+        "Sensor noise is not exactly normal.",
     )
     noise_above_stated: float = setting(
         1.5,
-        "Ratio of variances up to which noise above the stated level is not part of the gap.",
+        "Maximum ratio of the noise variance to the stated variance that does not count as a gap.",
         "judgement",
         "Stated noise is often rounded to one digit.",
     )
     misbehaving_rate: float = setting(
         1e-05,
-        "Rate at which the noise itself is said to misbehave, all tests together.",
+        "False-alarm rate of the tests for irregular noise, all tests combined.",
         "judgement",
-        "A hundredth of the rate of a gap: it outweighs any cause.",
+        "A hundredth of the false-alarm rate of a gap, since irregular noise outweighs any cause.",
     )
 
 
 @dataclass(frozen=True)
 class ReadOffSettings:
-    """Causes detected in the records before any effect is fitted."""
+    """Causes detected in the records before any fit."""
 
     coarse_step: float = setting(
         1.5,
-        "Ratio of the step of the readings to the stated resolution from which it counts as coarser.",
+        "Minimum ratio of the step of the readings to the stated resolution for a coarse sensor.",
         "judgement",
     )
     hum_rate: float = setting(
-        0.001, "Rate at which records without a hum are said to have one.", "convention", ONE_IN_1000
+        0.001, "False-alarm rate of the detection of mains hum.", "convention", ONE_IN_1000
     )
     hum_run_rate: float = setting(
-        0.001, "Rate at which a run without the hum's line is said to show it.", "convention"
+        0.001, "False-alarm rate of the line of the hum in a single run.", "convention"
     )
-    hum_runs: float = setting(0.75, "Share of the runs that must show a hum.", "judgement")
+    hum_runs: float = setting(0.75, "Minimum share of the runs that must show the hum.", "judgement")
     hum_contrast: float = setting(
         4.0,
-        "Drop of χ² at the hum's line over the largest beside it, all runs together.",
+        "Minimum ratio of the drop of χ² at the line of the hum to the largest drop nearby, all runs combined.",
         "judgement",
-        "Rods and corners also raise the spectrum.",
+        "The spectrum also rises at natural frequencies of the rod and at corner frequencies.",
     )
     hum_steady: float = setting(
         0.25,
-        "Least ratio of a hum's power in one half of the runs to that in the other half.",
+        "Minimum ratio of the hum's power in one half of the runs to its power in the other half.",
         "judgement",
-        "Hum from an amplifier or a lamp may change by a factor of two; a mode excited at the release "
-        "loses more.",
+        "Hum from an amplifier or a lamp may change by a factor of two. A mode excited at the release decays more.",
     )
     hum_alike: float = setting(
         0.02,
-        "Difference of evidence, as a share, up to which two frequencies of the mains explain the lines "
-        "alike.",
+        "Maximum relative difference in evidence at which two mains frequencies explain the lines equally well.",
         "judgement",
     )
     hum_swell_rate: float = setting(
         1e-05,
-        "Rate at which a steady hum is said to swell.",
+        "False-alarm rate of the test for hum that varies in amplitude.",
         "judgement",
-        "A hundredth of the rate of a hum.",
+        "A hundredth of the false-alarm rate of a hum.",
     )
     lead_rate: float = setting(
         0.001,
-        "Rate at which motion without a lead over its input is said to have one.",
+        "False-alarm rate of the test for a motion that leads its input.",
         "convention",
         ONE_IN_1000,
     )

@@ -11,7 +11,7 @@ to campaigns whose causes are known, *tuned* is set on such campaigns by hand; b
 is chosen by reason alone."""
 
 ONE_IN_1000 = "One campaign in a thousand."
-BY_CHANCE = "By chance alone two numbers lower χ² by more than 20 once in 22,000 effects tried."
+BY_CHANCE = "Two parameters lower χ² by more than 20 by chance once in 22,000 effects tried."
 
 
 def setting(

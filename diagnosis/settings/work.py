@@ -9,12 +9,12 @@ from diagnosis.settings.origin import setting
 
 @dataclass(frozen=True)
 class WorkSettings:
-    """The division of the work; answers are bit-identical with any of these."""
+    """Division of the work; the answers are bit-identical with any of these."""
 
     threads: int = setting(
         2,
-        "Threads in which runs are integrated.",
+        "Number of threads that integrate runs.",
         "judgement",
-        "The work between two predictions waits for all of them.",
+        "The work between two predictions waits for all threads.",
         unit="threads",
     )

@@ -62,7 +62,7 @@ def key_figures(document: Document) -> list[KeyFigure]:
             shown.append(KeyFigure(label, WITHIN_THE_NOISE, left_over(after)))
         else:
             shown.append(_misfit_figure(document, label, after, left_over(after)))
-        shown.append(KeyFigure("Share of the gap closed", share(gap["closed"]), gap["closed_on"]))
+        shown.append(KeyFigure("Share of the gap explained", share(gap["closed"]), gap["closed_on"]))
     if document["candidates"]:
         rivals = decided and document["ambiguous_with"]
         whose = "likeliest of these sets" if rivals else set_out(document)

@@ -38,15 +38,6 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
     return f"{known}, and {one_of}" if known else one_of
 
 
-def from_causes(document: Document) -> str:
-    """The causes of a decided answer with their probabilities, as part of a sentence."""
-    if document["ambiguous_with"]:
-        return known_and_open(document, sized=False)
-    proper = without_scatter(document["causes"])
-    likely = probability(document["credible"][0]["probability"])
-    return f"{plain(*proper)} (probability {likely})"
-
-
 def _parted(document: Document, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
     """Effects common to all likely answers, and the further effects of each answer with its probability.
 
@@ -125,9 +116,9 @@ def hold_words(document: Document) -> str:
     when = "later" if found["delay_s"] > 0.0 else "earlier"
     delay = 1e3 * abs(found["delay_s"])
     return (
-        f"One cause has two readings: either the input acts {delay:.3g} ms {when} than recorded, "
-        f"which is half a sample ({1e3 * found['half_sample_s']:.3g} ms), or it {other}, where it was taken as "
-        f"{taken}, {why}. The second reading, without a delay, explains the records {alike}."
+        f"One cause has two interpretations. Either the input acts {delay:.3g} ms {when} than recorded, about half "
+        f"a sample ({1e3 * found['half_sample_s']:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
+        f"The second interpretation explains the records {alike}, without a delay."
     )
 
 

@@ -17,9 +17,9 @@ Figures = Mapping[str, Any]
 Sentence = str | Callable[[Figures], str]
 
 UNPATCHED = "The causes could not be written into the model"
-_NOISE = "The records' noise is {ratio:.3g} times what noise_std and resolution state"
+_NOISE = "The noise of the records is {ratio:.3g} times the level that noise_std and resolution state"
 _LEFT_OUT = (
-    "Left out, since they state {} spring_stiffness and the others {}: {{runs}}. State it for all runs, or "
+    "Left out, because they state {} spring_stiffness and the others {}: {{runs}}. State it for all runs, or "
 )
 
 
@@ -27,8 +27,8 @@ def _not_confirmed(given: Figures) -> str:
     return (
         f"The integrator of the fits differs from the MuJoCo model by {given['rms_rad']:2} (root mean square "
         f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:2}). "
-        "The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
-        "and may be wrong by as much."
+        "The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits and may "
+        "have an error of this size."
     )
 
 
@@ -39,24 +39,22 @@ def _few_runs(given: Figures) -> str:
     if given["windy"]:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
-    return (
-        f"There {number} only: causes are distinguished by the form of the {motion} alone. Add runs {others}."
-    )
+    return f"There {number} only: the form of the {motion} alone distinguishes the causes. Add runs {others}."
 
 
 def _none_held_out(given: Figures) -> str:
     each = "spring, with the wind off and on" if given["windy"] else "run"
     return (
-        "No run could be held out of the fit, so the share closed is that of the fitted runs. The gap as the "
-        f"causes are added is predicted for stretches of time left out. Repeat every {each}: a run left out tests "
-        "more than a stretch."
+        "No run could be held out of the fit, so the explained share is that of the fitted runs. The "
+        f"gap as the causes are added is predicted for held-out stretches of time. Repeat every {each}: a held-out "
+        "run is a stronger test than a stretch."
     )
 
 
 def _unresolved(given: Figures) -> str:
     return (
         f"{plain(*given['effects']).capitalize()} was fitted to the whole records and left out of the answer: "
-        "neither the early nor the late half of them, fitted by itself, shows it."
+        "neither their early half nor their late half, fitted alone, shows it."
     )
 
 
@@ -64,16 +62,16 @@ CAUTIONS: Mapping[str, Sentence] = {
     "stated": "{words}",
     "stiffness not stated": f"{_LEFT_OUT.format('no', 'do')}diagnose these separately.",
     "stiffness stated": f"{_LEFT_OUT.format('their', 'do not')}diagnose these separately.",
-    "other springs": "Left out, since different frequencies at one wind speed show more than one spring, and these "
-    "runs may not have the spring of the rest: {runs}. State spring_stiffness, or diagnose these separately.",
-    "another mode": "Left out, since they swing in another mode, {ratio:g} times as fast as the same spring with "
-    "the wind off or faster: {runs}. Diagnose these separately.",
+    "other springs": "Left out, because different frequencies at one wind speed show more than one spring, and "
+    "these runs may have another spring: {runs}. State spring_stiffness, or diagnose these separately.",
+    "another mode": "Left out, because they oscillate in another mode, at least {ratio:g} times as fast as the "
+    "same spring with the wind off: {runs}. Diagnose these separately.",
     "no sensor effect tried": "No effect of the sensor is tried on {quantity}s.",
     "only a second mode tried": "A second mode is the only effect of the sensor that is tried on {quantity}s.",
-    "by moment": "The body has no restoring moment, so small errors of a moment add up in its angle, which departs "
-    "from every model. Effects are therefore compared by the residual moment. It counts as random noise "
-    "beside the answer: parameters, coefficients and the shares in the table of answers come from fits with that "
-    "noise. All other sizes and shares are those of the angle.",
+    "by moment": "The body has no restoring moment, so small errors of a moment accumulate in its angle, and every "
+    "model departs from it. Effects are therefore compared by the residual moment. The fits treat it as random "
+    "noise; parameters, coefficients and the shares in the table of answers come from these fits. All other sizes "
+    "and shares refer to the angle.",
     "unpatched": f"{UNPATCHED}: {{reason}}.",
     "one spring assumed": "No run states spring_stiffness, so all runs are assumed to have the same spring, and "
     "moments are per unit inertia. State it, or leave out the runs with another spring: a different spring looks "
@@ -84,20 +82,19 @@ CAUTIONS: Mapping[str, Sentence] = {
     "less noise than stated": f"{_NOISE}. The answer is based on the noise found in the records; correct noise_std "
     "or leave it out.",
     "more noise than stated": f"{_NOISE}, and noise above the stated level counts as a gap. If the sensor really "
-    "is as noisy as that, correct noise_std or leave it out.",
+    "is this noisy, correct noise_std or leave it out.",
     "not followed": "The MuJoCo model could not follow the fitted motion ({failure}), so all figures come from the "
     "integrator of the fits. Do not rely on the fitted parameters.",
     "not confirmed": _not_confirmed,
     "few runs": _few_runs,
     "none held out": _none_held_out,
-    "some not held out": "Not held out of the fit, since no other run has the same spring or wind: {runs}. Their "
-    "gap with the causes added is that of the fit; repeat these runs.",
-    "cut": "The nominal model misses the motion grossly, so each record is used only from its second passage "
-    "through the middle until its motion ends. A start driven by hand is not a free decay, and neither is a body "
-    "at rest. The coefficients before the causes may therefore differ from those of identify, which uses the "
-    "whole record.",
+    "some not held out": "Not held out of the fit, because no other run has the same spring or wind: {runs}. Their "
+    "gap with the causes is the gap of the fit. Repeat these runs.",
+    "cut": "The nominal model fits poorly, so each record is used only from its second passage through the centre "
+    "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
+    "causes may therefore differ from those of identify, which uses the whole record.",
     "unresolved": _unresolved,
-    "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the angle at which friction "
+    "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
         f'A separate zero for each run would explain {share(given["share"])} of the gap. State zero = "per_run" '
@@ -108,8 +105,8 @@ CAUTIONS: Mapping[str, Sentence] = {
         "unexplained, so no larger sets of effects were tried."
     ),
     "remainder not sought": "No formula for the remaining gap is sought for a driven body without a restoring "
-    "moment: every small error of a moment adds up in its angle.",
-    "remainder not solved": "The share of the remaining gap that could be closed was not found: its equations "
+    "moment: small errors of a moment accumulate in its angle.",
+    "remainder not solved": "The explainable share of the remaining gap was not found: its equations "
     "cannot be solved.",
 }
 """Caveats of an answer."""
@@ -129,14 +126,14 @@ NOISE: Mapping[str, Sentence] = {
 
 REMARKS: Mapping[str, tuple[Sentence, str]] = {
     "within step": (
-        "the model departs from the readings by less than their steps, whose error may follow the motion",
-        "read the angle more finely to see smaller gaps",
+        "the residual is smaller than the steps of the readings, and the error of the steps may follow the motion",
+        "use a finer resolution to see smaller gaps",
     ),
     "coloured": (
         "the sensor's noise is coloured: {std_rad:3} in all, and its power per hertz varies by a factor of "
         "{power_ratio:.3g} over a factor of {frequency_ratio:.3g} in frequency, in the same way throughout the "
         "runs",
-        "the diagnosis allows for it, and it is not a cause",
+        "the diagnosis allows for it; it is not a cause",
     ),
     "not judged": (
         "sampled too slowly to test whether the noise follows the motion or comes in bursts",
@@ -144,14 +141,14 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
     ),
     "harmonic of the hum": (
         "the strongest line of the hum is at {line_hz:.5g} Hz, {harmonic} times the mains' frequency",
-        "the stated amplitude is that line's",
+        "the stated amplitude is that of this line",
     ),
     "folded hum": (
         lambda given: (
             f"the hum's line of {given['line_hz']:.5g} Hz is above half the sample rate and appears at "
             f"{' to '.join(f'{place:.5g}' for place in given['places_hz'])} Hz"
         ),
-        "sample faster to see it where it is",
+        "sample faster to see it at its true frequency",
     ),
     "other mains": (
         "mains of {other_hz:.5g} Hz would show the same line as mains of {mains_hz:.5g} Hz at this sample rate",
@@ -165,25 +162,25 @@ PATCH: Mapping[str, Sentence] = {
     "its greatest moment within the records.",
     "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it. Call "
     "tunnel_sim.load_plugin() before MuJoCo reads the file.",
-    "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it yields as a damper "
-    "does, and a joint that friction holds creeps. Its time constant is set to two steps, the shortest allowed.",
-    "presliding": "The presliding of the friction has no native element, the plugin acts on hinges only, and it is "
-    "left out.",
-    "friction against rate": "The friction's dependence on the rate has no native element, the plugin acts on "
-    "hinges only, and it is left out.",
-    "friction against load": "The friction's dependence on the moment that the joint carries has no native "
-    "element, and is left out where this moment is not gravity's on a hinge.",
+    "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it acts as a damper, "
+    "and a joint at rest by friction creeps. Its time constant is set to two steps, the shortest allowed.",
+    "presliding": "The presliding of the friction is left out: it has no native element, and the plugin acts on "
+    "hinges only.",
+    "friction against rate": "The dependence of the friction on the rate is left out: it has no native element, "
+    "and the plugin acts on hinges only.",
+    "friction against load": "The dependence of the friction on the load of the joint is left out: it has no "
+    "native element, and the plugin supports only gravity's moment on a hinge.",
     "rod": "The twist of the rod is left out: it needs a further body and joint.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",
-    "air": "The air's moment is left out: the patched model is that of the runs with the wind off.",
+    "air": "The moment of the air is left out: the patched model describes the runs with the wind off.",
     "sensor": lambda given: (
         f"Effects of the sensor are not part of the model: {', '.join(plain(name) for name in given['effects'])}; "
         "the comparison applies them to the reading."
     ),
-    "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input "
-    "asks for it; RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from "
-    "the value written.",
+    "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input; "
+    "RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from the value "
+    "written.",
 }
 """Differences between the patched model and the law found."""
 

@@ -35,11 +35,11 @@ def diagnosis_brief(document: Document) -> str:
     decided = document.get("decided", True)
     undecided = "" if decided else f"undecided, the {set_out(document)} is "
     misfit, excess = misfit_of(document), gap["excess_before"]
-    size = f"{held_out_excess(excess)} times the noise power"
+    size = f"{held_out_excess(excess)} times the noise variance"
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
     closed = (
-        f", {share(gap['closed'])} of it closed {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
+        f"; {share(gap['closed'])} explained {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
     )
     likely = probability(first["probability"])
     return (
@@ -75,12 +75,12 @@ def coefficients_line(document: Document) -> str:
             mostly = listed(
                 [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
             )
-            parts.append(f"{words} (most of that of {mostly})" if mostly else words)
+            parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
     if not parts:
         return ""
     return (
-        f"± includes {listed(parts)}. tunnel identify includes the noise, the scatter between runs and what its "
-        "model misses, so its ± may be far smaller or larger."
+        f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
+        "the misfit of its model, so it may be far smaller or larger."
     )
 
 
@@ -99,13 +99,13 @@ def hidden_line(document: Document) -> str:
         return ""
     size = f"{significant(abs(first['size']['value']), 2)}{unit_mark(beside(first['size']['unit']))}"
     return (
-        f"What could hide: {plain(first['effect'])} of up to {size}{explained({first['size']['unit']})}, which "
-        f"these runs do not exclude, would change {' and '.join(moved)}. The intervals allow for it."
+        f"What could hide: these runs do not exclude {plain(first['effect'])} of up to {size}"
+        f"{explained({first['size']['unit']})}. It would change {' and '.join(moved)}. The intervals allow for it."
     )
 
 
 def patch_line(document: Document) -> str:
-    """The share of the gap that the patched model closes; empty without a model."""
+    """The share of the gap that the patched model explains; empty without a model."""
     model = document.get("model")
     if model is None:
         return ""
@@ -115,8 +115,8 @@ def patch_line(document: Document) -> str:
     else:
         closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
         said = (
-            f"The patched model, simulated by MuJoCo, closes {closed} of the gap {model['closed_on']}; the fit "
-            f"itself {by_fit}."
+            f"The patched model, simulated by MuJoCo, explains {closed} of the gap {model['closed_on']}; the fit "
+            f"itself explains {by_fit}."
         )
     zero = f"{'−' if model['zero_rad'] < 0.0 else '+'} {reading_shown(abs(model['zero_rad']), 3)}"
     return f"{said} The reading is the position of {model['joint']} {zero}."

@@ -151,20 +151,20 @@ def of_swing(misfit: Misfit, excess: float) -> str:
 
 
 def times_noise(value: float, decimals: int = 2) -> str:
-    """A gap in words, such as ``2.75 times the noise power``.
+    """A gap in words, such as ``2.75 times the noise variance``.
 
     Args:
         value: the gap as an excess, in noise variances, a ratio.
         decimals: of a gap below ten (a count).
     """
-    return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise power"
+    return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise variance"
 
 
 def left_over(excess: float) -> str:
-    """A residual gap, such as ``9.6 times the noise power``, a ratio."""
+    """A residual gap, such as ``9.6 times the noise variance``, a ratio."""
     least = 1e-3
     size = f"less than {least:g}" if excess < least else significant(excess, 2)
-    return f"{size} times the noise power"
+    return f"{size} times the noise variance"
 
 
 def beside_noise(excess: float) -> str:
@@ -268,7 +268,7 @@ KINDS: Mapping[str, str] = {
     "wind": "a moment of angle and rate with the wind",
     "time": "a moment in time, equal in all runs",
     "reading": "an error of the reading, equal in all runs",
-    "line": "a steady line in the reading, with another phase in every run",
+    "line": "a steady line in the reading, with its own phase in every run",
     "between": "a stiffness, damping or moment of each run",
     "event": "a moment in time of each run",
     "wander": "a wandering or jumping zero of each run",

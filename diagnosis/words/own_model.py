@@ -43,8 +43,8 @@ def model_words(document: Document) -> str:
     for one, std in corrected(document):
         before, unit = significant(one["before"][0], 3), unit_mark(one["unit"].split(",")[0])
         after = with_std(one["after"][0], std) if std > 0.0 else significant(one["after"][0], 3)
-        said.append(f"{one['name']} is {before} {unit} there, and the runs say {after} {unit}")
-    return f"{document['model']['file']} as given does not fit: {'; '.join(said)}." if said else ""
+        said.append(f"{one['name']} is {before} {unit} in the file and {after} {unit} by the runs")
+    return f"{document['model']['file']} does not fit: {'; '.join(said)}." if said else ""
 
 
 def model_step(document: Document) -> str:

@@ -37,32 +37,32 @@ def rest_words(document: Document) -> str:
     larger = excess > 1.0  # than the noise: people see it in the fit, whatever it does to the coefficients
     if larger and misfit is not None:
         size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
-    left = f"the residual ({size})" if named else "it"
-    explained = f"{'Not all is explained:' if larger else 'Explained;'} {left}" if named else "It"
+    left = f"the residual ({size})" if named else "the gap"
+    subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]
     material = [name for name, move in moves.items() if move["material"]]
     known = [name for name, move in moves.items() if move["std"] is not None]
     if not causes:
         words = "No gap: nothing remains beyond the noise."
     elif not rest["significant"]:
-        words = "Explained; the residual is within the noise."
+        words = "The residual is within the noise."
     elif material:
         moved = _each({name: change_up_to(moves[name]["value"], after[name]) for name in material})
-        start = f"Not all is explained: {left}" if named else "It"
+        start = f"Part of the gap remains: {left}" if named else subject
         words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
     elif not known:
-        words = f"{explained} changes no coefficient that these runs determine."
+        words = f"{subject} changes no coefficient that these runs determine."
     else:
         most = {name: max(moves[name]["value"], moves[name]["std"] or 0.0) for name in known}
         bounds = _each({name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()})
-        words = f"{explained} changes {bounds}." if named else f"It is immaterial: it changes {bounds}."
+        words = f"{subject} changes {bounds}." if named else f"The gap is immaterial: it changes {bounds}."
     if rest["further"]:
-        words += f" {plain(rest['further']).capitalize()} is significant beside it and too small to be named."
+        words += f" {plain(rest['further']).capitalize()} is significant, but too small to be named."
     return words
 
 
 def _each(sizes: dict[str, str]) -> str:
     """Coefficients with the sizes of their changes."""
-    return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items())
+    return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
 def closable_words(document: Document) -> str:
@@ -79,7 +79,7 @@ def closable_words(document: Document) -> str:
         most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
         bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
         return (
-            f"A smooth moment or error of the reading could explain no more than {bound} of {left}: the rest is "
+            f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
             "noise."
         )
     of_others = _measured_otherwise(document, closable["kind"], ceilings)
@@ -91,8 +91,8 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
     kind, where, law = found["kind"], found["events"], found["law"]
     best = next(one for one in ceilings if one.kind == kind)
     sentences = [
-        f"{percent(best.closed, best.std)} of {left} could be explained by {KINDS[kind]}, measured on "
-        f"{best.held_out} held out of the fit."
+        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {left} (measured on "
+        f"held-out {best.held_out})."
     ]
     if found["alike"]:
         sentences.append(
@@ -108,8 +108,8 @@ def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
         sentences.append(f"Most of it is in {largest}{run}.")
     if law is not None:
         formula = law["effect"].get("moment") or law["effect"]["reading"]
-        closes = percent(law["closed"], law["std"])
-        sentences.append(f"The formula {formula} explains {closes}{_with_values(law)}.")
+        explains = percent(law["closed"], law["std"])
+        sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
     return sentences
 
 
@@ -136,7 +136,7 @@ def formula_step(document: Document) -> str:
         return ""
     return (
         "Write the formula as an effect with --propose FILE, and diagnose again with --effects-file FILE: its "
-        "probability beside the known effects tells whether it is the cause"
+        "probability among the known effects tells whether it is the cause"
     )
 
 
@@ -153,8 +153,8 @@ def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) 
         return []
     return [
         f"{KINDS[most.kind].capitalize()} would explain {percent(most.closed, most.std)}, measured on "
-        f"{most.held_out}. A law common to all runs is preferred from {part(chosen.common_first)} of that share "
-        "on, since it can be a property of the rig."
+        f"{most.held_out}. A law common to all runs is preferred if it explains {part(chosen.common_first)} of "
+        "that share or more, since it can be a property of the rig."
     ]
 
 
@@ -167,8 +167,8 @@ def _line(found: dict[str, Any] | None) -> list[str]:
     amplitude = with_std(factor * found["amplitude"], factor * found["amplitude_std"])
     amplitude += mark if mark == "°" else f" {mark}"
     return [
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude}, root mean "
-        "square over the runs; chance alone shows one in less than "
+        f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
+        "alone shows a line in less than "
         f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
     ]
 
@@ -178,17 +178,18 @@ def ceiling(given: Document) -> Ceiling:
     return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
 
 
+_LABEL = "What could explain the residual gap"
+
+
 def closable_line(document: Document) -> str:
     """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
     if found := document.get("closable"):
-        return f"What could be explained: {found['words']}"
+        return f"{_LABEL}: {found['words']}"
     rest = document.get("rest")
     if not rest or not document["causes"]:
         return ""
     if not rest["significant"]:
-        return f"What could be explained: nothing beyond chance (p = {rest['p_value']:.2g})."
+        return f"{_LABEL}: nothing beyond chance (p = {rest['p_value']:.2g})."
     if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
-        return (
-            "What could be explained is not stated: beside a random moment, any law would explain something."
-        )
+        return f"{_LABEL}: not stated, since any law would explain part of a random moment."
     return ""

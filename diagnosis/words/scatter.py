@@ -128,10 +128,10 @@ def scatter_words(document: Document) -> str:
 
 def _start(document: Document) -> str:
     if not document.get("decided", True):
-        return "Whatever the cause, the runs differ from each other by chance"
-    if proper := without_scatter(document["causes"]):
-        return f"Beside {'them' if len(proper) > 1 else 'it'} the runs differ by chance"
-    only = "" if document["rest"]["material"] else ", and by nothing else"
+        return "With every answer the runs differ from each other by chance"
+    if without_scatter(document["causes"]):
+        return "In addition the runs differ by chance"
+    only = "" if document["rest"]["material"] else " only"
     likely = probability(document["credible"][0]["probability"])
     return f"The runs differ from each other by chance{only} (probability {likely})"
 
@@ -154,10 +154,10 @@ def trend_words(trend: Mapping[str, Any]) -> str:
     goes = "rises" if trend["change"] > 0.0 else "falls"
     moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
     if trend.get("only"):
-        return f"The runs drift and do not scatter: {moved} ({_DRIFTS[number]})."
+        return f"The runs drift but do not scatter: {moved} ({_DRIFTS[number]})."
     return (
-        f"That is not all by chance: {moved} ({_DRIFTS[number]}), and differs by {percent_of(trend['left'])} "
-        "beside that."
+        f"Part of this is a drift: {moved} ({_DRIFTS[number]}). "
+        f"The remaining scatter is {percent_of(trend['left'])}."
     )
 
 
@@ -180,10 +180,13 @@ def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> 
     if hidden:
         other = NUMBERS[SCATTERS[hidden[0]["effect"]]]
         bound = percent_of(hidden[0]["interval"][1])
-        return [f"These runs do not show whether {other} differs as well; by up to {bound} it may."]
+        return [
+            f"{other[0].upper()}{other[1:]} may also differ, by up to {bound}; these runs do not show it."
+        ]
     if poorly:
         return [
-            "These runs tell the wind speed and the spring apart poorly: add wind-off runs, or log the wind speed."
+            "These runs hardly distinguish the wind speed from the spring: add wind-off runs, or log the wind "
+            "speed."
         ]
     return []
 
@@ -206,7 +209,7 @@ def outlier_words(document: Document) -> str:
         parts.append((abs(own[name]) / usual, f"{name} {percent_of(own[name], sign=True)}"))
     least = settings_of(document).words.deviation_named
     far = [text for stds, text in parts if stds >= least] or [max(parts)[1]]
-    said = f"Run {run} deviates far beyond the others: {' and '.join(far)} against the model of all runs."
+    said = f"Run {run} deviates far beyond the others: {' and '.join(far)} relative to the model of all runs."
     return " ".join(filter(None, (said, _without_outlier(document, found.get("without_outlier")))))
 
 
@@ -228,14 +231,12 @@ def repeat_steps(document: Document) -> list[str]:
     """Next steps for a run that deviates far beyond the others, and for poorly distinguished quantities."""
     run = (document.get("repeatability") or {}).get("outlier")
     steps = (
-        [f"Repeat run {run}, or look for what disturbed it: it deviates far beyond the others."]
-        if run
-        else []
+        [f"Repeat run {run}, or look for a disturbance: it deviates far beyond the others."] if run else []
     )
     poorly = _told_apart(spreads_of(document), settings_of(document).words)
     named = {SCATTERS[name] for name in scattering(document["causes"])}
     if poorly and "wind_speed" not in named:  # whose advice includes this
-        steps.append("Log the wind speed of every run: the runs do not tell it from the spring.")
+        steps.append("Log the wind speed of every run: the runs do not distinguish it from the spring.")
     return steps
 
 
@@ -245,9 +246,9 @@ def repeatability_line(document: Document) -> str:
     if not found or len(found["runs"]) < 2:
         return ""
     if repeats(document):
-        return "Repeatability: the runs repeat; no scatter of their frequency or damping shows."
+        return "Repeatability: the runs repeat, without scatter of frequency or damping."
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
-    beyond = f"; beyond it: {found['outlier']}" if found["outlier"] else ""
+    beyond = f"; outlier: {found['outlier']}" if found["outlier"] else ""
     return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}."
 
 

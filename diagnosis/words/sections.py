@@ -114,16 +114,15 @@ def _place(document: Document) -> Section:
         f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
         "hold no sample or are within three standard deviations of the noise."
     )
-    return Section("place", "Where it is", (Figure("place", caption),))
+    return Section("place", "Where the gap is", (Figure("place", caption),))
 
 
 def _closes(document: Document) -> Section:
     caption = (
-        "The residual misfit as the causes are added, in the order in which they close most, "
-        f"{document.get('waterfall_on', '')}. Open circles: the misfit when this cause alone is taken out and the "
-        "others are refitted."
+        "The residual misfit as the causes are added, the largest contribution first, "
+        f"{document.get('waterfall_on', '')}. Open circles: the misfit without this cause, the others refitted."
     )
-    return Section("closes", "How far the gap closes", (Figure("waterfall", caption),))
+    return Section("closes", "How much of the gap is explained", (Figure("waterfall", caption),))
 
 
 def _where(document: Document) -> Section:
@@ -198,13 +197,13 @@ def _repeats(document: Document) -> Section:
 def _how_far(document: Document, campaign: Campaign | None) -> Section:
     drawn = captioned("how-far")
     meaning = (
-        "A run shows the gap where the nominal model, fitted to all runs, leaves a larger residual in it than "
-        "chance does in 1 % of campaigns, and at least a tenth of that of the worst run."
+        "A run shows the gap if its residual, with the nominal model fitted to all runs, exceeds chance at a "
+        "false-alarm rate of 1 % per campaign and is at least a tenth of the largest residual of a run."
     )
     runs = runs_table(document, campaign)
     return Section(
         "how-far-section",
-        "How far the gap closes, run by run",
+        "How much of the gap is explained, run by run",
         (waterfall_table(document), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
     )
 
@@ -261,10 +260,10 @@ def _uncertainty(document: Document, blown: bool) -> Section:
 
 def _patch(document: Document) -> Section:
     notes = (document.get("model") or {"notes": ()})["notes"]
-    title = "Where an element of the model is not the law of the fit"
+    title = "Differences between the elements of the model and the law of the fit"
     return Section(
         "patch",
-        "The model with the causes in it",
+        "The model with the causes",
         (Paragraph(patch_line(document)), Listing(tuple(notes), title), patch_table(document)),
     )
 
@@ -320,11 +319,11 @@ TERMS = (
     (
         "Excess",
         "mean squared residual over the noise variance of a sample, minus one: 0 is a perfect model, 1 a residual "
-        "of twice the noise's power",
+        "with twice the noise variance",
     ),
     (
         "Held out",
-        "predicted for runs or stretches of time that were left out of the fit; only the release is fitted to them",
+        "runs or stretches of time that were left out of the fit and then predicted; only their release is fitted",
     ),
     ("±, σ", "one standard deviation; intervals are 95 %"),
 )

@@ -34,7 +34,7 @@ from identification.printing import (
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.units import beside
 
-_IN_BRACKETS = "root mean square (in brackets: its power over that of the noise)"
+_IN_BRACKETS = "root mean square (in brackets: mean square over the noise variance)"
 
 
 def candidates_table(document: Document) -> Table:
@@ -55,8 +55,8 @@ def candidates_table(document: Document) -> Table:
     if others := given[len(shown) :]:
         together = sum(candidate["probability"] for candidate in others)
         rows.append((f"{len(others)} more, together", probability(together), "", "", ""))
-    detail = ("residual [× noise power]", "parameters")
-    heads = ("answer", "probability", "closed in the fit", *detail)
+    detail = ("residual [× noise variance]", "parameters")
+    heads = ("answer", "probability", "explained in the fit", *detail)
     return Table(
         f"Answers for {document['campaign']}",
         heads,
@@ -207,9 +207,9 @@ SOURCES = {
     "small causes": "small causes that are not named",
     "hidden effects": "effects that could hide",
     "air density": "rounding of the stated air density",
-    "unseen form": "form of the cause that no free decay shows",
+    "unseen form": "form of the cause that free decays cannot show",
     "freed form": "freedom of the causes' forms",
-    "rivals": "other answers, by their probability",
+    "rivals": "other answers, weighted by probability",
 }
 """The sources of a coefficient's variance."""
 

@@ -9,7 +9,6 @@ from diagnosis.settings import settings_of
 from diagnosis.words.causes import (
     advice,
     consequence,
-    from_causes,
     hold_step,
     hold_words,
     known_and_open,
@@ -107,7 +106,7 @@ def verdict(document: Document, rest: str) -> str:
 
 
 def _answer(document: Document, rest: str) -> str:
-    """The gap, its causes, and how far it closes with them."""
+    """The gap, its causes, and the share of the gap that they explain."""
     causes, gap, facts = document["causes"], document["gap"], document["found"]
     excess, repeats = gap["excess_before"], repeats_words(document)
     if not causes:
@@ -119,40 +118,54 @@ def _answer(document: Document, rest: str) -> str:
     size, misfit = times_noise(excess), misfit_of(document)
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
-    closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
+    there_is = f"There is a gap ({size})."
+    proper = without_scatter(causes)
+    explained = f"{share(gap['closed'])} of the gap {gap['closed_on']}."
     if not document["decided"]:
-        sentence = f"There is a gap ({size}), and its cause is undecided."
-        first = without_scatter(causes)
-        added = f"With {plain(*first)} added," if first else "With these differences allowed for,"
-        with_first = "" if causes == _UNKNOWN else f"{added} {closes}"
-        return " ".join(filter(None, (sentence, undecided_words(document), repeats, with_first)))
+        sentence = f"{there_is} Its cause is undecided."
+        first = f"{_sentence(plain(*proper))} {_explain(proper)}" if proper else "These differences explain"
+        by_first = "" if causes == _UNKNOWN else f"{first} {explained}"
+        return " ".join(filter(None, (sentence, undecided_words(document), repeats, by_first)))
     if causes == _UNKNOWN:
         nearly = "" if facts["nearly"] is None else _nearly(facts["nearly"])
         sentence = (
-            "no effect is named as its cause"
+            "No effect is named as its cause."
             if nearly
-            else "no effect of the vocabulary explains it (tunnel effects lists them)"
+            else "No known effect explains it (tunnel effects lists them)."
         )
-        return " ".join(filter(None, (f"There is a gap ({size}), and {sentence}.", nearly, rest, repeats)))
-    proper = without_scatter(causes)
-    last = (closes, rest, _immaterial(facts["immaterial"]) or consequence(document))
+        return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
+    last = (explained, rest, _immaterial(facts["immaterial"]) or consequence(document))
     if not proper:
-        sentence = f"There is a gap ({size}). {repeats} With these differences allowed for,"
-        return " ".join(filter(None, (sentence, *last)))
-    sources = []
+        return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
+    acting = []
     for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
         wind = f", {CONDITIONS[kind.condition]}" if facts["both_winds"] else ""
-        sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
-    part = "only in part " if document["rest"]["material"] else ""
-    they_act = "They act on" if len(proper) > 1 else "It acts on"
-    sentence = (
-        f"The gap ({size}) is explained {part}by {from_causes(document)}. {they_act} {'; '.join(sources)}."
-    )
-    with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
+        subject = plain(name) if len(proper) > 1 else "the cause"
+        acting.append(f"{subject} acts on {CHANNELS[kind.channel]}{wind}")
+    they = "They" if len(proper) > 1 else "It"
+    part = "part of the gap" if document["rest"]["material"] else "the gap"
+    if document["ambiguous_with"]:
+        sentence = f"{_sentence(part)} is explained by {known_and_open(document, sized=False)}."
+    else:
+        likely = probability(document["credible"][0]["probability"])
+        sentence = f"{_sentence(plain(*proper))} {_explain(proper)} {part} (probability {likely})."
+    misfit_words = f"The misfit of the nominal model is {size}."
+    acts = f"{_sentence('; '.join(acting))}."
+    by_all = f"{they} {_explain(proper)}"
     if len(causes) > len(proper):
-        with_all = f"With {'them' if len(proper) > 1 else 'it'} added and these differences allowed for,"
-    return " ".join(filter(None, (sentence, repeats, with_all, *last)))
+        by_all = f"Together with these differences {they.lower()} {_explain(proper)}"
+    return " ".join(filter(None, (sentence, misfit_words, acts, repeats, by_all, *last)))
+
+
+def _sentence(words: str) -> str:
+    """The words with a capital at the start."""
+    return words[:1].upper() + words[1:]
+
+
+def _explain(subjects: Sequence[str]) -> str:
+    """The verb for one or several subjects."""
+    return "explain" if len(subjects) > 1 else "explains"
 
 
 def undecided_words(document: Document) -> str:
@@ -162,7 +175,8 @@ def undecided_words(document: Document) -> str:
     channels = {kind.name: kind.channel for kind in known_effects()}
     effects = {name: common["effects"][name] for name in without_scatter(common["effects"])}
     named = {channels[name] for name in effects}
-    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in effects.items()]
+    common_to_all = [f"{plain(name)} ({probability(value)})" for name, value in effects.items()]
+    parts = [f"contain {listed(common_to_all)}"] if common_to_all else []
     for name, value in common["channels"].items():
         if name not in named:
             parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
@@ -176,8 +190,8 @@ def undecided_words(document: Document) -> str:
     together = probability(sum(one["probability"] for one in credible))
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
-        said += f"{best} fits best, but does not predict readings held out of the fit. "
-    return f"{said}The answer is one of these, with probability {together} together: {most}."
+        said += f"{best} fits best, but does not predict held-out readings. "
+    return f"{said}The answer is one of these, with a total probability of {together}: {most}."
 
 
 def _among_answers(effect: str) -> str:
@@ -191,16 +205,16 @@ def _among_answers(effect: str) -> str:
 
 def _nearly(found: Mapping[str, Any]) -> str:
     """The effects that explain most of a gap without being named, and the reason."""
-    said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of it"
+    said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of the gap"
     if found["noisy"]:
-        return f"{said}, but the noise misbehaves and may explain so small a gap."
+        return f"{said}, but irregular noise may explain a gap this small."
     said = f"{said} (probability {probability(found['probability'])})"
     if found["rival"]:
-        return f"{said}, and {plain(*found['rival'])} as much ({probability(found['rival_probability'])})."
+        return f"{said}, and {plain(*found['rival'])} explains as much ({probability(found['rival_probability'])})."
     if found["misfit"]:
         misfit = " and ".join(MISFITS[name] for name in found["misfit"])
         return f"{said}, but leaves a significant misfit of {misfit}."
-    return f"{said}: too little to name it."
+    return f"{said}, which is too little to name it."
 
 
 def _immaterial(changes: Mapping[str, float]) -> str:
@@ -222,9 +236,9 @@ def _disturbed(found: Mapping[str, Any]) -> str:
     kept = found["kept_until_s"]
     if found["used"]:
         why = "the other runs do not determine the model"
-        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used nevertheless: {why}."
-    without = "without this run" if kept is None else f"without its readings from {kept:.4g} s on"
-    return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
+        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s. It is used nevertheless, because {why}."
+    unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
+    return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; {unused}."
 
 
 def _with_second_modes(answer: str, document: Document) -> list[str]:
@@ -238,14 +252,14 @@ def _with_second_modes(answer: str, document: Document) -> list[str]:
 def _second_mode(found: Mapping[str, Any], unit: str) -> str:
     """A second mode in a run, its amplitudes in a unit of readings."""
     main, second = (
-        f"{reading_shown(mode['amplitude_rad'], 2, unit)} at {mode['frequency_hz']:.3g} Hz, which decays at "
+        f"{reading_shown(mode['amplitude_rad'], 2, unit)} at {mode['frequency_hz']:.3g} Hz, decaying at "
         f"{mode['decay_per_s']:.2g} 1/s"
         for mode in (found["main"], found["second"])
     )
     return (
-        f"{found['run']} contains a second mode: {second}, beside {main}. With it, the residual of one free decay "
-        f"falls by {100.0 * found['closes']:.0f} %. A rig with one degree of freedom has one "
-        f"mode: look for another motion, such as heave or the mount's."
+        f"{found['run']} contains a second mode: {second}. The main mode is {main}. The second mode explains "
+        f"{100.0 * found['closes']:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
+        "one mode: look for another motion, such as heave or a motion of the mount."
     )
 
 
@@ -348,7 +362,7 @@ def unplannable(document: Document) -> str:
 def too_close(run: Mapping[str, float]) -> str:
     """The statement that no run distinguishes two answers."""
     return (
-        "No run that can be set distinguishes these answers: with the best one they differ by "
+        "No possible run distinguishes these answers: in the best one they differ by "
         f"{run['separation']:.1f} standard deviations of the noise."
     )
 
@@ -363,11 +377,15 @@ def rival_lines(document: Document) -> list[str]:
     if run is not None and run_to_make(document) is None:
         lines.append(too_close(run))
     elif run is not None:
-        which = "A run that could" if decided else "A run that would distinguish the likely answers"
+        which = (
+            "A run that would distinguish them"
+            if decided
+            else "A run that would distinguish the likely answers"
+        )
         lines.append(f"{which}: {run_words(run)}.")
     elif rivals:
         lines.append(
-            "The run that could cannot be computed from these runs: state every spring_stiffness, or add runs."
+            "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
         )
     return lines
 
@@ -382,8 +400,8 @@ def run_words(run: Mapping[str, float]) -> str:
     wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
     angle = reading_shown(run["release_angle"], 2)
     return (
-        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, released at {angle}, "
-        f"{run['duration']:g} s long (the two then differ by {run['separation']:.0f} standard deviations)"
+        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, release at {angle}, "
+        f"duration {run['duration']:g} s (the answers differ by {run['separation']:.0f} standard deviations)"
     )
 
 
@@ -396,7 +414,7 @@ def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
 
 
-_SUSPECT = "State the effect that you suspect in a file, and diagnose again with --effects-file"
+_SUSPECT = "State the suspected effect in a file, and diagnose again with --effects-file"
 
 
 def next_steps(document: Document) -> list[str]:

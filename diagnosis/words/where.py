@@ -23,7 +23,7 @@ def _alone(given: Mapping[str, Any]) -> str:
 
 
 REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
-    "wind off": "it is there with the wind off",
+    "wind off": "it appears with the wind off",
     "wind on in every run": f"{_WIND}, since the wind is on in every run",
     "no single run": f"{_WIND}, since no single run shows it",
     "one run": f"{_WIND} from one run alone ({{run}})",
@@ -69,7 +69,7 @@ def where_words(document: Document) -> str:
     parts = [f"{_which_runs(where, place, settings.words)}."]
     if places := _places(where, place):
         most = part(settings.where.interval_share).capitalize()
-        parts.append(f"{most} of it lie {', '.join(places)}.")
+        parts.append(f"{most} of the gap lie {', '.join(places)}.")
     if place["bands"]:
         largest_first = sorted(place["bands"].items(), key=lambda item: -item[1])
         listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in largest_first)
@@ -85,7 +85,7 @@ def where_words(document: Document) -> str:
     else:
         parts.append(f"{acts}: {channel}.")
         if place["wind"]:  # without runs of both winds the condition goes unsaid
-            parts.append(f"It is there {CONDITIONS[where['condition']]}: {condition}.")
+            parts.append(f"It appears {CONDITIONS[where['condition']]}: {condition}.")
     return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
 
 
@@ -122,7 +122,7 @@ def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: Word
             text += f"; nearly all of it with the wind {more}"
         else:
             ratio = wind[more] / wind[less]
-            text += f"; {ratio:.2g} times as much power with the wind {more} as with it {less}"
+            text += f"; its power is {ratio:.2g} times as large with the wind {more}"
     return text
 
 

@@ -214,13 +214,13 @@ from the arrow itself; it dies out within a quarter of a second. Root mean squar
 |---|---|---|---|---|
 {chr(10).join(rows)}
 
-The best physical models in print are reported to leave 0.3 to 0.4 mV on the arrow, and more in its tip.
+The best published physical models have errors of 0.3 to 0.4 mV on the arrow, and more at its tip.
 
-![The arrow, and what two models leave of it](images/{image.name})
+![The arrow, and the residuals of two models](images/{image.name})
 
 Each multisine ends in a free decay of some {length:.0f} samples: the input is quiet there. The ten decays (of
-{1e3 * swing.min():.0f} to {1e3 * swing.max():.0f} mV) are identified by `output_error` as records of their own, and
-so is what the driven model predicts there. The frequencies differ by
+{1e3 * swing.min():.0f} to {1e3 * swing.max():.0f} mV) are identified by `output_error` as separate records, and
+so are the predictions of the driven model. The frequencies differ by
 {100 * apart[:, 0].mean():+.3f} ± {100 * error[0]:.3f} %, the damping ratios by
 {100 * apart[:, 1].mean():+.2f} ± {100 * error[1]:.2f} % (mean of the ten and its standard deviation).
 """
@@ -259,7 +259,7 @@ def emps(campaign: Campaign, document: Mapping[str, Any]) -> str:
     half = np.arange(run.reading.size) < run.reading.size // 2
     errors = [1e3 * rms(predicted(model, [half]).error[run.id][~half]) for model in (nominal, whole)]
     return f"""## EMPS
-A positioning axis: the motor's force drives a carriage that nothing holds, in closed loop (Janot, Gautier and
+A positioning axis: the motor's force drives a free carriage in closed loop (Janot, Gautier and
 Brunot 2019). Metres are taken as radians, newtons as N m.
 
 The diagnosis: {document["verdict"]}
@@ -270,8 +270,9 @@ The diagnosis: {document["verdict"]}
 
 Fitted to the first half of the record, the likeliest set predicts the second half from the force alone with a root
 mean square error of {errors[1]:.2f} mm, the nominal model with {errors[0]:.2f} mm; the carriage moves by
-{1e3 * float(np.ptp(run.reading)):.0f} mm. Nothing holds the carriage, so that small errors of the force add up.
-The validation record that others state their errors on is not among these data.
+{1e3 * float(np.ptp(run.reading)):.0f} mm. The carriage has no restoring force, so small errors of the force
+accumulate.
+The validation record used in the literature is not among these data.
 """
 
 
@@ -302,11 +303,11 @@ def main() -> None:
     image = PAGE.parent / "images" / "driven-records-arrow.png"
     multisines = diagnosed(campaign_without(box, ARROW), given.answers, "silverbox")
     parts = [
-        "# Measured driven records\n\nTwo records that others have published models of: what the diagnosis names, "
-        "and how well it predicts motion that no fit has seen.\n"
+        "# Measured driven records\n\nTwo published records with published models: the causes that the diagnosis "
+        "names, and its predictions of motion that no fit has used.\n"
         "`python -m docs.studies.driven_records --data FOLDER` writes this page. Two rules of the diagnosis were "
-        "made with these records in sight\n([decision 0029](decisions/0029-driven-runs.md)): they test the "
-        "predictions, and not those rules.\n",
+        "made with knowledge of these records\n([decision 0029](decisions/0029-driven-runs.md)), so the records "
+        "test the predictions, but not these rules.\n",
         silverbox(box, multisines, image),
         emps(axis, diagnosed(axis, given.answers, "emps")),
     ]

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 PICTURE = ROOT / "docs" / "images" / "layout.svg"
 PACKAGES = {
     "tunnel_lab": "commands, report, bench, experiments",
-    "diagnosis": "where the model departs, why, and how far the gap closes",
+    "diagnosis": "where the model departs, why, and the share explained",
     "identification": "the coefficients, with their uncertainty",
     "tunnel_sim": "the rig, its effects, its records",
 }

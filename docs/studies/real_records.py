@@ -130,10 +130,10 @@ def page(parts: Sequence[tuple[str, str]]) -> str:
     """The whole page, from the rows and sections of the records."""
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (
-        "# Real records\n\nWhat the diagnosis says of measured records, and what their sources or energy balances "
-        "say. `python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes are in "
-        "[real_records.py](studies/real_records.py). An answer is right if it names all of them and no others, "
-        "and, where no effect explains the record, says what was recognised. The records marked * have no stated "
+        "# Real records\n\nThe diagnosis of measured records, compared with their sources or energy balances. "
+        "`python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes are in "
+        "[real_records.py](studies/real_records.py). An answer is right if it names all of them and no others and, "
+        "where no effect explains the record, names the other motion. The records marked * have no stated "
         "licence and are not packaged.\n\n"
         f"**{right} of {len(parts)} are right.** Moments are per unit of inertia.\n\n"
         "| record | in it | named | probability | |\n|---|---|---|---|---|\n"

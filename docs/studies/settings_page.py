@@ -19,9 +19,8 @@ PAGE = ROOT / "docs" / "reference" / "settings.md"
 HEAD = """\
 # Settings of the diagnosis
 
-Every number by which the diagnosis decides, with its origin. Each belongs to one decision; that some are equal
-means nothing. `diagnose` takes a copy with other values, and its document states under `provenance` what differs
-from these:
+Every number by which the diagnosis decides, with its origin. Each number belongs to one decision. `diagnose` takes
+a copy with other values, and its document states the changed values under `provenance`:
 
 ```python
 from diagnosis import Settings, diagnose
@@ -30,8 +29,9 @@ found = diagnose("campaign", settings=Settings().changed({"gap.detection_rate": 
 ```
 
 *Convention*: a customary level, or the meaning of a word. *Physics*: follows from the rig. *Estimated*: fitted to
-campaigns whose causes are known. *Tuned*: set on such campaigns by hand. [Blind tests](../blind-check.md) use other
-campaigns. *Judgement*: chosen by reason alone. [What each setting decides](../ablation.md): what moving them does.
+campaigns with known causes. *Tuned*: set by hand on campaigns with known causes. *Judgement*: chosen by reason
+alone. [Blind tests](../blind-check.md) use other campaigns. The [ablation](../ablation.md) measures the effect of
+changing the settings.
 
 The page is written by `python -m docs.studies.settings_page`. Numerical constants (grids, iterations, tolerances of
 solvers) are in the code that uses them.
@@ -44,7 +44,7 @@ def page() -> str:
     for stage in fields(Settings):
         group = getattr(Settings(), stage.name)
         title = (type(group).__doc__ or "").rstrip(".")
-        parts.append(f"\n## {title}\n\n| `{stage.name}.` | value | decides | origin |\n|---|---|---|---|\n")
+        parts.append(f"\n## {title}\n\n| `{stage.name}.` | value | meaning | origin |\n|---|---|---|---|\n")
         parts += [_row(one) for one in fields(group)]
     return "".join(parts)
 

@@ -285,7 +285,7 @@ def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         if kept >= yaw.size:
             continue
         what = (
-            f"at rest from {time[end]:.3f} s on, {off:.2g} {campaign.sensor.unit} beside the centre of the motion; "
+            f"at rest from {time[end]:.3f} s, {off:.2g} {campaign.sensor.unit} from the centre of the motion; "
             f"the record is used up to {time[kept]:.3f} s"
         )
         remarks.append(Remark(Outcome.CUT, (run.id,), what, "cut the record by hand if that is wrong"))

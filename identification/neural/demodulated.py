@@ -190,7 +190,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
 
 Places = NDArray[np.intp]
 Column = tuple[Array | None, Array | None]
-"""Of the logarithm of the amplitude and of the phase; None where it is zero."""
+"""Columns of the logarithm of the amplitude and of the phase; None: zero."""
 _FLOOR = 0.02  # least amplitude over the first: noise would dominate inverse powers of smaller ones
 _POWERS = (-1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
 _SETTLING = 4.0  # time constants in a record

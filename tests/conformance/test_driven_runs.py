@@ -253,7 +253,9 @@ def test_what_is_planted_is_named_with_its_size(
     assert found.where.words is not None
     assert "along the decay" not in found.where.words
     assert not any("MuJoCo" in said for said in found.cautions)
-    assert any("its loss depends on that motion" in said for said in found.cautions) == (name == "root")
+    assert any(
+        "their loss depends on the motion of the spring's root" in said for said in found.cautions
+    ) == (name == "root")
 
 
 def of_first(**change: Any) -> Callable[[Campaign], Campaign]:
@@ -315,7 +317,7 @@ IN_WIND = {"wind_speed": 3.0, "air_density": 1.2}
 @pytest.mark.parametrize(
     ("name", "change", "uses", "said"),
     [
-        ("root", without_springs, (diagnose,), "spring_stiffness = 0 states none"),
+        ("root", without_springs, (diagnose,), "but spring_stiffness is 0"),
         ("loose", of_first(drive={"column": "base_rad"}), (identify,), "root acts through the spring"),
         (
             "moment",
@@ -326,11 +328,16 @@ IN_WIND = {"wind_speed": 3.0, "air_density": 1.2}
         ("rates", reading("acceleration"), (identify, diagnose), "reads accelerations"),
         ("rates", without_springs, (identify, diagnose), "looks like a constant moment"),
         ("loose", beside("moment"), (diagnose,), "runs with a spring and without one"),
-        ("loose", beside("loose", **IN_WIND), (diagnose,), "no spring, and the wind blows"),
+        (
+            "loose",
+            beside("loose", **IN_WIND),
+            (diagnose,),
+            "without a spring are not diagnosed with the wind on",
+        ),
         ("loose", beside("loose", drive={"column": "drive"}), (diagnose,), "when the gain is unknown"),
         ("loose", scaled(-1.0), (diagnose,), "does not follow the moment"),
         ("turning base", alone(without_springs), (identify, refuse_undiagnosable), "without a spring"),
-        ("turning base", alone(of_first(**IN_WIND)), (identify, refuse_undiagnosable), "the wind blows"),
+        ("turning base", alone(of_first(**IN_WIND)), (identify, refuse_undiagnosable), "with the wind on"),
         ("turning base", scaled(-1.0), (identify, refuse_undiagnosable), "the other sign"),
         ("turning base", scaled(180.0 / np.pi), (identify, refuse_undiagnosable), "in degrees"),
         ("turning base", scaled(np.pi / 180.0), (identify, refuse_undiagnosable), "in radians"),

@@ -1,6 +1,6 @@
 """Effects that are not of the textbook's form, by the reference simulator: the family's name still comes out.
 
-Six runs of 5 s at 500 Hz. The forms are the reference's own; sizes are several times the noise power.
+Six runs of 5 s at 500 Hz. The forms are the reference's own; sizes are several times the noise variance.
 """
 
 from dataclasses import replace

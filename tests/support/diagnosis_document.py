@@ -38,7 +38,7 @@ def document() -> dict[str, Any]:
             "excess_after": 0.1234,
             "closed": 0.9876,
             "after_on": "in all runs, two held out",
-            "closed_on": "on runs held out of the fit",
+            "closed_on": "on held-out runs",
             "runs": [
                 {"id": "alpha", "before": 31.72, "after": -0.0567, "held_out": True},
                 {"id": "beta", "before": 4.583, "after": 0.2345, "held_out": False},
@@ -74,7 +74,7 @@ def document() -> dict[str, Any]:
             {"effect": CAUSE, "excess": 2.75},
             {"effect": RIVAL, "excess": 0.1345},
         ],
-        "waterfall_on": "on runs held out of the fit",
+        "waterfall_on": "on held-out runs",
         "without": {CAUSE: 21.85, RIVAL: 2.85},
         "sizes": [
             {"effect": CAUSE, "run": "beta", "amplitude_rad": 0.1625, "damping_ratio": 0.01335,

@@ -145,10 +145,10 @@ TABLE: dict[str, Case] = {
         PLAIN, stating("r2", spring_stiffness=44.84), "44.84 of r2 as 16.12 N m/rad", ("r2",)
     ),
     "last third zeros": Case(
-        PLAIN, reading(padded(1.0 / 3.0)), "the reading stands at 0 rad", ("r1",), refused=False
+        PLAIN, reading(padded(1.0 / 3.0)), "the reading is constant at 0 rad", ("r1",), refused=False
     ),
     "last third held": Case(
-        PLAIN, reading(padded(1.0 / 3.0, None), "r3"), "the reading stands at", ("r3",), refused=False
+        PLAIN, reading(padded(1.0 / 3.0, None), "r3"), "the reading is constant at", ("r3",), refused=False
     ),
     "repeated with noise of 1e-9": Case(
         PLAIN, _with_noise(1e-9), "so counted once", ("again",), refused=False
@@ -235,13 +235,13 @@ FURTHER: dict[str, Case] = {
     "AC-coupled in one run": Case(PLAIN, reading(high_passed(3.0, held=False), "r3"), "AC-coupled", ("r3",)),
     "clock drifts by -0.3 %": Case(_clock(-0.003), _nothing, "the clock of the logger drifts", ALL),
     "clock of one run drifts": Case(_clock(0.003, (44.84, 0.0)), _nothing, "clock of the logger", ("r3",)),
-    "last tenth zeros": Case(PLAIN, reading(padded(0.1)), "stands at 0 rad", ("r2",), refused=False),
-    "sensor unplugged": Case(PLAIN, reading(_unplugged, "r3"), "stands at 0.00", ("r3",), refused=False),
+    "last tenth zeros": Case(PLAIN, reading(padded(0.1)), "is constant at 0 rad", ("r2",), refused=False),
+    "sensor unplugged": Case(PLAIN, reading(_unplugged, "r3"), "is constant at 0.00", ("r3",), refused=False),
     "reading stuck for a second": Case(
-        PLAIN, _holding(2000, 2600), "the reading keeps one value", ("r1",), refused=False
+        PLAIN, _holding(2000, 2600), "the reading is constant while", ("r1",), refused=False
     ),
     "zeros in the middle": Case(
-        PLAIN, _holding(2000, 2400, 0.0), "the reading keeps one value", ("r1",), refused=False
+        PLAIN, _holding(2000, 2400, 0.0), "the reading is constant while", ("r1",), refused=False
     ),
     "repeated with noise of 1e-4": Case(PLAIN, _with_noise(1e-4), "so counted once", ("again",), refused=False),
     "repeated and mirrored": Case(

@@ -69,7 +69,7 @@ def test_everything_is_represented_in_three_lines(data: Campaign, found: Diagnos
     assert repr(data).startswith(f"Campaign 'small': {len(data.runs)} runs")
     assert f"{data.runs[0].record.time_s.size} samples" in repr(data.runs[0].record)
     assert "quadratic damping (probability" in repr(found)
-    assert "of it closed on runs held out" in repr(found)
+    assert "explained on held-out runs" in repr(found)
     assert "° root mean square, " in repr(found)
     assert "Cnβ = " in repr(estimate)
     normalised = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs[:1]))

@@ -54,8 +54,8 @@ _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
 _ABOUT = (
-    "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for runs, or "
-    "stretches of time, held out of the fit. The diagnosis itself does not change; it also frees the forms."
+    "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for "
+    "held-out runs, or stretches of time. The diagnosis does not change; it also frees the forms."
 )
 _CONVERGE = "Free the forms, and fit to convergence (up to a minute)"
 _NO_SPRING = "no run can be planned without a stated spring"
@@ -215,7 +215,7 @@ class Answer:
         parts = {section.key: section.blocks for section in sections(document)}
         for keys in _FIRST:
             show_blocks(block for key in keys for block in parts.pop(key))
-        with ui.expansion("What remains, the runs, and caveats"):
+        with ui.expansion("Residual gap, runs and caveats"):
             for key in (key for key in parts if key not in _ELSEWHERE):
                 show_blocks(parts[key])
         if document["gap"]["detected"]:
@@ -314,12 +314,12 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 
     show_facts(
         [
-            (share(closure.closed), f"share closed, {closure.held_out}"),
+            (share(closure.closed), f"explained {closure.held_out}"),
             (misfit_shown(document, closure.after), "residual misfit, root mean square"),
             (misfit_shown(document, closure.before), "with the nominal model"),
         ]
     )
-    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
+    ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap explained"')
     with ui.element("ul").classes("notes"):
         show_items(
             f"{name.replace('_', ' ').replace('.', ': ')} = {size(given)}"

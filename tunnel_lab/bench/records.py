@@ -63,7 +63,7 @@ class RecordsPage:
             with self._naming:
                 name = ui.input("Name of the campaign", value=session.name).props("dense")
                 name.on("change", lambda: self._rename(str(name.value)))
-        self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
+        self._form_place = ui.expansion("Missing information and corrections").classes("choices")
         self._reading = 0
         self._charts: list[Chart] = []
         self._rests: list[ui.number] = []

@@ -68,7 +68,7 @@ class Work:
         if not self.command or self.running or self.status == 0:
             return ""
         if self.status is None:
-            return "It was ended from outside."
+            return "Another process ended it."
         errors = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
         return errors[-1] if errors else f"It ended with exit status {self.status}."
 
@@ -208,7 +208,7 @@ async def _in_fitter(work: Callable[Given, ResultT], *given: Given.args, **named
         return await asyncio.wrap_future(_fitter().submit(work, *given, **named))
     except BrokenProcessPool:
         _fitter.cache_clear()
-        raise TunnelError("the fitting process was ended from outside", remedy="try again") from None
+        raise TunnelError("another process ended the fitting process", remedy="try again") from None
 
 
 @cache

@@ -27,8 +27,8 @@ from tunnel_sim.vocabulary.errors import counted
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
 Campaigns are drawn and simulated by the reference simulator, whose integrator
-and forms of effects are not those of the fits. Their truth is written
-to a separate key, whose salted SHA-256 is published with the data.
+and forms of effects differ from those of the fits. Their truth is written
+to a separate key, and its salted SHA-256 is published with the data.
 
 [bold]Order[/bold]
   tunnel blind make set --count 200 --seed 1
@@ -86,7 +86,7 @@ def make(
         ),
     ] = 0.25,
     small: Annotated[
-        float, Option("--small", min=0, max=1, help="Share with a small effect beside those that matter.")
+        float, Option("--small", min=0, max=1, help="Share with an additional small effect.")
     ] = 0.25,
     departures: Annotated[
         float,
@@ -128,18 +128,18 @@ def make(
     """Make a set: campaigns without truth, the sealed key, and its published hash.
 
     Springs, speeds, releases, coefficients and noise of every campaign are drawn
-    at random. It has up to four effects that matter, or one outside the vocabulary,
-    in the textbook form or another, each sized to 1–100 times the noise power. No
-    two of them imitate each other. Small effects beside them need not be found.
-    In half of all campaigns wind speed, springs or damping differ from run to run:
-    the causes count without that, and how it is named is scored beside them.
-    Effects of an --effects-file are not drawn: they have one form only, that of the
-    fits, so that finding them would not be an independent test. A folder of
-    campaigns from tunnel simulate, each with its truth.json, can be diagnosed with
-    them and is scored as an open set.
+    at random. A campaign has up to four large effects, or one outside the vocabulary,
+    in the textbook form or another, each sized to 1–100 times the noise variance. No
+    two of them imitate each other. Small effects need not be found.
+    In half of the campaigns wind speed, springs or damping scatter between runs.
+    The scatter is scored separately from the causes.
+    Effects of an --effects-file are not drawn: they only have the form of the fits,
+    so they would not be an independent test. Campaigns from tunnel simulate, each
+    with its truth.json, can be diagnosed with them; tunnel blind score treats them
+    as an open set.
 
-    The same seed gives the same campaigns. Sizing the effects takes several minutes,
-    hardly more for many campaigns than for few.
+    The same seed gives the same campaigns. Sizing the effects takes several minutes
+    for any number of campaigns.
 
     [bold]Exit status[/bold]
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
@@ -238,7 +238,7 @@ def score(
 
     The output gives exact matches by kind with Wilson intervals, causes found and
     false by number of causes and by circumstances, false alarms, calibration of
-    the answer and of the probabilities of the effects, closure on held-out runs,
+    the answer and of the probabilities of the effects, explained gap on held-out runs,
     errors of Cnβ and Cnr before and after, the answers by true cause, and what is
     found of the scatter between runs. A folder
     without seal.json but with a truth.json in every campaign is scored as an open

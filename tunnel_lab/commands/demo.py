@@ -51,7 +51,7 @@ def demo(
 
     The rig is simulated with dry friction and with a spring that is softer than
     stated. The records alone are then identified and diagnosed: the causes, their
-    sizes, and how far the gap closes on runs held out of the fit. The report
+    sizes, and the share of the gap that they explain on held-out runs. The report
     (report.html), the plan, the campaign, and both answers as JSON are written to
     FOLDER. It takes about 15 s.
 

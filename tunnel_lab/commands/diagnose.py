@@ -147,7 +147,7 @@ def diagnose(
     and compared. The answer is one effect or several, "none" (there is no gap) or
     "unknown" (none of these effects explains it), each with a probability.
     The gap and the coefficients are given before and after the effects are added.
-    The gap is predicted for runs, or stretches of time, held out of the fit. For a
+    The gap is predicted for held-out runs, or stretches of time. For a
     significant residual gap, the answer states whether it could change the
     coefficients, and which kind of moment or error of the reading, and which
     formula, could explain it; --propose writes the formula for --effects-file.
@@ -216,7 +216,7 @@ def diagnose(
         return
     show(printed(document))
     if propose is not None and proposed is None:
-        nothing = "nothing remains beyond chance, or beside a random moment, or nothing holds the body"
+        nothing = "no residual gap is significant, a random moment is a cause, or the body has no spring"
         say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
     say_written(json, report, summary, patch, proposed)
 
@@ -308,12 +308,12 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     explained = [document["causes"] not in ([], ["unknown"]) for document in documents]
     pairs = list(zip(documents, explained, strict=True))
     answers = (
-        ("gap [× noise power]", *(excess(d, "excess_before") for d in documents)),
+        ("gap [× noise variance]", *(excess(d, "excess_before") for d in documents)),
         (
-            "residual gap [× noise power]",
+            "residual gap [× noise variance]",
             *(excess(d, "excess_after") if known else _NONE for d, known in pairs),
         ),
-        ("share closed", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
+        ("share explained", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
         ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
         ("decided", *("yes" if d["decided"] else "no" for d in documents)),
         ("or instead", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),

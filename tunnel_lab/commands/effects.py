@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 ABOUT_DIRECTIONS = (
-    "Moments stand on the right-hand side of Izz β̈ + Cr β̇ + Kr β = Ka β + Ca β̇, with Ka = ½ρV²Al Cnβ and "
+    "Moments are on the right-hand side of Izz β̈ + Cr β̇ + Kr β = Ka β + Ca β̇, with Ka = ½ρV²Al Cnβ and "
     "Ca = ½ρVAl² Cnr; y is the reading."
 )
 """The sign convention of the equations."""
@@ -36,12 +36,12 @@ _PAGE_HEAD = """# Effects
 <!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
 
 The effects that the nominal model leaves out. `tunnel simulate` injects them and `tunnel diagnose` reports them
-by these names. The condition `always` means with the wind on or off, `wind_on` only with the wind on.
+by these names. The condition `always` means with the wind on or off; `wind_on` means only with the wind on.
 
 {directions}
 
 The first parameter of an effect is its severity. At zero severity the record is bit-identical to one without the
-effect. Numbers in a plan or on the command line are in the units given here:
+effect. Numbers in a plan or on the command line are in these units:
 
 ```toml
 [[effects]]
@@ -53,8 +53,8 @@ parameters = {{ friction_moment = 0.004 }}   # N m
 tunnel simulate plan.toml --out c --effect coulomb_friction:friction_moment=0.004
 ```
 
-Real effects never have exactly these forms: each name stands for a family. For what free decays cannot reveal
-about them see [what no free decay can show](../theory/what-no-free-decay-can-show.md).
+Real effects never have exactly these forms: each name stands for a family.
+[What no free decay can show](../theory/what-no-free-decay-can-show.md) lists the limits of free decays.
 
 """
 

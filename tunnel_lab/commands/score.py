@@ -103,7 +103,7 @@ def score(
     code reproduces the baseline to the last bit.
 
     --breakdown adds each unmodelled effect to a campaign of twelve runs of the
-    reference simulator, at 1 and 10 times the noise power, and shows the bias of
+    reference simulator, at 1 and 10 times the noise variance, and shows the bias of
     Cnβ and Cnr in % and in reported standard deviations (three realisations, or
     --trials). This takes a few minutes.
 

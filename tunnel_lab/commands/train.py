@@ -62,17 +62,17 @@ def train(
     responses over the ranges given. Each network is trained from several random
     starts, and the one with the largest evidence is kept. The effective number of
     parameters γ, α, β and the errors on test responses are shown and written as
-    JSON beside the weights. The same seed gives the same bits on the same machine.
+    JSON beside the weights. The same seed gives a bit-identical result on the same machine.
     Training takes half a minute on an idle core.
 
-    An interrupted training leaves OUT.part.safetensors; the same command continues
-    from there and gives the same bits.
+    After an interruption the same command continues from OUT.part.safetensors, with a
+    bit-identical result.
 
     With --estimator neural_posterior, campaigns are drawn and simulated by the
     reference simulator with effects in many forms, and two networks are fitted to
     them: one for a record, one for a campaign. --zeta, --omega and --starts do not
-    apply. Unfinished work is in the folder OUT.part; it does not matter how many
-    processes simulate.
+    apply. Unfinished work is in the folder OUT.part. The number of processes does not
+    affect the result.
 
     [bold]Examples[/bold]
       tunnel train mine.safetensors --seed 7

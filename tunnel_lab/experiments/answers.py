@@ -144,7 +144,7 @@ def quantity_rows(
         found: None where there is no estimate.
         units: of the quantities, by name.
         truth: by quantity, in its unit; quantities without one may be left out.
-        bound: Cramér–Rao bound, likewise.
+        bound: Cramér–Rao bound, by quantity, in its unit.
     """
     for name, unit in units.items():
         quantity = getattr(found, name, None)

@@ -40,7 +40,7 @@ COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#b0529b", "#9a6f00", "#2f8fb0", "#b5484f", "#6f8200", "#7a63c7", "#77808a",
     "#c88090", "#207060", "#7090f0", "#989860", "#b878d8", "#805870",
 )  # fmt: skip
-"""Of `figures.mplstyle`."""
+"""The colour cycle of `figures.mplstyle`."""
 
 
 BLUE, VERMILION = COLOURS[:2]

@@ -11,7 +11,7 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, validate
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
-Excess = Annotated[float, Field(description="a number of noise powers")]
+Excess = Annotated[float, Field(description="a ratio to the noise variance")]
 Table = dict[str, Any]
 Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
 
@@ -119,11 +119,13 @@ class DiagnosisDocument(Document):
     where: Table = Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words")
     inclusion: dict[str, float] = Field(description="by effect, the probability that it is among the causes")
     waterfall: list[Table] = Field(description="effect and excess, as the causes are added one by one")
-    waterfall_on: str = Field(description="what was held out of the fits for it")
+    waterfall_on: str = Field(description="its held-out readings")
     without: dict[str, float] = Field(description="by cause, the excess when it alone is taken out")
     sizes: list[Table] = Field(description="what each fitted cause does to a swing of a stated amplitude")
     rest: Table | None = Field(description="what remains after the causes")
-    closable: Table | None = Field(description="how much of what remains could be closed, and by what")
+    closable: Table | None = Field(
+        description="the part of the residual gap that could be explained, and by which kind of law"
+    )
     model: Table | None = Field(description="the patched model, with --model")
     next_run: Table | None = Field(description="the run that would distinguish the causes from their rivals")
     confirmation: Table = Field(description="how far MuJoCo and the fits' integrator agree")

@@ -33,7 +33,7 @@ class NonlinearYawMoment(Effect):
     place = 9
     channel = "stiffness"
     condition = "wind_on"
-    advice = "Model the moment that is not linear in the angle, or release from smaller angles"
+    advice = "Model the nonlinear moment, or release from smaller angles"
     equation = "Ka (1 + κa β²) β instead of Ka β; general form: |β|^p for β²"
     signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
@@ -89,8 +89,8 @@ class UnsteadyAeroLag(Effect):
         "Ka x instead of Ka β, with τ ẋ = β − x, τ = a l/V; for a < 0 a phase lead: Ka (2β − x) with |τ|"
     )
     signature = (
-        "To first order it is a change of Cnr, which absorbs it; the remainder is of second order in τω "
-        "and shows when springs and speeds are compared."
+        "To first order Cnr absorbs it; the remainder is of second order in τω, and shows when springs and speeds "
+        "are compared."
     )
     references = (
         "Theissen, Unsteady Vehicle Aerodynamics in Gusty Crosswind (dissertation), TU München 2012",
@@ -100,9 +100,8 @@ class UnsteadyAeroLag(Effect):
     law_terms = ("aero_lag",)
     tries = 2
     caveat = (
-        "The Cnr after adding the lag describes the damping term alone; the lag damps the motion as well. In a "
-        "slow oscillation both together act as an effective Cnr − a Cnβ, which is what the nominal model finds "
-        "(before)."
+        "With the lag, Cnr describes the damping term alone; the lag also damps the motion. In a slow oscillation "
+        "both act as an effective Cnr − a Cnβ, the value of the nominal model (before)."
     )
 
     lag: float = parameter("a", "l/V", "time constant in units of l/V", scale=0.5, lower=-20.0, upper=20.0)
@@ -132,7 +131,7 @@ class FlowMisalignment(Effect):
     place = 15
     channel = "forcing"
     condition = "wind_on"
-    size = "flow that is {angle} askew"
+    size = "flow at an angle of {angle}"
     advice = "Align the rig with the flow"
     equation = "moment Ka βf added; general form: βf (V/20 m/s)^n for βf"
     signature = (
@@ -235,7 +234,7 @@ class WindSpeedDrift(Effect):
     place = 10
     channel = "stiffness"
     condition = "wind_on"
-    advice = "Hold the wind speed during the run, or record it"
+    advice = "Keep the wind speed constant during the run, or record it"
     equation = "V(t) = V (1 + d t/T) over a run of length T; general form: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)

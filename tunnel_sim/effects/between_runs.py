@@ -54,11 +54,11 @@ class WindSpeedScatter(BetweenRuns):
     channel = "calibration"
     condition = "wind_on"
     scatters = "wind_speed"
-    advice = "Log the wind speed of every run, or hold it closer"
+    advice = "Log the wind speed of every run, or control it better"
     equation = "true speed of run i = (1 + εi) V, εi normal with standard deviation σ, drawn for every run"
     signature = (
-        "The wind-on runs lie off the model by chance: their stiffness by the change of the speed squared, their "
-        "damping by that of the speed. The wind-off runs repeat."
+        "The wind-on runs deviate from the model by chance: their stiffness with the square of the speed, their "
+        "damping with the speed. The wind-off runs repeat."
     )
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.05,)
@@ -78,7 +78,7 @@ class WindSpeedScatter(BetweenRuns):
 
 @dataclass(frozen=True)
 class StiffnessScatter(BetweenRuns):
-    """A spring whose stiffness differs from run to run by chance, as it is clamped again."""
+    """A spring whose stiffness differs from run to run by chance, such as by clamping it again."""
 
     name = "stiffness_scatter"
     place = 28
@@ -88,9 +88,7 @@ class StiffnessScatter(BetweenRuns):
     scatters = "spring_stiffness"
     advice = "Clamp the spring in the same way before every run, or leave it in place"
     equation = "(1 + εi) Kr in run i, εi normal with standard deviation σ, drawn for every run"
-    signature = (
-        "The frequencies of runs of one spring differ by chance, wind off as well; their damping repeats."
-    )
+    signature = "The frequencies of one spring differ by chance, also with the wind off; its damping repeats."
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
     example = (0.02,)
 
@@ -118,7 +116,9 @@ class DampingScatter(BetweenRuns):
     scatters = "mechanical_damping"
     advice = "Run the bearing in before every run, and lay the cable in the same way"
     equation = "(1 + εi) Cr in run i, εi normal with standard deviation σ, drawn for every run"
-    signature = "The damping of equal runs differs by chance, wind off as well; their frequencies repeat."
+    signature = (
+        "The damping of equal runs differs by chance, also with the wind off; their frequencies repeat."
+    )
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
     example = (0.2,)
 

@@ -54,10 +54,11 @@ class ActuatorSaturation(_OfActuator):
     name = "actuator_saturation"
     place = 30
     size = "an actuator that exerts at most {limit}"
-    advice = "Ask the actuator for less, or record the moment that it exerts"
+    advice = "Command smaller moments, or record the moment of the actuator"
     equation = "|moment| ≤ M, in driven runs; general form: u/(1 + |u/M|^(1/s))^s for the demanded moment u"
     signature = (
-        "Small inputs act as stated; at the peaks of large ones the motion falls short of the nominal model."
+        "Small inputs act as stated; at the peaks of large inputs the motion is smaller than predicted by the "
+        "nominal model."
     )
     references = (
         _FRANKLIN,
@@ -94,11 +95,11 @@ class ActuatorRateLimit(_OfActuator):
     name = "actuator_rate_limit"
     place = 31
     size = "an actuator whose moment changes by at most {rate}"
-    advice = "Ask the actuator for slower changes, or record the moment that it exerts"
+    advice = "Command slower changes, or record the moment of the actuator"
     equation = "|d moment/dt| ≤ R, in driven runs"
     signature = (
-        "Slow parts of the input act as stated; for fast and large ones the moment becomes a triangle, late and "
-        "too small."
+        "Slow parts of the input act as stated; for fast and large inputs the moment is triangular, late and too "
+        "small."
     )
     references = (_FRANKLIN,)
     example = (3.0,)
@@ -121,11 +122,11 @@ class ActuatorLag(_OfActuator):
     name = "actuator_lag"
     place = 32
     size = "an actuator that follows its input with a time constant of {lag}"
-    advice = "Record the moment that the actuator exerts, or use a faster one"
+    advice = "Record the moment of the actuator, or use a faster actuator"
     equation = "τ dm/dt + m = u for the moment m of the stated input u, in driven runs"
     signature = (
-        "The phase between input and angle falls by arctan ωτ and the gain by √(1 + ω²τ²): like a delay at low "
-        "frequencies, less late and smaller at high ones."
+        "The phase between input and angle falls by arctan ωτ and the gain by √(1 + ω²τ²). At low frequencies "
+        "this is a delay; at high frequencies the delay and the gain decrease."
     )
     references = (_FRANKLIN,)
     example = (0.02,)

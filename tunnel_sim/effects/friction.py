@@ -54,7 +54,7 @@ class CoulombFriction(Effect):
     condition = "always"
     jumps = True
     size = "dry friction of {friction_moment}"
-    advice = "Free the bearing and the potentiometer of their dry friction"
+    advice = "Reduce the dry friction of the bearing and the potentiometer"
     equation = (
         "−Tc sgn β̇; rest while the other moments stay within ±Tc; general forms: −Tc z/zs, ż = β̇ − |β̇| z/zs; "
         "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc; in a joint Tc + μ |M|, where M is "
@@ -95,7 +95,7 @@ class CoulombFriction(Effect):
         form=True, inside=True,
     )  # fmt: skip
     peak: float = parameter(
-        "b", "1", "friction near rest over that of fast sliding, less one",
+        "b", "1", "friction near rest over friction of fast sliding, minus one",
         scale=1.0, lower=0.0, upper=9.0, form=True,
     )  # fmt: skip
     peak_rate: float = parameter(

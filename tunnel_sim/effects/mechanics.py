@@ -52,7 +52,7 @@ class AsymmetricStiffness(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
-    advice = "Seat the spring so that it is as stiff to both sides"
+    advice = "Seat the spring so that it is equally stiff to both sides"
     equation = "−κ Kr β²; general form: |β|^p for β²"
     signature = (
         "The centre of the oscillation shifts by −κ A²/2 and a second harmonic appears; the "
@@ -81,7 +81,7 @@ class FreePlay(Effect):
     jumps = True
     size = "play of {half_width} to each side between spring and rod"
     parts = True
-    advice = "Take up the play between spring and rod"
+    advice = "Remove the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
@@ -235,7 +235,7 @@ class RodFlexibility(Effect):
 
 @dataclass(frozen=True)
 class SpringMiscalibration(Effect):
-    """One spring that is not as stiff as stated."""
+    """One spring whose stiffness differs from the stated one."""
 
     name = "spring_miscalibration"
     place = 22
@@ -245,7 +245,7 @@ class SpringMiscalibration(Effect):
     advice = "Measure the stiffness of the spring of {spring_stiffness} again"
     equation = "(1 + x) Kr instead of the stated Kr, in the runs of one spring"
     signature = (
-        "All runs of one spring lie off the line of stiffness against squared frequency by the same relative "
+        "All runs of one spring deviate from the line of stiffness against squared frequency by the same relative "
         "amount."
     )
     references = ("Paper, Table II: springs 4 and 7 lie off the line by −12 % and +10 %",)
@@ -253,7 +253,7 @@ class SpringMiscalibration(Effect):
     tries = 2
 
     error: float = parameter(
-        "x", "1", "true over stated stiffness, less one", scale=0.02, lower=-0.9, upper=9.0
+        "x", "1", "true over stated stiffness, minus one", scale=0.02, lower=-0.9, upper=9.0
     )
     spring_stiffness: float = parameter(
         "Kr", "N m/rad", "stated stiffness of the spring concerned",
@@ -351,7 +351,7 @@ class StructuralDamping(Effect):
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
     after_effect: float = parameter(
-        "m", "1", "after-effect of the release over that of a loss factor common to all frequencies",
+        "m", "1", "after-effect of the release, relative to a loss factor equal at all frequencies",
         scale=1.0, lower=-10.0, upper=10.0, form=True,
     )  # fmt: skip
 

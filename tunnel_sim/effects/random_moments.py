@@ -76,7 +76,7 @@ class Buffeting(RandomMoment):
     place = 13
     condition = "wind_on"
     source = "forcing"
-    advice = "Quieten the stream, or average over more runs with the wind on"
+    advice = "Reduce the turbulence of the stream, or average over more runs with the wind on"
     equation = "random moment of standard deviation s ½ρV²Al, correlated as exp(−2π fb |t − t'|)"
     signature = (
         "In wind-on runs the response wanders about the decay; after the decay it continues as "
@@ -111,8 +111,8 @@ class AmbientVibration(RandomMoment):
     advice = "Isolate the rig from its floor and from draughts, or average over more runs"
     equation = "random moment of standard deviation s, correlated as exp(−2π fb |t − t'|)"
     signature = (
-        "In every run, with the wind off as well, the decay ends in narrow-band noise at the rig's natural "
-        "frequency, of the same moment in all runs."
+        "In every run, also with the wind off, the decay ends in narrow-band noise at the rig's natural frequency. "
+        "The moment is equally strong in all runs."
     )
     references = (
         "Peterson, Observations and modeling of seismic background noise, USGS Open-File Report 93-322 (1993)",

@@ -65,7 +65,7 @@ def check_described(kind: object) -> None:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
     if kind.own_numbers(1) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
-        what = "has a phase or instants in every run, and does not say how they are found"
+        what = "has a phase or instants in every run, and does not state how they are found"
         raise TunnelError(what, where=where, remedy="override sought")
     if kind.random and len(kind.parameters()) != _OF_SPECTRUM:
         what = "is a random moment, whose parameters are an intensity and a bandwidth or Strouhal number"
@@ -145,7 +145,7 @@ def check_kind(kind: object) -> None:
     if any(kind.name == one.name and kind is not one for one in ALL_EFFECTS):
         raise TunnelError("is the name of a built-in effect", where=where, remedy="choose another name")
     for trait, of in (
-        ("lattice", "effect that is read off the records"),
+        ("lattice", "effect that is detected in the records"),
         ("scatters", "effects between runs"),
     ):
         if getattr(kind, trait):
@@ -170,7 +170,7 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
     for spectrum in {(kind.random, kind.condition) for kind in own if kind.random}:
         same = [kind.name for kind in kinds if (kind.random, kind.condition) == spectrum]
         if len(same) > 1:
-            what = f"has the spectrum of {same[0]}, and no run could tell them apart"
+            what = f"has the spectrum of {same[0]}, so no run can distinguish them"
             raise TunnelError(what, where=f"effect {same[-1]}", remedy="leave one of them out")
     names = [kind.name for kind in kinds]
     for name in names:

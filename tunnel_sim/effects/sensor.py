@@ -77,11 +77,9 @@ class SensorHysteresis(Effect):
     condition = "always"
     jumps = True
     size = "backlash of {half_width} to each side at the sensor"
-    advice = "Take up the backlash between rod and sensor"
+    advice = "Remove the backlash between rod and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
-    signature = (
-        "The reading stands still for a moment at each reversal of the motion and lags by w in between."
-    )
+    signature = "The reading pauses at each reversal of the motion and lags by w in between."
     references = (
         "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
     )
@@ -92,7 +90,7 @@ class SensorHysteresis(Effect):
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
     roundness: float = parameter(
-        "k", "1", "relative difference of two plays whose mean is read",
+        "k", "1", "relative difference between two plays; the reading is their mean",
         scale=0.3, lower=0.0, upper=1.0, form=True,
     )  # fmt: skip
 
@@ -201,7 +199,7 @@ class SensorQuantisation(Effect):
     condition = "always"
     size = "readings in steps of {step}"
     advice = "State the sensor's real resolution, or use a finer one"
-    equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
+    equation = "y = q round(y/q); a step finer than the stated resolution has no effect"
     signature = (
         "The readings are multiples of a coarser step than stated; their error is a sawtooth of the angle."
     )
@@ -231,12 +229,12 @@ class DroppedSamples(Effect):
     size = "{lost_time} of lost samples in every run"
     advice = "Replace the logger, or state the time of every sample"
     equation = (
-        "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
+        "y(t) = β(t) until the instant and β(t + τ) after it, with the change spread over one sample interval; "
         "the instant is drawn for every run. With n instants in a run, τ/n is lost at each. In driven runs the "
-        "input is lost with the reading (k = 0), or recorded apart and complete (k = 1)"
+        "input is lost with the reading (k = 0), or recorded separately and complete (k = 1)"
     )
     signature = (
-        "The phase jumps at an instant of a run; before and after it frequency and damping are the same."
+        "The phase jumps at an instant of a run; frequency and damping are the same before and after it."
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.02,)
@@ -345,21 +343,21 @@ _LEAST_SPRING = 1e-9  # N m/rad: a fit may try zero
 
 @dataclass(frozen=True)
 class SecondMode(Effect):
-    """A second oscillation beside the first, as of a bending sting or a coupled freedom."""
+    """A second oscillation, such as bending of the sting or a coupled degree of freedom."""
 
     name = "second_mode"
     place = 24
     channel = "sensor"
     condition = "always"
-    advice = "Stiffen what oscillates beside the body, or model both modes"
+    advice = "Stiffen the part that oscillates beside the body, or model both modes"
     equation = (
         "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.35 rad)^n for a, "
-        "β0 the release angle. In driven runs k = 0 is the same from the start on; with k = ±1 the input M "
-        "excites it instead: y = β + k a q/0.35 rad, q̈ + 2 ζ2 ω2 q̇ + ω2² q = ω2² M/Kr"
+        "β0 the release angle. In driven runs with k = 0 it starts with the run; with k = ±1 the input M "
+        "excites it: y = β + k a q/0.35 rad, q̈ + 2 ζ2 ω2 q̇ + ω2² q = ω2² M/Kr"
     )
     signature = (
-        "A decaying line from the release on, at one frequency whatever the spring and the wind; in driven runs a "
-        "second resonance, or such a line from the start on."
+        "A decaying line that starts at the release, at one frequency for all springs and wind speeds. In driven "
+        "runs a second resonance, or a decaying line that starts with the run."
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.005, 60.0, 0.01)
@@ -387,7 +385,7 @@ class SecondMode(Effect):
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )
     by_input: float = parameter(
-        "k", "1", "whether the input of a driven run excites it: 0 or 1, or -1 against its sense",
+        "k", "1", "whether the input of a driven run excites it: 0 or 1, or -1 with the opposite sign",
         scale=1.0, lower=-1.0, upper=1.0, of_input=True,
     )  # fmt: skip
 
@@ -438,7 +436,7 @@ class SecondMode(Effect):
 
 @dataclass(frozen=True)
 class InputDelay(Effect):
-    """An input that acts later than its time stamps say.
+    """An input that acts later than its time stamps.
 
     It is exact for both holds and any delay: the integrator ends a step at each kink. Beyond its samples the
     input keeps its first and its last value.

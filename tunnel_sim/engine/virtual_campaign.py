@@ -118,7 +118,7 @@ def _drawn(plan: CampaignPlan) -> list[_Drawn]:
     for condition in plan.conditions:
         if condition.wind_speed > 0.0 and condition.drive is not None and condition.drive.kind.of_base:
             raise TunnelError(
-                "the base is shaken and the wind blows, whose moment follows the motion in the room",
+                "a shaken base is not supported with the wind on",
                 where=f"{plan.name}, run '{condition.id}'",
                 remedy="give wind_speeds = [0], or drive the body by amplitudes_nm",
             )
@@ -210,10 +210,10 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             what = "acts on driven runs only, and all runs of the plan are free decays"
             raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
         if effect.of_moment and not any(drive.kind.by_actuator for drive in drives):
-            what = "changes the moment of a drive, and here the drive moves the spring's root or the base"
+            what = "changes the moment of a drive, but this drive moves the spring's root or the base"
             raise TunnelError(what, where=where, remedy="leave it out, or drive the body by amplitudes_nm")
         if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
-            what = "is a loss in the spring, which is not simulated where its root moves"
+            what = "is a loss in the spring; it is not simulated where the spring's root moves"
             remedy = "leave out the effect, or drive the body by amplitudes_nm"
             raise TunnelError(what, where=where, remedy=remedy)
         if effect.by_angle_in_room and any(drive.kind.by_inertia for drive in drives):

@@ -79,7 +79,9 @@ class Prior:
         known = [item.name for item in fields(Prior)]
         for name, value in checked_names(changes, known, "prior", where).items():
             if name in REWARDED and value == 0:
-                what = f"prior of {name} = {value!r}: known exactly, it leaves nothing to learn"
+                what = (
+                    f"prior of {name} = {value!r}: the value is known exactly, so there is nothing to learn"
+                )
                 raise EnvError(what, where=where, remedy="give a number above 0, in 1/rad")
             Number(above=name in REWARDED, unit=_PRIOR_UNITS[name]).checked(value, f"prior of {name}", where)
         return replace(Prior(), **changes)

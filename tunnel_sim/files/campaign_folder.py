@@ -256,10 +256,10 @@ def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
         value = getattr(run, key)
         if value is not None and key not in INPUTS[column].keys:
             having = " or ".join(name for name, kind in INPUTS.items() if key in kind.keys)
-            what = f"{key} = {value:g} of the column {column}"
-            raise TunnelError(what, where=where, remedy=f"give {key} of a column {having} only")
+            what = f"{key} = {value:g} with the column {column}"
+            raise TunnelError(what, where=where, remedy=f"give {key} only with a column {having}")
     if run.drive_gain == 0.0:
-        what = f"drive_gain = 0 of the column {column}"
+        what = f"drive_gain = 0 with the column {column}"
         raise TunnelError(what, where=where, remedy="give drive_gain in N m per unit, not zero")
 
 
@@ -351,5 +351,5 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
     if runs.is_dir() and not runs.is_symlink():
         strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]
     if strange:
-        what = f"the folder holds more than a campaign ({strange[0].name})"
+        what = f"the folder contains more than a campaign ({strange[0].name})"
         raise TunnelError(what, where=where, remedy="move that away, or choose another folder")

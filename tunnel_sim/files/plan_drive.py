@@ -174,7 +174,7 @@ def drive_of_file(path: Path, time_s: Times, table: DriveTable, where: str) -> D
     given, column, values = read_input(path, where)
     hold = table.hold
     if not INPUTS[column].amplitudes:
-        what = "no known unit" if column == "drive" else "a servo in place of the spring, which no plan has"
+        what = "no known unit" if column == "drive" else "no meaning in a plan, since it needs a servo"
         raise TunnelError(f"the column {column} has {what}", where=where, remedy=f"name it {_COLUMNS}")
     _check_gain(table.gain, column, where)
     given = given - given[0]

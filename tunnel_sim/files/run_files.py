@@ -174,7 +174,7 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
 def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     """A table as text."""
     check_utf8(content, where)
-    check_lines(content, where, "save it again as text, or cut off what a crash has left at its end")
+    check_lines(content, where, "save it again as text, or remove the damaged end")
     head = content[: content.find(b"\n") + 1] or content
     columns, lines = head.count(b",") + 1, content.count(b"\n")
     check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that are not needed")

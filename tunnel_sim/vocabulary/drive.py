@@ -96,7 +96,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
     x, y = values - values.mean(), record.yaw_rad - record.yaw_rad.mean()
     alike = float(x @ y) ** 2 / max(float(x @ x) * float(y @ y), 1e-300)
     if 1.0 - alike < _ITSELF:
-        what = f"the input {name} is the response itself, up to a factor"
+        what = f"the input {name} is proportional to the response"
         remedy = f"record what drives the body in {name}, not the sensor's reading"
         raise TunnelError(what, where=where, remedy=remedy)
     ends = (float(values.min()), float(values.max()))
@@ -116,7 +116,7 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         stands = int(np.count_nonzero(flat)) * _FLAT > count
         if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
             raise TunnelError(
-                f"the input {name} saturates: its extreme value fills {_CLIPPED:.0%} of the record or more",
+                f"the input {name} saturates: {_CLIPPED:.0%} or more of the record is at its extreme value",
                 where=where,
                 remedy="record the input in a wider range; where the actuator itself saturates, state "
                 "plausible = false under [sensor] to keep it",
@@ -145,17 +145,17 @@ def refuse_untreated(
         what = "the command acts through the servo, whose kp is spring_stiffness, which is 0"
         remedy = "state the kp of the servo as spring_stiffness, or leave spring_stiffness out"
     elif spring_stiffness == 0.0 and not drive.on_body:
-        what = "the motion of the root acts through the spring, and spring_stiffness = 0 states none"
+        what = "the motion of the root acts through the spring, but spring_stiffness is 0"
     elif spring_stiffness == 0.0 and kind.by_inertia:
-        what = "the base turns under a body without a spring, so that the run shows no moment in N m"
+        what = "without a spring, a turning base does not determine a moment in N m"
         remedy = "leave the run out, or drive the body by a moment"
     elif kind.of_base and wind_on:
-        what = "the base is shaken and the wind blows, whose moment follows the motion in the room"
+        what = "a shaken base is not supported with the wind on"
         remedy = "shake the base with the wind off, or leave the run out"
     elif quantity == "acceleration":  # it jumps with a held input
         what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
     elif quantity == "rate" and spring_stiffness == 0.0:
-        what = "the run is driven and has no spring, and the rate's zero looks like a constant moment"
+        what = "in a driven run without a spring, the zero of a rate sensor looks like a constant moment"
         remedy = "record the angle"
     if what:
         raise TunnelError(what, where=where, remedy=remedy)
@@ -168,7 +168,7 @@ def refuse_several_gains(drives: Iterable[Drive | None], where: str) -> None:
     )
     if len(columns) > 1:
         raise TunnelError(
-            f"the gains of {' and '.join(columns)} are unknown, and one gain is common to the runs",
+            f"the gains of {' and '.join(columns)} are unknown, but the fit has one common gain",
             where=where,
             remedy="state drive_gain of one of them, or take the runs of each input separately",
         )

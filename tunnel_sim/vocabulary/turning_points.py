@@ -65,8 +65,8 @@ class HoldsTurningPoints(TunnelError):
     def __init__(self, points: TurningPoints, where: str) -> None:
         self.points = points
         super().__init__(
-            f"holds {points.time_s.size} turning points, from one side to the other, without the motion between",
+            f"contains {points.time_s.size} turning points only, not the motion between them",
             where=where,
-            remedy="tunnel identify FILE gives ωn and ζ from them; a campaign, and a diagnosis, need the angle "
-            "between them too, with five samples a cycle or more",
+            remedy="use tunnel identify FILE for ωn and ζ; a campaign and a diagnosis need the whole motion, with "
+            "five samples a cycle or more",
         )

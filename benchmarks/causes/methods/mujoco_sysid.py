@@ -20,8 +20,8 @@ ABOUT = About(
     f"{FINER} times as many with dry friction; records as means of {ROWS} blocks per cycle; forward selection by "
     f"BIC of up to {MOST} causes, of which the {FITTED} that the Jacobian ranks first are fitted at every step; "
     f"none, or no further one, below {DETECTED} noise variances, `unknown` where the set leaves {CLOSED:g} of the "
-    "gap; probabilities are BIC weights of all sets fitted; the steps and where to stop were chosen with the "
-    "truths of nine campaigns in sight",
+    "gap; probabilities are BIC weights of all sets fitted; the steps and where to stop were chosen with "
+    "knowledge of the truths of nine campaigns",
     (*NAMES, UNKNOWN),
     NOT_SEEN,
 )

@@ -74,7 +74,7 @@ class DriftingClock(StatementSlip):
             who = "every run" if places == whole else "the run"
             air = "" if still.intersection(ids) else ", or the wind speed"
             what = (
-                f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, whatever the amplitude: "
+                f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, at every amplitude: "
                 f"the clock of the logger drifts, or the stiffness of a spring that warms up{air}"
             )
             remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"

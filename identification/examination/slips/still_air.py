@@ -74,8 +74,8 @@ class WindNotSeen(StatementSlip):
             max(abs(change.damping) for change in changes),
         )
         what = (
-            f"with the wind on frequency and damping are those with the wind off, to {50.0 * largest[0]:.2g} % and "
-            f"{100.0 * largest[1]:.2g} %: the air acts on no body so little"
+            f"with the wind on, frequency and damping equal those with the wind off within {50.0 * largest[0]:.2g} "
+            f"% and {100.0 * largest[1]:.2g} %: no body has so small an aerodynamic moment"
         )
         ids = tuple(change.swing.run.id for change in changes)
         return (Remark(Outcome.NOTED, ids, what, "check whether the fan was on, and wind_speed"),)

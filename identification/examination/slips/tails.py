@@ -45,8 +45,8 @@ class StuckReading(RecordSlip):
                 time, yaw = run.record.time_s, run.record.yaw_rad
                 where = np.flatnonzero(stuck)
                 what = (
-                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while "
-                    f"the body moves ({counted(where.size, 'sample')}); they are left out"
+                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading is constant while the "
+                    f"body moves; {counted(where.size, 'sample')} left out"
                 )
                 remarks.append(
                     Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")
@@ -91,8 +91,8 @@ class ConstantTail(RecordSlip):
             if at is not None:
                 time, yaw = run.record.time_s, run.record.yaw_rad
                 what = (
-                    f"from {time[at]:.3f} s on the reading stands at {float(np.median(yaw[at:])):.4g} "
-                    f"{campaign.sensor.unit}, after swings that could not end so soon; that part is left out"
+                    f"from {time[at]:.3f} s the reading is constant at {float(np.median(yaw[at:])):.4g} "
+                    f"{campaign.sensor.unit}, too soon for the motion to have decayed; this part is left out"
                 )
                 remedy = "check for a padded file, a stopped logger or a body held by hand"
                 remarks.append(Remark(Outcome.CUT, (run.id,), what, remedy))

@@ -25,7 +25,7 @@ def test_the_true_cause_closes_the_gap_on_runs_held_out(hand: ByHand) -> None:
     assert given.unit == "N m"
     assert given.std is not None
     assert given.value == pytest.approx(MOMENT, abs=5.0 * given.std)
-    assert found.held_out == "on runs held out of the fit"
+    assert found.held_out == "on held-out runs"
 
 
 def test_no_cause_or_another_closes_less(hand: ByHand) -> None:

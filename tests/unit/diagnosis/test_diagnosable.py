@@ -121,10 +121,10 @@ def test_runs_left_out_are_in_the_cautions_and_not_in_the_gap():
 
 
 def test_unlike_springs_that_are_not_stated_are_no_gap():
-    """Fitted together they would be a gap of thousands of noise powers."""
+    """Fitted together they would be a gap of thousands of noise variances."""
     answer = diagnose(decays(PAIR, bare=range(6)), kinds=vocabulary(["sensor_drift"]))
     assert answer.causes == ()
-    assert any("may not have the spring of the rest" in text for text in answer.cautions)
+    assert any("may have another spring" in text for text in answer.cautions)
 
 
 def test_a_wind_on_run_in_another_mode_is_left_out():

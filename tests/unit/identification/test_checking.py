@@ -130,7 +130,7 @@ FAULTS: dict[str, tuple[Callable[[Estimate, Campaign], Any], str]] = {
         lambda found, _: replace(found, runs=found.runs[1:]),
         "give a RunEstimate for each run",
     ),
-    "unsigned": (lambda found, _: replace(found, estimator="x"), "signs its estimate 'x'"),
+    "unsigned": (lambda found, _: replace(found, estimator="x"), "labels its estimate 'x'"),
     "hertz": (
         of_runs(omega_n=scaled(1.0, unit="Hz")),
         "unit of omega_n of run r01 .* is 'Hz'; give it in rad/s",
@@ -165,7 +165,7 @@ FAULTS: dict[str, tuple[Callable[[Estimate, Campaign], Any], str]] = {
     ),
     "the input is changed": (changed_record, "read-only.*; copy an array before you change it"),
     "the input is forced": (forced, "changes the record of run r01; copy an array"),
-    "not repeatable": (drawn, "another answer when it is asked again.*default_rng"),
+    "not repeatable": (drawn, "a different answer for the same runs.*default_rng"),
     "the first run decides": (first_run_decides, "not the same for the same runs in another order"),
     "not a number": (not_a_number, "omega_n of run r01 .* is nan ± nan; give None and a status"),
     "silent": (silent, "neither a frequency nor a status that says why"),

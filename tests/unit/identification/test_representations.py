@@ -60,8 +60,8 @@ run    ωn          ζ            status
 on     12.340(56)  0.01230(45)  ok
 <off>  –           –            no oscillation
 
-In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is
-that of the noise; tunnel diagnose adds what the model may miss.
+In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It
+includes the noise only; tunnel diagnose adds the error of the model.
 Note: run on: it starts late; cut it
 Note: no decaying motion above the noise: check the sensor, start a free record at its
 release, or check the input of a driven one (<off>)
@@ -162,7 +162,7 @@ def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> 
     text = str(diagnosis)
     assert text.startswith("The gap is explained by coulomb friction.\n")
     lines = text.splitlines()
-    assert "coulomb_friction         97 %             99.0 %" in lines
+    assert "coulomb_friction         97 %                99.0 %" in lines
     assert "coulomb_friction  friction_moment  0.003990 ± 0.000060 N m" in lines
     assert any(line.strip() == "ratio            2.000 (at its upper bound)" for line in lines)
     assert "Cnr [1/rad] -0.313 ± 0.022 -0.257 ± 0.012 -18 %" in [" ".join(line.split()) for line in lines]

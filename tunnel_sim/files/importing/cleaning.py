@@ -76,24 +76,22 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
     differing = np.count_nonzero(same & ~repeated)
     if differing > _COARSE * time.size and time[0] < time[-1]:
         remarks.append(
-            f"{differing} stamps equal the one before though the readings differ: the stamps are coarser than "
-            f"the sampling, and evenly spaced times take their place"
+            f"{differing} time stamps repeat although the readings differ: the stamps are coarser than the "
+            "sampling, and evenly spaced times are used instead"
         )
         time = np.linspace(time[0], time[-1], time.size)
     elif same.any():
         keep = np.concatenate([[True], ~same])
         further = (
-            f", and {counted(int(differing), 'further reading')} at the time of the one before"
-            if differing
-            else ""
+            f", and {counted(int(differing), 'further reading')} at a repeated time" if differing else ""
         )
         remarks.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
         rows, time, reading = rows[keep], time[keep], reading[keep]
     first = float(time[0]) if time.size else 0.0
     if first != 0.0:
         remarks.append(
-            f"times here are the file's, whose first sample is at {clock_text(first)} s; those of the campaign "
-            "count from the first sample of each run"
+            f"the times stated here are the times of the file, which starts at {clock_text(first)} s; in the "
+            "campaign every run starts at 0 s"
         )
     time = from_zero(time)
     steps = np.diff(time)
@@ -135,7 +133,7 @@ def from_rest(reading: PerSample, rest: float, unit: str, said: list[str], where
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
         raise TunnelError(
-            f"never passes the stated rest of {rest:.4g} {unit}: it lies from {least:.4g} to {most:.4g} {unit}",
+            f"the readings, {least:.4g} to {most:.4g} {unit}, do not include the stated rest of {rest:.4g} {unit}",
             where=where,
             remedy=f"state the reading at rest in {unit}, for each run where they differ",
         )

@@ -124,7 +124,7 @@ def in_seconds(
     if not unit:
         _ask_for_unit(times, ("time",), "--time-unit", where)
         unit, step = guessed_time_unit(values)
-        said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
+        said.append(f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}")
     return values * UNITS["time"][unit] if unit != "s" else values
 
 
@@ -200,7 +200,8 @@ def in_radians(
             refuse_without_unit([reading], where)
         unit, swing = guessed_angle_unit(values)
         said.append(
-            f"no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit says otherwise"
+            f"the file states no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit "
+            "changes this"
         )
     kind = kind_of(unit)
     factor = UNITS[kind][unit]
@@ -210,7 +211,7 @@ def in_radians(
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         what = f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn"
-        remedy = "give --unit deg if it does; of an encoder --counts-per-turn N"
+        remedy = "give --unit deg if it does, or --counts-per-turn N for an encoder"
         raise TunnelError(what, where=where, remedy=remedy)
     return values, quantity, unit
 

@@ -264,7 +264,7 @@ def check_wind(
             what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
             raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
     if _WIND_ON.search(f"{file.stem} {run}"):
-        what = "the name says that the wind is on, but not how fast"
+        what = "the name states that the wind is on, but not its speed"
         remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
         raise Unstated(what, where=where, remedy=remedy)
     if not driven:

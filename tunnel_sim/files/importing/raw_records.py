@@ -121,7 +121,7 @@ def _records(
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
     starts = [0, *restarts(time), time.size]
     if len(starts) > 2:
-        remarks.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
+        remarks.append(f"the clock restarts {counted(len(starts) - 2, 'time')}: a new run each time")
     for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
         clean = cleaned(time[a:b], readings[a:b])
         rows = np.flatnonzero(kept)[a:b]
@@ -179,7 +179,7 @@ def _turning_points(
         own = "s" if size < _LONGEST_SWING else "ms"
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
         remarks = [line for line in remarks if "no unit of the times" not in line]
-        remarks.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
+        remarks.append(f"the file states no unit of the times: half periods of {size:.4g} are taken as {own}")
     found: dict[str, PerSample] = {}
     for channel in table.channels:
         mark = _STD.match(channel.name)

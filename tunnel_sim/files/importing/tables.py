@@ -27,7 +27,7 @@ _RUN_NAMES = re.compile(
     r"(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
 )
 LEAST_ROWS = 16
-"""Of a record: a shorter table beside longer ones holds conditions or sizes."""
+"""Fewest rows of a record: a shorter table beside longer ones holds conditions or sizes."""
 _LEAST_EACH = 8  # rows of a run, on average: a column that changes more often numbers something else
 
 

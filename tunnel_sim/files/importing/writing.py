@@ -39,7 +39,7 @@ _RUN_OF_JOINT = {
     "spring_stiffness": "N m/rad: 0 for a joint without a spring",
     **_OF_INPUT,
 }
-"""Of driven runs in still air: no coefficient of the wind is sought in them."""
+"""Comments for driven runs in still air, which give no aerodynamic coefficient."""
 ORIGINAL = "# Original: "
 _RUNS_HEAD = "# What the files do not say about the runs: fill it in, and remove the # before it."
 

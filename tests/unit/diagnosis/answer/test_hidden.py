@@ -124,7 +124,7 @@ def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant
     found = diagnose(with_zero(campaign(shedding), zero), kinds=kinds)
     assert found.causes == ("vortex_shedding",)
     assert found.rest.significant
-    assert "Sensor drift is significant beside it and too small to be named." in found.verdict
+    assert "Sensor drift is significant, but too small to be named." in found.verdict
     (drift,) = (one for one in found.hidden if one.effect == "sensor_drift")
     assert drift.significance > 5.0
     assert abs(drift.size.value) > 1.5e-3

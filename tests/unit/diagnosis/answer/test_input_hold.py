@@ -60,7 +60,7 @@ def test_a_guessed_hold_is_said_as_the_second_reading_of_the_delay() -> None:
 
 def test_a_hold_that_is_stated_wrongly_is_said_too() -> None:
     said = diagnose(held("linear"), kinds=FEW).verdict
-    assert "One cause has two readings" in said
+    assert "One cause has two interpretations" in said
     assert "as the campaign states" in said
 
 
@@ -73,7 +73,7 @@ def test_a_smooth_input_that_is_stated_as_held_seems_early() -> None:
     runs = tuple(replace(run, drive=replace(run.drive, hold="zero")) for run in smooth.runs)
     answer = diagnose(replace(smooth, runs=runs), kinds=FEW)
     assert answer.causes == (DELAY.name,)
-    assert "acts 1 ms earlier than recorded, which is half a sample (1 ms), or it is linear" in answer.verdict
+    assert "acts 1 ms earlier than recorded, about half a sample (1 ms); or it is linear" in answer.verdict
     assert any(
         'state drive_hold = "linear" for the runs' in step for step in next_steps(answer.to_json_dict())
     )

@@ -120,7 +120,7 @@ def test_what_chance_explains_is_never_material(data, base):
     found = judged(studied(data, base, (CAUSE,), best), 0.1, 0.001, excess=0.0004)
     assert not found.significant
     assert not found.material
-    assert found.words == "Explained; the residual is within the noise."
+    assert found.words == "The residual is within the noise."
     assert found.moves["cn_beta"].relative == pytest.approx(0.2)
 
 
@@ -131,11 +131,9 @@ def with_effect(base):
 def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
     study = studied(data, base, (CAUSE,), base)
     found = judged(with_p_value(study, 0.0), 0.0, 0.0001)
-    assert (
-        found.words == "Explained; the residual (0.0145° root mean square) changes Cnβ by less than 0.02 %."
-    )
+    assert found.words == "The residual (0.0145° root mean square) changes Cnβ by less than 0.02 %."
     assert judged(study, 0.0, None).words.startswith(
-        "Explained; the residual (0.0145° root mean square) changes no coefficient"
+        "The residual (0.0145° root mean square) changes no coefficient"
     )
 
 

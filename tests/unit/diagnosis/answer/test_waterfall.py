@@ -60,7 +60,7 @@ def test_the_cause_that_closes_most_comes_first_and_the_idle_one_is_not_missed(d
     assert abs(all_) < chance
     assert found.without[IDLE] == pytest.approx(one)
     assert found.without[CAUSE] > 0.9 * before
-    assert found.held_out == "on runs held out of the fit"
+    assert found.held_out == "on held-out runs"
 
 
 def test_a_hum_is_a_step_of_its_own_power(data, base, both):
@@ -112,7 +112,7 @@ def test_a_single_run_is_held_out_by_stretches_of_time(data):
     base = nominal(alone)
     best = added(base, CAUSE)
     found = waterfall(studied(alone, base, (CAUSE,), best), NO_BASE, {})
-    assert found.held_out == "on stretches of time held out of the fit"
+    assert found.held_out == "on held-out stretches of time"
     assert found.steps[0].excess > base.excess  # predicted, not fitted
     assert abs(found.steps[1].excess) < 4.0 * np.sqrt(2.0 / base.count)
 

@@ -129,7 +129,7 @@ def test_two_springs_are_not_one_model(tmp_path: Path) -> None:
 
 
 def test_a_closure_is_a_share() -> None:
-    closure = NativeClosure(101.0, 2.0, 11.0, "on runs held out of the fit")
+    closure = NativeClosure(101.0, 2.0, 11.0, "on held-out runs")
     assert (closure.fit_closed, closure.native_closed) == pytest.approx((0.99, 0.9))
     assert NativeClosure(101.0, 0.5, 300.0, "").native_closed == 0.0
 

@@ -114,7 +114,7 @@ def test_friction_that_grows_with_the_moment_of_the_drive_is_named_with_its_shar
 def test_a_moment_that_no_effect_explains_counts_as_noise_beside_the_friction() -> None:
     found = diagnose(campaign(joint(FRICTION, 7, unknown=0.5)))
     assert found.causes == ("coulomb_friction",)
-    assert any("counts as random noise beside the answer" in said for said in found.cautions)
+    assert any("The fits treat it as random noise" in said for said in found.cautions)
     friction = found.candidates[0].parameters["friction_moment"]
     assert friction.std is not None
     assert abs(friction.value - FRICTION) < 3.0 * friction.std < 0.2 * FRICTION

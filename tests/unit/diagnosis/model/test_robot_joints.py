@@ -112,7 +112,7 @@ TWO = MOTOR + '<motor name="second" joint="elbow"/>'
     [
         (robot(actuators=TWO), {}, "several actuators: motor, second; name the one"),
         (robot(actuators=TWO), {"actuator": "motors"}, "no actuator 'motors'; did you mean 'motor'"),
-        (robot(actuators=""), {}, "the joint has no actuator in the model"),
+        (robot(actuators=""), {}, "the model has no actuator of the joint"),
         (robot(actuators=MOTOR.replace("/>", ' ctrlrange="-0.1 0.1"/>')), {}, "outside -0.1 to 0.1 of its ctrl"),
         (robot(actuators=MOTOR.replace("/>", ' forcerange="-0.1 9"/>')), {}, "outside -2 to 180 N m of its force"),
         (robot('actuatorfrcrange="-3 3"'), {}, "outside -3 to 3 N m of its force range"),
@@ -140,20 +140,20 @@ def changed(data: Campaign, **drive: object) -> Campaign:
 def test_inputs_that_are_not_the_joints_are_refused_in_one_line(tmp_path: Path, swung: Campaign) -> None:
     law = own_model(tmp_path, swung, robot()).law
     with pytest.raises(
-        TunnelError, match=r"drive_gain = 3 is stated, and actuator 'motor' gives 20 N m per unit"
+        TunnelError, match=r"drive_gain = 3 is stated, but actuator 'motor' gives 20 N m per unit"
     ):
         with_law(changed(swung, gain=3.0), law)
     assert with_law(changed(swung, gain=GEAR), law)[0].runs[0].input_gain == GEAR
-    with pytest.raises(TunnelError, match="the joint of a model has no root that moves"):
+    with pytest.raises(TunnelError, match="the joint of a model has no moving root"):
         with_law(changed(swung, column="base_rad"), law)
     loose = own_model(tmp_path, swung, robot(actuators="")).law
     assert with_law(changed(swung, gain=3.0), loose)[0].runs[0].input_gain == 3.0
     free = replace(swung, runs=(*swung.runs, replace(swung.runs[0], id="free", drive=None)))
-    with pytest.raises(TunnelError, match="nothing holds the joint of the model, and nothing drives free"):
+    with pytest.raises(TunnelError, match="the joint of the model has no restoring moment, and free"):
         refuse_undiagnosable(*with_law(free, law))
     rates = replace(swung, sensor=replace(swung.sensor, quantity="rate"))
     sprung = replace(law, stiffness=5.0)  # else the spring is missing
-    with pytest.raises(TunnelError, match="do not say where the model's joint moves"):
+    with pytest.raises(TunnelError, match="do not determine the position of the model's joint"):
         refuse_undiagnosable(*with_law(rates, sprung))
 
 
@@ -332,7 +332,7 @@ def test_half_a_step_of_the_models_integrator_is_not_a_cause(tmp_path: Path, int
     assert model.law.step == 0.002
     answer = diagnose(data, kinds=vocabulary(KINDS), model=model)
     assert answer.causes == ()
-    said = "leads its input by 1 ms, at most half of the model's step of 2 ms"
+    said = "leads its input by 1 ms. MuJoCo's first-order integrators cause a lead of up to half the step of 2 ms"
     assert any(said in caution for caution in answer.cautions)
     assert answer.model is not None
     assert any("half a step, 1 ms, before its input" in note for note in answer.model.notes)

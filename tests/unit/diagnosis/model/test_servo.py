@@ -119,7 +119,7 @@ def test_the_format_keeps_the_command_and_the_gains(tmp_path: Path, known: Campa
         np.testing.assert_array_equal(one.drive.values, other.drive.values)
     text = (tmp_path / "servo" / "campaign.toml").read_text()
     (tmp_path / "servo" / "campaign.toml").write_text(text.replace("servo_kv", "drive_gain"))
-    with pytest.raises(TunnelError, match="drive_gain = 4 of the column command_rad"):
+    with pytest.raises(TunnelError, match="drive_gain = 4 with the column command_rad"):
         read_campaign(tmp_path / "servo")
 
 
@@ -137,13 +137,13 @@ def test_why_play_and_effects_of_a_spring_are_not_tried_is_said(known: Campaign)
     play, others = said
     assert "between motor and link" in play
     assert play.endswith("not tried: free_play.")
-    assert others.endswith("of one are not tried: cubic_stiffness, spring_miscalibration.")
+    assert others.endswith("is not a spring: cubic_stiffness, spring_miscalibration.")
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"drive": None}, "has no command_rad, and other runs do"),
+        ({"drive": None}, "has no command_rad, but other runs do"),
         ({"spring_stiffness": 61.0}, "servos of several gains"),
         ({"spring_stiffness": 0.0}, "the kp of the servo as spring_stiffness"),
     ],
@@ -155,14 +155,14 @@ def test_what_is_no_campaign_of_one_servo_is_refused_in_one_line(
     mixed = replace(known, runs=(replace(first, **change), *others))  # type: ignore[arg-type]
     with pytest.raises(TunnelError, match=said):
         refuse_undiagnosable(mixed)
-    with pytest.raises(TunnelError, match="kv is stated, and no kp"):
+    with pytest.raises(TunnelError, match="kv is stated without kp"):
         refuse_undiagnosable(commanded(kp=None))
 
 
 @pytest.mark.parametrize(
     ("actuators", "free", "said"),
     [
-        ('<motor name="motor" joint="elbow" gear="20"/>', None, "holds no position"),
+        ('<motor name="motor" joint="elbow" gear="20"/>', None, "does not hold a position"),
         ('<motor name="motor" joint="elbow" gear="20"/>', ("gain",), "no position servo drives the joint"),
         (SERVO, ("inertia", "gain"), "where the servo alone holds the joint"),
         (SERVO, ("stiffness", "gain"), "only one of them can be fitted"),

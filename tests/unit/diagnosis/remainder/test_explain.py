@@ -1,4 +1,4 @@
-"""What could be explained of a gap, and the law proposed; the reference simulator gives the truth."""
+"""The explainable share of a gap, and the proposed law; the reference simulator gives the truth."""
 
 from __future__ import annotations
 
@@ -226,12 +226,16 @@ REST = {"significant": False, "p_value": 0.4321}
 @pytest.mark.parametrize(
     ("causes", "rest", "said"),
     [
-        (["coulomb_friction"], REST, "What could be explained: nothing beyond chance (p = 0.43)."),
+        (
+            ["coulomb_friction"],
+            REST,
+            "What could explain the residual gap: nothing beyond chance (p = 0.43).",
+        ),
         (["coulomb_friction"], REST | {"significant": True}, ""),
         (
             ["buffeting"],
             REST | {"significant": True},
-            "What could be explained is not stated: beside a random moment",
+            "What could explain the residual gap: not stated, since any law",
         ),
         ([], REST, ""),
         (["unknown"], None, ""),
@@ -266,7 +270,7 @@ def test_the_table_names_every_kind(detent):
         text for kind, text in KINDS.items() if kind not in ("noise", "line")
     }
     words = closable_words(document | {"causes": ["unknown"], "decided": True})
-    assert f"of the gap could be explained by {closable_table(document).rows[0][0]}, measured on" in words
+    assert f"{closable_table(document).rows[0][0].capitalize()} could explain " in words
 
 
 def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):

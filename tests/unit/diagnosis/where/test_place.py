@@ -154,7 +154,7 @@ def test_runs_are_named_by_chance_no_oftener_than_stated():
         for _ in range(trials)
     )
     assert alarms <= binom.ppf(0.9999, trials, 0.05)
-    # a gap that is there is seen: twice the noise power in one band
+    # a gap that is there is seen: twice the noise variance in one band
     power = rng.chisquare(1.0, 600)
     power[(frequency > 1.0) & (frequency < 3.0)] *= 3.0
     assert RunExcess("r", frequency, power, 2.0, 0.0, 0.0).p_value() < 1e-3

@@ -35,10 +35,10 @@ def placed(given: Document, **changes: Any) -> str:
 
 def test_where_the_gap_is_says_runs_places_bands_and_reasons(given: Document) -> None:
     assert where_words(given) == (
-        "88 % of the gap is in 2 of 3 runs (alpha, gamma); 4.2 times as much power with the wind on as with it "
-        "off. Four fifths of it lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
+        "88 % of the gap is in 2 of 3 runs (alpha, gamma); its power is 4.2 times as large with the wind on. Four "
+        "fifths of the gap lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
         "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on "
-        "the damping: the damping shifts along the decay more than the frequency does. It is there with the wind "
+        "the damping: the damping shifts along the decay more than the frequency does. It appears with the wind "
         "on and off: the 2 wind-off runs, fitted alone, show it too. That agrees with quadratic damping."
     )
 
@@ -58,9 +58,9 @@ def test_the_runs_that_show_the_gap(given: Document) -> None:
 
 
 def test_only_what_locates_the_gap_is_said(given: Document) -> None:
-    assert "of it lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
+    assert "of the gap lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
     text = placed(given, narrow=[], bands={})
-    assert "of it lie" not in text
+    assert "of the gap lie" not in text
     assert "By frequency" not in text
 
 
@@ -139,16 +139,16 @@ def test_caveats_state_their_figures() -> None:
     few = {"kind": "few runs", "runs": 1, "driven": False, "windy": False}
     assert said(CAUTIONS, few).endswith("Add runs with other springs and release angles.")
     assert said(CAUTIONS, few).startswith(
-        "There is one run only: causes are distinguished by the form of the decay"
+        "There is one run only: the form of the decay alone distinguishes the causes."
     )
     assert said(CAUTIONS, few | {"runs": 2, "windy": True}).endswith(
         "springs, wind speeds and release angles."
     )
     assert said(CAUTIONS, few | {"driven": True}).endswith(
-        "form of the motion alone. Add runs with other inputs."
+        "form of the motion alone distinguishes the causes. Add runs with other inputs."
     )
     left_out = said(CAUTIONS, {"kind": "another mode", "ratio": 1.5, "runs": ["r1", "r3"]})
-    assert "1.5 times as fast as the same spring with the wind off or faster: r1, r3." in left_out
+    assert "at least 1.5 times as fast as the same spring with the wind off: r1, r3." in left_out
     differs = said(CAUTIONS, {"kind": "not confirmed", **FIGURES})
     assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in differs
     rates = said(CAUTIONS, {"kind": "not confirmed", **FIGURES}, "rad/s")
@@ -160,7 +160,7 @@ def test_remarks_on_the_noise_have_their_remedies() -> None:
     found = remark(folded)
     assert found.runs == ("a", "b")
     assert found.what.endswith("is above half the sample rate and appears at 40 to 60 Hz")
-    assert found.remedy == "sample faster to see it where it is"
+    assert found.remedy == "sample faster to see it at its true frequency"
 
 
 @pytest.mark.parametrize(
@@ -198,24 +198,23 @@ def test_the_note_on_the_coefficients(given: Document) -> None:
 
 def test_what_remains(given: Document) -> None:
     assert rest_words(given) == (
-        "Explained; the residual (0.00946° root mean square) changes Cnβ by less than 0.28 % and Cnr by less than "
-        "4.6 %."
+        "The residual (0.00946° root mean square) changes Cnβ by less than 0.28 % and Cnr by less than 4.6 %."
     )
     rest = given["rest"]
     large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
     assert rest_words(large).startswith(
-        "Not all is explained: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less than"
+        "Part of the gap remains: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less "
+        "than"
     )
-    assert rest_words(given | {"causes": ["unknown"]}).startswith("It is immaterial: it changes Cnβ by")
+    assert rest_words(given | {"causes": ["unknown"]}).startswith("The gap is immaterial: it changes Cnβ by")
     assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
     assert rest_words(calm) == (
-        "Explained; the residual is within the noise. Sensor drift is significant beside it and too small to be "
-        "named."
+        "The residual is within the noise. Sensor drift is significant, but too small to be named."
     )
     rest["moves"]["cn_r"]["material"] = True
     assert rest_words(given).startswith(
-        "Not all is explained: the residual (0.00946° root mean square) could change Cnr by 0."
+        "Part of the gap remains: the residual (0.00946° root mean square) could change Cnr by 0."
     )
     assert rest_words(given | {"rest": None}) == ""
 
@@ -234,7 +233,7 @@ def test_what_could_be_closed(given: Document) -> None:
     def text(**changes: Any) -> str:
         return closable_words(given | {"closable": CLOSABLE | changes})
 
-    first = "85.0 ± 2.0 % of the residual gap could be explained by a moment of the angle alone, measured on"
+    first = "A moment of the angle alone could explain 85.0 ± 2.0 % of the residual gap (measured on held-out"
     assert text().startswith(first)
     assert text().endswith("No other kind measured on runs would explain more than 31.0 %.")
     larger = [*CEILINGS[:2], CEILINGS[2] | {"closed": 0.97, "std": 0.01}]
@@ -242,7 +241,8 @@ def test_what_could_be_closed(given: Document) -> None:
     assert said_both.startswith(first)
     assert said_both.endswith(
         "A moment in time of each run would explain 97.0 ± 1.0 %, measured on short gaps. A law "
-        "common to all runs is preferred from four fifths of that share on, since it can be a property of the rig."
+        "common to all runs is preferred if it explains four fifths of that share or more, since it can be a "
+        "property of the rig."
     )
     table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})
     assert "at most" not in table.title
@@ -274,18 +274,20 @@ def test_what_could_be_closed(given: Document) -> None:
         "frequency_hz": 7.2, "frequency_std_hz": 0.0011, "amplitude": 2.4e-4, "amplitude_std": 1e-5, "unit": "rad",
         "false_alarm_rate": 0.01,
     }  # fmt: skip
-    assert "The line is at 7.2000 ± 0.0011 Hz, with an amplitude of 0.01375 ± 0.00057°" in text(line=line)
+    assert "The line is at 7.2000 ± 0.0011 Hz. Its amplitude is 0.01375 ± 0.00057°" in text(line=line)
     assert text(kind="noise").startswith(
-        "A smooth moment or error of the reading could explain no more than 89.0 % of the residual gap:"
+        "No smooth moment or error of the reading could explain more than 89.0 % of the residual gap:"
     )
     given["decided"] = False
-    assert " of the gap could be explained by" in text()
+    assert " % of the gap (measured" in text()
     assert closable_words(given | {"closable": None}) == ""
 
 
 def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
     found = sentences(given)
-    assert found.verdict.startswith("The gap (0.135° root mean square, 2.9 % of the swing)")
+    assert found.verdict.startswith(
+        "The gap is explained by either quadratic damping (91 %) or coulomb friction"
+    )
     assert found.rest in found.verdict
     assert found.where == where_words(given)
     assert found.noise == "the campaign states no noise"
@@ -299,7 +301,7 @@ def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None
     changed = given | {"provenance": {"settings": {"where.interval_share": 0.75, "words.runs_listed": 1}}}
     assert settings_of(changed).where.interval_share == 0.75
     text = where_words(changed)
-    assert "Three quarters of it lie between" in text
+    assert "Three quarters of the gap lie between" in text
     assert "in 2 of 3 runs;" in text
 
 

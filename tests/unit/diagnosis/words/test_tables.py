@@ -110,7 +110,7 @@ def test_the_gap_as_the_causes_are_added(given: Document) -> None:
 
 
 def both(excess: float) -> list[float]:
-    """A gap in degrees, by the noise of the document, and in noise powers."""
+    """A gap in degrees, by the noise of the document, and in noise variances."""
     return [np.degrees(4.5e-4) * np.sqrt(max(excess, 0.0)), excess]
 
 
@@ -187,7 +187,7 @@ def test_the_run_to_make(given: Document) -> None:
     assert len(rival_lines(given)) == 2
     assert len(rival_lines(given | {"next_run": None})) == 2
     close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
-    assert close[1].startswith("No run that can be set distinguishes these answers")
+    assert close[1].startswith("No possible run distinguishes these answers")
     assert "by 2.9 standard deviations" in close[1]
     assert rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
 
@@ -227,9 +227,9 @@ def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_tab
     after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
     line = coefficients_line(given)
     assert line == (
-        "± includes noise of the readings (most of that of Cnr), effects that could hide (most of that of Cnβ) and "
-        "other answers, by their probability. tunnel identify includes the noise, the scatter between runs and "
-        "what its model misses, so its ± may be far smaller or larger."
+        "± includes noise of the readings (most of the variance of Cnr), effects that could hide (most of the "
+        "variance of Cnβ) and other answers, weighted by probability. The ± of tunnel identify includes the noise, "
+        "the scatter between runs and the misfit of its model, so it may be far smaller or larger."
     )
     assert Paragraph(line) in printed(given)
     assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
@@ -239,9 +239,7 @@ def test_a_unit_of_this_field_is_explained_where_it_is_used(given: Document) -> 
     move = {"cn_beta": {"value": 0.1, "std": None, "unit": "1/rad"}}
     lag = {"effect": "unsteady_aero_lag", "size": {"value": 0.014, "std": None, "unit": "l/V"}, "moves": move}
     meant = "l/V: the time in which the air passes the reference length"
-    assert f"of up to 0.014 l/V ({meant}), which these runs do not exclude" in hidden_line(
-        given | {"hidden": [lag]}
-    )
+    assert f"of up to 0.014 l/V ({meant}). It would change" in hidden_line(given | {"hidden": [lag]})
     assert hidden_table(given | {"hidden": [lag]}).title == f"What could hide ({meant})"
 
 

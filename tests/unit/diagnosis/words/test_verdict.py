@@ -67,26 +67,26 @@ def said(*causes: str, **changes: Any) -> str:
 @pytest.mark.parametrize(
     ("held_out", "closed_on"),
     [
-        ((True, True), "on runs held out of the fit"),
+        ((True, True), "on held-out runs"),
         ((False,), "in the fitted runs (none could be held out)"),
     ],
 )
 def test_the_runs_of_the_closure_are_named(held_out, closed_on):
     found = gap(*held_out)
     assert found.closed_on == closed_on
-    assert f"closes {closed_on}. What remains is small." in said("coulomb_friction", size=found)
+    assert f"of the gap {closed_on}. What remains is small." in said("coulomb_friction", size=found)
 
 
 def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
     # 0.002 rad · √2 = 0.16206°, over 0.1 rad 2.8 %
-    words = "(0.162° root mean square, 2.8 % of the swing)"
-    assert f"The gap {words} is explained by" in said("coulomb_friction")
-    assert f"There is a gap {words}" in said("unknown")
+    words = "0.162° root mean square, 2.8 % of the swing"
+    assert f"The misfit of the nominal model is {words}." in said("coulomb_friction")
+    assert f"There is a gap ({words})" in said("unknown")
     found = gap(True).to_json_dict()["misfit"]
     assert found["before"] == pytest.approx(0.002 * 2.0**0.5)
     assert found["after"] == pytest.approx(0.002 * 0.1**0.5)
     rates = replace(gap(True), misfit=Misfit(0.01, 0.5, "rad/s"))
-    assert "(0.810 °/s root mean square, 2.8 % of the swing" in said("coulomb_friction", size=rates)
+    assert "is 0.810 °/s root mean square, 2.8 % of the swing" in said("coulomb_friction", size=rates)
 
 
 @pytest.mark.parametrize("excess", [0.15, 2.754, 9.994, 22.401, 1.91e6])
@@ -99,8 +99,8 @@ def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
     before, _, closed, probability = key_figures(given | {"candidates": [{"probability": 0.9}]})
     assert f"{before.value} root mean square, " in words
     assert before.note.split("; ")[1] in words
-    assert "times the noise power" not in words
-    assert f"{closed.value} of the gap closes" in words
+    assert "times the noise variance" not in words
+    assert f"{closed.value} of the gap" in words
     assert f"(probability {probability.value})" in words
 
 
@@ -122,15 +122,15 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     found = gap(False, False, False)
     given = document()
     given["verdict"] = said("quadratic_damping", size=found)
-    given["waterfall_on"] = "on stretches of time held out of the fit"
+    given["waterfall_on"] = "on held-out stretches of time"
     given["gap"] |= {"closed_on": found.closed_on}
     for run in given["gap"]["runs"]:
         run["held_out"] = False
     notes = [fact.note for fact in key_figures(given)]
     assert notes.count(found.closed_on) == 1
-    assert not any("on runs held out" in note for note in notes)
+    assert not any("on held-out runs" in note for note in notes)
     page = render_report(given, campaign())
-    assert "on runs held out" not in page
+    assert "on held-out runs" not in page
     assert "run held out" not in page
     table = runs_table(given).without_detail()
     assert table.columns == ("run", "before", "after")
@@ -138,11 +138,14 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
 
 def test_every_cause_of_several_is_named_with_what_it_acts_on():
     text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
-    assert "by coulomb friction, cubic stiffness and mains hum (probability 90 %)" in text
-    for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
+    assert "Coulomb friction, cubic stiffness and mains hum explain the gap (probability 90 %)" in text
+    for words in (
+        "Coulomb friction acts on the damping; cubic stiffness acts on the restoring moment; ",
+        "mains hum acts on the sensor reading.",
+    ):
         assert words in text
-    assert "With them added" in text
-    assert "With it added" in said("coulomb_friction")
+    assert "They explain 95.0 % of the gap" in text
+    assert "It explains 95.0 % of the gap" in said("coulomb_friction")
 
 
 @pytest.mark.parametrize("cause", ["coulomb_friction", "nonlinear_yaw_moment"])
@@ -154,8 +157,8 @@ def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
 
 def test_what_remains_and_is_material_is_said_in_the_first_sentence():
     first = said("coulomb_friction", material=True).partition(". ")[0]
-    assert "only in part by coulomb friction" in first
-    assert "in part" not in said("coulomb_friction")
+    assert "Coulomb friction explains part of the gap" in first
+    assert "part of the gap" not in said("coulomb_friction")
     given = document()
     given["ambiguous_with"] = []
     assert headline(given) == ("quadratic damping", "found")
@@ -174,12 +177,12 @@ UNDECIDED = (
 def test_below_one_half_no_set_is_named_as_the_cause():
     causes = ("coulomb_friction", "gravity_stiffness")
     text = said(*causes, answers=UNDECIDED)
-    assert "its cause is undecided" in text
-    assert "is explained" not in text
+    assert "Its cause is undecided" in text
+    assert "explain the gap" not in text
     assert "The likely answers contain coulomb friction (93 %)." in text
     assert "coulomb friction and gravity stiffness (35 %), " in text
-    assert "with probability 93 % together" in text
-    assert "is explained by" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
+    assert "with a total probability of 93 %" in text
+    assert "explain the gap" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
 
 
 def test_of_many_likely_answers_five_are_said_and_the_others_counted():
@@ -221,7 +224,7 @@ def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
     answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
     found = decision(answers, Settings().answer, closed)
     assert found.decided is decided
-    said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
+    said_so = "Free play fits best, but does not predict held-out readings." in undecided_words(
         found.to_json_dict()
     )
     assert said_so is not decided
@@ -287,9 +290,12 @@ NEARLY = {
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({}, " (probability 30 %): too little to name it."),
-        ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (20 %)."),
-        ({"noisy": True}, " of it, but the noise misbehaves and may explain so small a gap."),
+        ({}, " (probability 30 %), which is too little to name it."),
+        (
+            {"rival": ["coulomb_friction"], "rival_probability": 0.2},
+            ", and coulomb friction explains as much (20 %).",
+        ),
+        ({"noisy": True}, " of the gap, but irregular noise may explain a gap this small."),
         (
             {"misfit": ["zero", "harmonics"]},
             ", but leaves a significant misfit of the zero and the harmonics.",
@@ -298,9 +304,9 @@ NEARLY = {
 )
 def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(changes, words):
     text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
-    assert "no effect is named as its cause. Quadratic damping would explain 99.6 % of it" in text
+    assert "No effect is named as its cause. Quadratic damping would explain 99.6 % of the gap" in text
     assert words in text
-    assert "no effect of the vocabulary explains it (tunnel effects lists them)" in said("unknown")
+    assert "No known effect explains it (tunnel effects lists them)" in said("unknown")
 
 
 OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
@@ -329,14 +335,14 @@ def test_a_second_mode_of_every_run_is_said_before_the_gap():
     main = {"amplitude_rad": 0.3, "frequency_hz": 2.2, "decay_per_s": 0.1}
     second = {"amplitude_rad": 0.02, "frequency_hz": 2.9, "decay_per_s": 0.2}
     mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
-    said_of_it = "contains a second mode: 1.1° at 2.9 Hz, which decays at 0.2 1/s, beside 17° at 2.2 Hz"
+    said_of_it = "contains a second mode: 1.1° at 2.9 Hz, decaying at 0.2 1/s. The main mode is 17° at 2.2 Hz"
     alone = said("unknown", second_modes=[mode])
     assert alone.startswith("There is a gap")
     assert f"swing {said_of_it}" in alone
     runs = [run["id"] for run in answer_of("unknown")["gap"]["runs"]]
     text = said("unknown", second_modes=[mode | {"run": run} for run in runs])
     assert text.startswith(f"{runs[0]} {said_of_it}")
-    assert "falls by 98 %" in text
+    assert "explains 98 %" in text
 
 
 def test_runs_in_limit_cycles_have_a_verdict_of_their_own():
@@ -402,7 +408,7 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         "or gravity stiffness (40 %)"
     )
     assert headline(one) == (words, "open")
-    assert f" of the swing) is explained by {words}. They act on the damping" in verdict(one, "")
+    assert f"The gap is explained by {words}. The misfit" in verdict(one, "")
     assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
     springs = (
@@ -413,9 +419,7 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         headline(one)[0]
         == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
     )
-    said_once = (
-        "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). They act on the"
-    )
+    said_once = "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). The misfit"
     assert said_once in verdict(one, "")
     one["candidates"][2:] = [
         {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},
@@ -466,8 +470,8 @@ def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str,
 def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
     given = of_model(0.03, "inertia", "damping")
     assert verdict(given, "").endswith(
-        "arm.xml as given does not fit: joint armature is 0.0100 kg m² there, and the runs say 0.03000 ± 0.00020 "
-        "kg m²."
+        "arm.xml does not fit: joint armature is 0.0100 kg m² in the file and 0.03000 ± 0.00020 kg m² by the "
+        "runs."
     )
     assert next_steps(given)[0] == ("Correct these values in arm.xml; --patch FILE writes a model with them.")
     for fits in (

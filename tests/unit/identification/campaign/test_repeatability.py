@@ -105,8 +105,8 @@ def test_the_repeatability_is_printed_and_goes_through_json(scattered):
     document = estimate.to_json_dict()
     (line,) = repeatability_lines(document)
     assert line.startswith("Between runs: frequency differs by 0.0")
-    assert "as if by chance, wind speed by" in line
-    assert line.endswith("The intervals include it; tunnel diagnose tells chance from a cause.")
+    assert "attributed to chance, wind speed by" in line
+    assert line.endswith("The intervals include it; tunnel diagnose distinguishes chance from a cause.")
     assert line in " ".join(str(estimate).split())
     again = Estimate.from_json_dict(document)
     assert again.repeatability == estimate.repeatability

@@ -32,7 +32,7 @@ def test_a_long_rest_beside_the_centre_is_cut_off_and_said():
     data, moved = ending_beside(30.0)
     kept, (remark,) = without_rest(data)
     assert (remark.outcome, remark.runs) == (Outcome.CUT, ("a",))
-    assert "beside the centre" in remark.what
+    assert "from the centre of the motion" in remark.what
     assert kept.runs[0].record.duration == pytest.approx(moved + 3.0 * 2.0 * np.pi / OMEGA, abs=0.3)
     assert abs(identify(data).runs[0].sensor_zero.value - 0.1) < 0.002
 

@@ -65,7 +65,7 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
         session = Session(served.folder, "img_src_x_onerror_alert_1")
         assert [path.name for path in session.uploads.iterdir()] == ["img_src_x_onerror_alert_1_.csv"]
         page.set_viewport_size({"width": 390, "height": 900})
-        page.get_by_text("What the files do not say").click()
+        page.get_by_text("Missing information and corrections").click()
         page.get_by_label("Conditions in the file names").wait_for()
         page.wait_for_function(SETTLED, polling=300)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -112,7 +112,7 @@ def test_a_resting_angle_is_dragged_and_typed(browser: Any, served: Bench, tmp_p
         assert read_recipe(session.choices).stretches[0].rest == pytest.approx(0.2, abs=0.1)
         page.get_by_text("Resting angles as numbers").click()
         field = page.get_by_label("Rest of hung, to be subtracted [rad]")
-        for text, words in (("9", "never passes the stated rest of 9 rad"), ("0.05", "rest, 0.05 rad, is")):
+        for text, words in (("9", "do not include the stated rest of 9 rad"), ("0.05", "rest, 0.05 rad, is")):
             field.fill(text)
             field.press("Enter")
             page.wait_for_selector(f"text={words}")
@@ -196,7 +196,7 @@ def test_the_next_run_is_proposed_and_can_be_kept(browser: Any, served: Bench) -
         assert "spring_stiffness = 81.5" in Path(found.value.path()).read_text()
         write_json(session.diagnosis, read_json(session.diagnosis, remedy="") | {"next_run": NEAR})
         one.open("/next/next-run")
-        one.page.wait_for_selector("text=No run that can be set distinguishes these answers")
+        one.page.wait_for_selector("text=No possible run distinguishes these answers")
         assert one.page.locator("button:has-text('Download the plan')").count() == 0
 
 

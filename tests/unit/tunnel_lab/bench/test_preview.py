@@ -73,7 +73,7 @@ def test_a_moved_rest_is_subtracted_also_by_the_command_and_can_be_taken_back(se
     preview.move(session, mark, {"rest": None})
     assert preview.drawn(preview.read(session)[0])[0].marks[0].rest == mark.rest
     preview.move(session, mark, {"rest": 3.0})
-    with pytest.raises(TunnelError, match="never passes the stated rest of 3 rad"):
+    with pytest.raises(TunnelError, match="do not include the stated rest of 3 rad"):
         preview.read(session)
 
 

@@ -76,9 +76,9 @@ def test_gap_answer_parameters_and_coefficients_stand_side_by_side(
     gap, parameters, coefficients, changes = tables(out).values()
     gaps = {row["quantity"]: (row["before"], row["after"]) for row in gap}
     # ± the noise of three runs: √(0.021² + 0.019² + 0.017²) / 3 = 0.011
-    assert gaps["gap [× noise power]"] == ("27.350 ± 0.011", 0.0123)
-    assert gaps["residual gap [× noise power]"] == ("0.123 ± 0.011", "–")
-    assert gaps["share closed"] == ("98.8 %", "–")
+    assert gaps["gap [× noise variance]"] == ("27.350 ± 0.011", 0.0123)
+    assert gaps["residual gap [× noise variance]"] == ("0.123 ± 0.011", "–")
+    assert gaps["share explained"] == ("98.8 %", "–")
     assert gaps["causes"] == ("quadratic_damping", "none")
     assert gaps["or instead"] == ("coulomb_friction", "–")
     assert gaps["probability"] == ("91 %", "99 %")

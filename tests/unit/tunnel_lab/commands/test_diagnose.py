@@ -103,7 +103,7 @@ def test_no_gap_is_an_answer_and_no_failure(tunnel: Tunnel, gap_free: Path) -> N
     status, out, _ = tunnel("diagnose", gap_free)
     assert status == 0
     assert out.startswith("No gap")
-    assert "Gap (× noise power)" not in out
+    assert "Gap (× noise variance)" not in out
 
 
 @pytest.mark.slow
@@ -171,8 +171,8 @@ def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_predictio
     assert not any(run["held_out"] for run in document["gap"]["runs"])
     assert document["gap"]["closed_on"] in document["verdict"]
     for text in (out, document["verdict"], page.read_text(encoding="utf-8")):
-        assert "on stretches of time held out of the fit" in text
-        assert "on runs held out" not in text
+        assert "on held-out stretches of time" in text
+        assert "on held-out runs" not in text
         assert "with the wind on and off" not in text
 
 
@@ -199,7 +199,7 @@ def test_noise_far_above_the_stated_is_said(tunnel: Tunnel, tmp_path: Path) -> N
     data = campaign(settings, duration=5.0, rate=500.0, noise=0.01, stated_noise=0.0005, rng=rng)
     status, out, _ = tunnel("diagnose", write_campaign(data, tmp_path / "noisy"), "--effects", "sensor_drift")
     assert status == 0
-    assert "times what noise_std and resolution state" in out
+    assert "times the level that noise_std and resolution state" in out
 
 
 @pytest.mark.parametrize("stated", [0.0, None])

@@ -107,7 +107,7 @@ def test_a_check_states_every_law_and_fails_where_one_is_violated(
     monkeypatch.setenv("COLUMNS", "200")
     status, out, _ = tunnel("effects", "check", "detent", "--effects-file", effects_file)
     assert (status, out.count("obeyed: "), out.count("violated: ")) == (0, 9, 0)
-    assert "Cosine of that with the nearest effects: free_play 0." in out
+    assert "Cosine of this part with the nearest effects: free_play 0." in out
     status, out, _ = tunnel("effects", "check", "unsteady_aero_lag")
     assert (status, out.count("violated: ")) == (1, 1)
     for words in (("check",), ("detent", "gain"), ("check", "nothing")):

@@ -62,7 +62,7 @@ def test_a_preview_writes_the_picture_alone(tunnel: Tunnel, tmp_path: Path) -> N
         (["--out", "rig", "--set", "speed=1"], "unknown key 'speed'"),
         (["--out", "rig", "--recipe", "none.toml"], "no such file"),
         (["--out", "rig", "--rate", "0"], "'rate' = 0.0"),
-        (["--out", "rig", "--rest", "20"], "run 'log': never passes the stated rest of 20 rad"),
+        (["--out", "rig", "--rest", "20"], "do not include the stated rest of 20 rad"),
     ],
 )
 def test_bad_options_leave_nothing(
@@ -132,7 +132,7 @@ def test_times_of_notes_table_and_picture_are_those_that_start_takes(
     path = held_and_released(tmp_path, first=100.0)
     status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
     assert status == 0
-    assert "times here are the file's, whose first sample is at 100 s" in said
+    assert "the times stated here are the times of the file, which starts at 100 s" in said
     (begins,) = re.findall(r"begins at (\S+) s", said)
     assert float(begins) == pytest.approx(104.0, abs=0.02)  # where the body was let go
     assert drawn == pytest.approx([float(begins)])

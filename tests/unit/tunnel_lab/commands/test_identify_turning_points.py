@@ -61,8 +61,8 @@ def test_other_commands_say_what_can_be_done(
     rest = ("--out", "rig", "--yes") if command == "import" else ()
     status, out, err = tunnel(command, path, *rest)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "holds 60 turning points" in err
-    assert "tunnel identify FILE gives ωn and ζ" in err
+    assert "contains 60 turning points" in err
+    assert "use tunnel identify FILE for ωn and ζ" in err
     assert [one.name for one in tmp_path.iterdir()] == ["peaks.txt"]
 
 

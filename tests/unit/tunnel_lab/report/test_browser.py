@@ -171,7 +171,7 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened: Opened) -> None
 
 def test_without_scripts_the_drawn_figures_are_shown(browser: Any, report: Path) -> None:
     tab = Opened(browser, report, 1200, java_script_enabled=False)
-    tab.page.click("text=How far the gap closes, run by run")
+    tab.page.click("text=How much of the gap is explained, run by run")
     assert tab.page.is_visible('figure[data-figure="fit"] svg')
     assert not tab.page.is_visible("#theme")
     tab.context.close()

@@ -180,13 +180,13 @@ def test_figures_have_words_for_those_who_cannot_see_them(page):
 
 def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, document, written):
     text = Page(page).text
-    assert "What could be explained: A moment." in text
+    assert "What could explain the residual gap: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
     assert "not determined" in text  # worse than nothing, and beyond any meaning
     explained = document | {"closable": None, "maps": None}
-    assert "What could be explained" not in written(explained)
+    assert "What could explain the residual gap:" not in written(explained)
     page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
-    assert "What could be explained: nothing beyond chance (p = 0.43)." in Page(page).text
+    assert "What could explain the residual gap: nothing beyond chance (p = 0.43)." in Page(page).text
     assert "kind of law" not in page
 
 
@@ -194,14 +194,14 @@ MODEL = {
     "file": "rig.xml", "joint": "yaw", "free": ["inertia", "damping"], "rest_rad": 0.0, "zero_rad": 0.0123,
     "written": [{"name": "joint frictionloss", "before": [0.0], "after": [0.00456], "unit": "N m"}],
     "notes": ["frictionloss is a soft constraint."],
-    "closed": 0.947, "closed_by_fit": 0.968, "closed_on": "on runs held out of the fit",
+    "closed": 0.947, "closed_by_fit": 0.968, "closed_on": "on held-out runs",
 }  # fmt: skip
 
 
 def test_the_patched_model_and_its_closure_are_on_the_page(document, written):
     given = document | {"model": MODEL, "maps": None}
     text = Page(written(given, Byline(patch="out.xml"))).text
-    assert "closes 94.7 % of the gap on runs held out of the fit; the fit itself 96.8 %." in text
+    assert "explains 94.7 % of the gap on held-out runs; the fit itself explains 96.8 %." in text
     assert "The model is written to out.xml." in text
     assert "The reading is the position of yaw + 0.705°." in text
     assert "Changes to rig.xml" in text
@@ -274,7 +274,7 @@ def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
     assert "deviates far beyond the others" in page
     found = document["repeatability"]
     page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
-    assert "<p>Repeatability: the runs repeat; no scatter of their frequency or damping shows.</p>" in page
+    assert "<p>Repeatability: the runs repeat, without scatter of frequency or damping.</p>" in page
     assert 'data-figure="repeatability"' not in page
     assert "How the runs repeat" not in written(document | {"repeatability": None})
 

@@ -119,5 +119,5 @@ def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
     # of small ones, linear theory tells no delay from a lag
-    assert found.fault == "it moves the rig as actuator_lag does"
+    assert found.fault == "it has the same influence on the motion as actuator_lag"
     assert "12 simulated driven runs" in found.lines()[0]

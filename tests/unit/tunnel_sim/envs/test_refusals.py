@@ -32,7 +32,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
         ({"noise_std": 1e-7, "resolution": 0.0}, ["below 1e-06 rad"]),
         ({"effect_probability": 1.5}, ["probability"]),
         ({"prior": {"cn_bta": 0.1}}, ["did you mean 'cn_beta'"]),
-        ({"prior": {"cn_r": 0.0}}, ["cn_r = 0.0: known exactly", "nothing to learn", "above 0, in 1/rad"]),
+        (
+            {"prior": {"cn_r": 0.0}},
+            ["cn_r = 0.0: the value is known exactly", "nothing to learn", "above 0, in 1/rad"],
+        ),
         ({"prior": {"release_angle": -0.1}}, ["release_angle = -0.1", "in rad"]),
         ({"prior": 5}, ["FreeDecay-v0: prior = 5 is not a mapping", "give values by name"]),
         ({"rig_file": "nowhere.toml"}, ["FreeDecay-v0, rig_file, nowhere.toml", "no such file"]),

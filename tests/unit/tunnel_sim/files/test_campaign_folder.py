@@ -306,7 +306,7 @@ def test_what_is_not_a_campaign_is_never_deleted(tmp_path: Path, stranger: str) 
         (tmp_path / stranger).parent.mkdir(exist_ok=True)
         (tmp_path / stranger).write_text("mine")
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(TunnelError, match=r"does not contain a campaign|holds more than a campaign"):
+    with pytest.raises(TunnelError, match=r"does not contain a campaign|contains more than a campaign"):
         write_campaign(campaign(), folder, overwrite=True)
     assert sorted(tmp_path.rglob("*")) == before
 

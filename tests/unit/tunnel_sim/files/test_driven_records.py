@@ -65,7 +65,7 @@ CLIPPED = np.clip(INPUT, -0.6, 0.6)
 BAD = {
     "length": (Drive("moment_nm", INPUT[:-1]), "999 samples, the record 1000"),
     "constant": (Drive("drive", np.full(TIME.size, 3.0)), "is constant"),
-    "itself": (Drive("drive", -4.0 * RESPONSE + 1.0), "is the response itself"),
+    "itself": (Drive("drive", -4.0 * RESPONSE + 1.0), "is proportional to the response"),
     "saturates": (Drive("moment_nm", CLIPPED), "saturates"),
     "nan": (Drive("moment_nm", np.where(TIME[5] == TIME, np.nan, INPUT)), "NaN"),
 }
@@ -110,7 +110,7 @@ def edited(tmp_path: Path, old: str, new: str, file: str = "campaign.toml") -> P
             'drive_hold = "linear"',
             "drive_gain = 2.0",
             "campaign.toml",
-            "drive_gain = 2 of the column moment_nm",
+            "drive_gain = 2 with the column moment_nm",
         ),
         ("release_angle", "drive_gain = 1.0\nrelease_angle", "campaign.toml", "without an input column"),
         ("moment_nm", "drive,base_rad", "runs/driven.csv", "2 input columns"),

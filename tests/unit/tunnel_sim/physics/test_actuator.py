@@ -259,7 +259,7 @@ def test_a_plan_whose_drive_moves_the_root_refuses_them_in_one_line() -> None:
         conditions=tuple(replace(one, drive=drive) for one in plan.conditions),
         effects=(EffectSetting("actuator_lag", {"lag": 0.01}),),
     )
-    with pytest.raises(TunnelError, match="here the drive moves the spring's root") as caught:
+    with pytest.raises(TunnelError, match="this drive moves the spring's root") as caught:
         plan_effects(plan)
     assert "\n" not in str(caught.value)
 

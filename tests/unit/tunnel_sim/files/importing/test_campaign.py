@@ -159,7 +159,7 @@ def test_conditions_from_file_names(tmp_path: Path) -> None:
 
 
 def test_the_wind_is_not_guessed(tmp_path: Path) -> None:
-    with pytest.raises(TunnelError, match=r"name says that the wind is on.*--set wind_speed"):
+    with pytest.raises(TunnelError, match=r"name states that the wind is on.*--set wind_speed"):
         read_records([csv(tmp_path, "wind_on_1.csv")])
     for given in ({"spring_stiffness": 16.0}, {"reference_length": 0.6}):
         with pytest.raises(TunnelError, match=r"wind-on \(12 m/s\) without air_density.*--set air_density"):
