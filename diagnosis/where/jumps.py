@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
@@ -94,7 +95,7 @@ class _Oscillation:
         size = np.exp(np.where(inside, self.size[rows] - mean[:, None], 0.0))
         cos, sin = size * np.cos(phase), size * np.sin(phase)
         columns = [np.ones_like(since), since, cos, -sin, cos * since, -sin * since, self.reading[rows]]
-        triangle = np.linalg.qr(np.stack(columns, axis=-1) * inside[..., None], mode="r")
+        triangle = _triangle(np.stack(columns, axis=-1) * inside[..., None])
         found = np.linalg.pinv(triangle[:, :6, :6]) @ triangle[:, :6, 6:]
         own = found[:, 2, 0] + 1j * found[:, 3, 0]
         amplitude, phases = np.abs(own), np.angle(own)
@@ -134,7 +135,9 @@ class _Oscillation:
         return np.stack([*columns, self.reading[rows]], axis=-1) * inside[..., None], inside.sum(axis=1)
 
 
-def _windows(cycles: Array, centres: Array, half: float, fewest: int) -> tuple[Array, Array]:
+def _windows(
+    cycles: Array, centres: Array, half: float, fewest: int
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """The rows within half a width of centres, and which of them are: the others fill up to the longest window.
 
     Args:
@@ -176,10 +179,15 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
     return Jumps(run.id, np.interp(instants, cycles, motion.time), scaled, chance)
 
 
+def _triangle(columns: Array) -> Array:
+    """R of the QR decomposition of each matrix of a stack, shape (m, rows, n)."""
+    return np.asarray(np.linalg.qr(columns, mode="r"))
+
+
 def _compared(motion: _Oscillation, instants: Array) -> Array:
     """By instant, the drop of χ², the residual χ² per degree of freedom, and these degrees, shape (3, m)."""
     columns, count = motion.around(instants)
     # the last column in the orthonormal basis of the columns before it
-    reading = np.linalg.qr(columns, mode="r")[..., -1] ** 2
+    reading = _triangle(columns)[..., -1] ** 2
     freedom = np.maximum(count - _COLUMNS + 1.0, 1.0)
     return np.stack([reading[:, -3] + reading[:, -2], reading[:, -1] / freedom, freedom])
