@@ -8,11 +8,11 @@ well. No model of the rig is needed, so a large gap from any cause does not hide
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
@@ -25,6 +25,8 @@ _APART = 0.25  # cycles between the instants
 _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
 _ROUNDS = 3  # of finding that change, each from the previous one
+_COLUMNS = 23  # of `_Oscillation.around`
+_AT_ONCE = 200  # instants, which bounds the memory
 _CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
 _QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
 
@@ -84,48 +86,68 @@ class _Oscillation:
     def _followed(self, order: int) -> _Oscillation:
         """With phase and amplitude that follow the reading, as polynomials of time."""
         cycles = self.cycles
-        places, sizes, phases, amplitudes = [], [], [], []
-        for centre in np.arange(0.5, cycles[-1] - 0.4, 0.5):
-            inside = np.abs(cycles - centre) <= 1.0
-            mean, since = float(self.size[inside].mean()), cycles[inside] - centre
-            wave = np.exp(self.size[inside] - mean + 1j * self.phase[inside])
-            columns = np.column_stack(
-                [np.ones(since.size), since, wave.real, -wave.imag, wave.real * since, -wave.imag * since]
-            )
-            found = np.linalg.lstsq(columns, self.reading[inside], rcond=None)[0]
-            own = complex(found[2], found[3])
-            places.append(centre)
-            amplitudes.append(abs(own))
-            sizes.append(np.log(max(abs(own), 1e-300)) - mean)
-            phases.append(np.angle(own))
-        amplitude = np.array(amplitudes)
+        places = np.arange(0.5, cycles[-1] - 0.4, 0.5)
+        if places.size == 0:
+            return self
+        rows, inside = _windows(cycles, places, 1.0, 6)
+        mean = np.sum(self.size[rows] * inside, axis=1) / np.maximum(inside.sum(axis=1), 1)
+        since, phase = cycles[rows] - places[:, None], self.phase[rows]
+        size = np.exp(np.where(inside, self.size[rows] - mean[:, None], 0.0))
+        cos, sin = size * np.cos(phase), size * np.sin(phase)
+        columns = [np.ones_like(since), since, cos, -sin, cos * since, -sin * since, self.reading[rows]]
+        triangle = _triangle(np.stack(columns, axis=-1) * inside[..., None])
+        found = np.linalg.pinv(triangle[:, :6, :6]) @ triangle[:, :6, 6:]
+        own = found[:, 2, 0] + 1j * found[:, 3, 0]
+        amplitude, phases = np.abs(own), np.angle(own)
+        sizes = np.log(np.maximum(amplitude, 1e-300)) - mean
         clear = amplitude > max(_CLEAR, 0.01 * amplitude.max(initial=0.0))
         if np.count_nonzero(clear) < 3 * order:
             return self
         weights = np.minimum(amplitude[clear] / amplitude[clear].max(), 0.3)
-        at = 2.0 * np.array(places)[clear] / cycles[-1] - 1.0
+        at = 2.0 * places[clear] / cycles[-1] - 1.0
         everywhere = np.clip(2.0 * cycles / cycles[-1] - 1.0, -1.0, at[-1])
         change = [
             chebyshev.chebval(everywhere, chebyshev.chebfit(at, values, order, w=weights))
-            for values in (np.unwrap(np.array(phases)[clear]), np.array(sizes)[clear])
+            for values in (np.unwrap(phases[clear]), sizes[clear])
         ]
         return _Oscillation(self.time, self.reading, self.phase + change[0], self.size + change[1])
 
-    def around(self, instant: float) -> tuple[Array, Array, Array]:
-        """The rows around an instant (cycles), their smooth harmonics, and the jump, in columns."""
-        inside = np.flatnonzero(np.abs(self.cycles - instant) <= _HALF)
-        since, phase = (self.cycles[inside] - instant) / _HALF, self.phase[inside]
-        size = np.exp(self.size[inside] - self.size[inside].mean())
-        smooth, waves = [np.ones(since.size), since], [size * np.cos(phase), size * np.sin(phase)]
+    def around(self, instants: Array) -> tuple[Array, Array]:
+        """Around instants (cycles) the smooth harmonics, the jump and the reading, in columns.
+
+        Returns:
+            The columns, shape (m, rows, n), with rows of zeros after the last one of an instant, and the number of
+            rows of every instant, shape (m,).
+        """
+        rows, inside = _windows(self.cycles, instants, _HALF, _COLUMNS)
+        since, phase = (self.cycles[rows] - instants[:, None]) / _HALF, self.phase[rows]
+        size = np.exp(self.size[rows] - self.size[rows[:, :1]])
+        waves = [size * np.cos(phase), size * np.sin(phase)]
+        columns = [np.ones_like(since), since]
         for wave in waves:
-            smooth += [wave * since**power for power in range(4)]
-            smooth.append(wave * np.maximum(since, 0.0))
+            columns += [wave * since**power for power in range(4)]
+            columns.append(wave * np.maximum(since, 0.0))
         for harmonic in (2, 3):
             for turn in (np.cos, np.sin):
                 wave = size**harmonic * turn(harmonic * phase)
-                smooth += [wave, wave * since]
-        jump = np.column_stack(waves) * (since > 0.0)[:, None]
-        return self.reading[inside], np.column_stack(smooth), jump
+                columns += [wave, wave * since]
+        columns += [wave * (since > 0.0) for wave in waves]
+        return np.stack([*columns, self.reading[rows]], axis=-1) * inside[..., None], inside.sum(axis=1)
+
+
+def _windows(
+    cycles: Array, centres: Array, half: float, fewest: int
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """The rows within half a width of centres, and which of them are: the others fill up to the longest window.
+
+    Args:
+        fewest: rows of a window.
+    """
+    order = np.argsort(cycles, kind="stable")
+    first = np.searchsorted(cycles, centres - half, sorter=order)
+    count = np.searchsorted(cycles, centres + half, side="right", sorter=order) - first
+    place = np.arange(max(fewest, int(count.max())))
+    return order[np.minimum(first[:, None] + place, cycles.size - 1)], place < count[:, None]
 
 
 def jumps(fit: Fit) -> list[Jumps]:
@@ -148,7 +170,8 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
     if not cycles[-1] > _FEWEST or not np.all(np.diff(cycles) > 0.0):
         return None
     instants = np.arange(_HALF, cycles[-1] - _HALF, _APART)
-    drop, left, freedom = np.array(list(_compared(motion, instants))).T
+    parts = np.array_split(instants, 1 + instants.size // _AT_ONCE)
+    drop, left, freedom = np.concatenate([_compared(motion, part) for part in parts], axis=1)
     everywhere = float(np.quantile(drop, 0.25)) / _QUARTILE
     scaled = drop / np.maximum(np.maximum(left, everywhere), 1.0)
     # the tail of F with two degrees of freedom
@@ -156,13 +179,15 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
     return Jumps(run.id, np.interp(instants, cycles, motion.time), scaled, chance)
 
 
-def _compared(motion: _Oscillation, instants: Array) -> Iterator[tuple[float, float, float]]:
-    """By instant, the drop of χ², the residual χ² per degree of freedom, and these degrees."""
-    for instant in instants:
-        reading, smooth, jump = motion.around(float(instant))
-        basis = np.linalg.qr(smooth)[0]
-        rest = reading - basis @ (basis.T @ reading)
-        own = np.linalg.qr(jump - basis @ (basis.T @ jump))[0]
-        drop = float(np.sum((own.T @ rest) ** 2))
-        freedom = float(max(reading.size - smooth.shape[1] - 2, 1))
-        yield drop, (float(rest @ rest) - drop) / freedom, freedom
+def _triangle(columns: Array) -> Array:
+    """R of the QR decomposition of each matrix of a stack, shape (m, rows, n)."""
+    return np.asarray(np.linalg.qr(columns, mode="r"))
+
+
+def _compared(motion: _Oscillation, instants: Array) -> Array:
+    """By instant, the drop of χ², the residual χ² per degree of freedom, and these degrees, shape (3, m)."""
+    columns, count = motion.around(instants)
+    # the last column in the orthonormal basis of the columns before it
+    reading = _triangle(columns)[..., -1] ** 2
+    freedom = np.maximum(count - _COLUMNS + 1.0, 1.0)
+    return np.stack([reading[:, -3] + reading[:, -2], reading[:, -1] / freedom, freedom])

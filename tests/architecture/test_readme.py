@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import shlex
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tunnel_lab.cli import main
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -34,16 +38,14 @@ def toml_block(key: str) -> str:
 def output_of(command: str, folder: Path) -> list[str]:
     program, *arguments = shlex.split(command)
     assert program == "tunnel"
-    done = subprocess.run(
-        [sys.executable, "-m", "tunnel_lab.cli", *arguments],
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setenv("COLUMNS", "80")
+        patch.setenv("NO_COLOR", "1")
+        patch.chdir(folder)
+        status = main(arguments)
+    assert status == 0, err.getvalue()
+    return out.getvalue().splitlines()
 
 
 def script_output(script: str, folder: Path) -> str:

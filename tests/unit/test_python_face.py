@@ -30,6 +30,11 @@ def data() -> Campaign:
 
 
 @pytest.fixture(scope="module")
+def estimate(data: Campaign) -> Estimate:
+    return identify(data)
+
+
+@pytest.fixture(scope="module")
 def found(data: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
     folder = tmp_path_factory.mktemp("face") / "small"
     write_campaign(data, folder)
@@ -38,11 +43,11 @@ def found(data: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Diagnosis
 
 @pytest.mark.parametrize("given", [str, slow(Path), lambda folder: folder / "campaign.toml"])
 def test_identify_takes_a_folder_and_a_campaign_alike(
-    data: Campaign, tmp_path: Path, given: Callable[[Path], str | Path]
+    data: Campaign, estimate: Estimate, tmp_path: Path, given: Callable[[Path], str | Path]
 ) -> None:
     write_campaign(data, tmp_path / "small")
     there = identify(given(tmp_path / "small"))
-    assert there.to_json_dict() == identify(data).to_json_dict()
+    assert there.to_json_dict() == estimate.to_json_dict()
 
 
 def test_a_file_of_a_logger_is_a_campaign_too(data: Campaign, tmp_path: Path) -> None:
@@ -60,8 +65,9 @@ def test_diagnose_takes_a_folder(found: Diagnosis) -> None:
     assert [run.id for run in found.data.runs] == [run.id for run in found.gap.runs]
 
 
-def test_everything_is_represented_in_three_lines(data: Campaign, found: Diagnosis) -> None:
-    estimate = identify(data)
+def test_everything_is_represented_in_three_lines(
+    data: Campaign, estimate: Estimate, found: Diagnosis
+) -> None:
     for one in (data, data.runs[0].record, estimate, found):
         lines = repr(one).splitlines()
         assert len(lines) == 3, lines
@@ -92,8 +98,8 @@ def test_the_answer_is_one_table(found: Diagnosis) -> None:
             assert (rows[part, quantity]["value"], rows[part, quantity]["std"]) == (value.value, value.std)
 
 
-def test_an_estimate_is_a_table_of_coefficients_or_of_runs(data: Campaign) -> None:
-    assert identify(data).to_frame().equals(identify(data).coefficients_frame())
+def test_an_estimate_is_a_table_of_coefficients_or_of_runs(data: Campaign, estimate: Estimate) -> None:
+    assert estimate.to_frame().equals(estimate.coefficients_frame())
     normalised = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs[:1]))
     alone = identify(normalised)
     assert alone.to_frame().equals(alone.runs_frame())
@@ -122,8 +128,8 @@ def test_figures_and_the_report_are_those_of_the_command(
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_pandas_is_given_tables_without_pyarrow(data: Campaign, found: Diagnosis) -> None:
-    made: tuple[Diagnosis | Estimate, ...] = (found, identify(data))
+def test_pandas_is_given_tables_without_pyarrow(estimate: Estimate, found: Diagnosis) -> None:
+    made: tuple[Diagnosis | Estimate, ...] = (found, estimate)
     for one in made:
         table = one.to_pandas()
         assert list(table.columns) == one.to_frame().columns
@@ -140,31 +146,32 @@ def test_a_run_is_a_dataset(data: Campaign) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")  # of ArviZ 0.23, on its own future
-def test_draws_have_the_moments_of_the_estimate(data: Campaign) -> None:
-    found = identify(data)
-    posterior = found.to_arviz(np.random.default_rng(1), draws=20_000).posterior
-    assert found.cn_beta is not None
-    draws = np.stack([posterior[name].to_numpy()[0] for name in found.parameters])
-    std = np.sqrt(np.diag(found.covariance_matrix))
-    means = np.array([getattr(found, name).value for name in found.parameters])
+def test_draws_have_the_moments_of_the_estimate(estimate: Estimate) -> None:
+    posterior = estimate.to_arviz(np.random.default_rng(1), draws=20_000).posterior
+    assert estimate.cn_beta is not None
+    draws = np.stack([posterior[name].to_numpy()[0] for name in estimate.parameters])
+    std = np.sqrt(np.diag(estimate.covariance_matrix))
+    means = np.array([getattr(estimate, name).value for name in estimate.parameters])
     # five standard errors of a mean of 20,000 draws, and of a correlation of them
     np.testing.assert_allclose((draws.mean(axis=1) - means) / std, 0.0, atol=5.0 / np.sqrt(20_000))
-    correlation = found.covariance_matrix / np.outer(std, std)
+    correlation = estimate.covariance_matrix / np.outer(std, std)
     np.testing.assert_allclose(np.corrcoef(draws), correlation, atol=5.0 / np.sqrt(20_000))
-    first = found.runs[0].omega_n
+    first = estimate.runs[0].omega_n
     assert first is not None
-    own = posterior["omega_n"].sel(run=found.runs[0].id)
+    own = posterior["omega_n"].sel(run=estimate.runs[0].id)
     assert float(own.std()) == pytest.approx(first.std, rel=0.03)
     assert abs(float(own.mean()) - first.value) < 5.0 * first.std / np.sqrt(20_000)
-    assert posterior.attrs["estimator"] == found.estimator
+    assert posterior.attrs["estimator"] == estimate.estimator
 
 
-def test_a_missing_library_is_named(data: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_named(
+    data: Campaign, estimate: Estimate, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("pandas", "xarray", "arviz"):
         monkeypatch.setitem(__import__("sys").modules, name, None)
     with pytest.raises(TunnelError, match=r"pandas is not installed.*\[frames\]"):
-        identify(data).to_pandas()
+        estimate.to_pandas()
     with pytest.raises(TunnelError, match=r"xarray is not installed.*\[frames\]"):
         data.runs[0].to_xarray()
     with pytest.raises(TunnelError, match=r"arviz is not installed.*\[arviz\]"):
-        identify(data).to_arviz(np.random.default_rng(0))
+        estimate.to_arviz(np.random.default_rng(0))

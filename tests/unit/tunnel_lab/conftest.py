@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,6 +35,19 @@ def tunnel(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
         return status, captured.out, captured.err
 
     return run
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures in files of their first bytes: rendering takes most of the time, and has tests of its own."""
+    from matplotlib.figure import Figure
+
+    begin, savefig = {"png": b"\x89PNG\r\n\x1a\n", "pdf": b"%PDF"}, Figure.savefig
+
+    def begun(figure: Figure, stream: Any, *, format: str, **named: Any) -> None:
+        stream.write(begin[format]) if format in begin else savefig(figure, stream, format=format, **named)
+
+    monkeypatch.setattr(Figure, "savefig", begun)
 
 
 @pytest.fixture

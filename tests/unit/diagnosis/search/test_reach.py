@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from diagnosis import vocabulary
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.reach import left_by_all
 from diagnosis.words.cautions import CAUTIONS
@@ -52,7 +53,10 @@ def test_a_moment_that_no_effect_has_is_not() -> None:
 
 
 def test_the_search_ends_there_and_says_so() -> None:
-    study = investigate(campaign(strange=0.1))
+    few = vocabulary(
+        ["coulomb_friction", "quadratic_damping", "cubic_stiffness", "sensor_drift", "free_play"]
+    )
+    study = investigate(campaign(strange=0.1), few)
     assert study.causes == ("unknown",)
     assert study.left_by_all is not None
     assert study.left_by_all > study.settings.search.out_of_reach

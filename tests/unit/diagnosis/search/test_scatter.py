@@ -123,11 +123,11 @@ def test_runs_that_repeat_show_none() -> None:
 
 def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
     stated = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
-    within = diagnose(campaign(repeatability=stated), kinds=FEW)
-    assert not within.gap.detected
+    within = investigate(campaign(repeatability=stated), FEW)
+    assert not within.gap.test.detected
     assert within.causes == ()
-    beyond = diagnose(campaign(scatter=8.0, repeatability=stated), kinds=FEW)
-    assert beyond.gap.detected
+    beyond = investigate(campaign(scatter=8.0, repeatability=stated), FEW)
+    assert beyond.gap.test.detected
     assert set(beyond.causes) <= {STIFFNESS, DAMPED}
     assert beyond.causes
 

@@ -174,6 +174,7 @@ def test_the_comparison_sees_an_estimate_that_is_missing_or_failed(plan: Campaig
     assert reason.startswith("conventional: no run could be identified")
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_failed_check_ends_the_comparison_with_status_one(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
 ) -> None:

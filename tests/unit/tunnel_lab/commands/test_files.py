@@ -20,6 +20,7 @@ Tunnel = Callable[..., tuple[int, str, str]]
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_an_import_says_what_it_read_and_writes_the_campaign(tunnel: Tunnel, tmp_path: Path) -> None:
     out = tmp_path / "rig"
     status, said, err = tunnel(

@@ -104,6 +104,7 @@ def test_plot_writes_whole_figures(tunnel: Tunnel, tiny_campaign: Path, tmp_path
         assert f"Written: {path}" in out
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_plot_draws_the_fit_of_a_diagnosis(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
     (tmp_path / "answer.json").write_text(json.dumps(document()))
     status, out, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "figures")
@@ -123,6 +124,7 @@ def test_plot_draws_the_fit_of_a_diagnosis(tunnel: Tunnel, tiny_campaign: Path, 
     assert (status, err.count("\n")) == (2, 1)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_plot_draws_how_the_runs_repeat(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
     (tmp_path / "answer.json").write_text(json.dumps(scattering_document()))
     status, _, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "all")

@@ -68,13 +68,17 @@ def test_no_option_is_hidden() -> None:
     assert option_names(hidden=True) == {"--help"}
 
 
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+\b(?!-?[*{])")
+
+
 def named_options() -> Iterator[tuple[str, str]]:
     """File and option of every option that a text of the program names; docstrings of commands are among them."""
     for package in PACKAGES:
         for file in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            text = file.read_text(encoding="utf-8")
+            for node in ast.walk(ast.parse(text)) if OPTION.search(text) else ():
                 if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                    for name in re.findall(r"(?<![\w-])--[a-z][a-z-]+\b(?!-?[*{])", node.value):
+                    for name in OPTION.findall(node.value):
                         yield file.relative_to(ROOT).as_posix(), name
 
 

@@ -157,15 +157,14 @@ def test_identify_shows_the_line_that_raised(tunnel, tiny_campaign: Path) -> Non
     assert "own_method.py line 24; identification.check_estimator" in err
 
 
-def test_score_takes_it_into_its_processes(folder: Path) -> None:
-    done = in_a_process(
-        "score", "grid.toml", "--jobs", "1", "-e", "own_method:Mine,own_method:Broken", cwd=folder
-    )
-    assert done.returncode == 0
-    assert " mine " in done.stdout
-    assert "broken raised an exception 4 times; counted as failures. The first:" in done.stderr
-    assert done.stderr.count("Traceback") == 1
-    assert RAISED in done.stderr
+@pytest.mark.usefixtures("folder")
+def test_score_takes_it_into_its_processes(tunnel) -> None:
+    status, out, err = tunnel("score", "grid.toml", "--jobs", "1", "-e", "own_method:Mine,own_method:Broken")
+    assert status == 0
+    assert " mine " in out
+    assert "broken raised an exception 4 times; counted as failures. The first:" in err
+    assert err.count("Traceback") == 1
+    assert RAISED in err
 
 
 @pytest.mark.usefixtures("folder")

@@ -15,7 +15,8 @@ from tunnel_lab.report.figures import law_figure
 from tunnel_lab.report.where import place_figure
 
 
-def test_symbols_of_coefficients_and_causes_are_explained() -> None:
+def test_symbols_of_coefficients_and_causes_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing takes most of the time
     rows = dict(symbol_rows(document()))
     assert {"Cnβ", "Cnr", "β", "β̇", "V", "l", "C2"} <= set(rows)
     assert "ωn" not in rows  # nothing in this document has it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from identification.blocks import Table
+from tunnel_lab.cli import main
 from tunnel_lab.terminal.inputs import TableFormat
 from tunnel_lab.terminal.tables import rendered
 
@@ -24,6 +26,20 @@ ENCODINGS = {
 
 
 def printed(encoding: str, *words: object) -> tuple[int, bytes, bytes]:
+    """Exit status, standard output and standard error of ``tunnel``, in a process where the locale matters."""
+    if name := ENCODINGS[encoding].get("PYTHONIOENCODING"):
+        codec, _, errors = name.partition(":")
+        out, err = (
+            io.TextIOWrapper(io.BytesIO(), codec, errors=how)
+            for how in (errors or "strict", "backslashreplace")
+        )
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(sys, "stdout", out)
+            patch.setattr(sys, "stderr", err)
+            status = main([str(word) for word in words])
+        out.flush()
+        err.flush()
+        return status, out.buffer.getvalue(), err.buffer.getvalue()  # type: ignore[attr-defined]
     done = subprocess.run(
         [sys.executable, "-m", "tunnel_lab.cli", *map(str, words)],
         cwd=ROOT, env={**os.environ, **ENCODINGS[encoding]}, capture_output=True, check=False,

@@ -9,10 +9,15 @@ from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers
 from tunnel_sim.envs import EnvError
-from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
 
 ARGUMENTS = {"duration": 0.03, "preset": "operator"}
 ACTIONS = np.zeros((2, 2), dtype=np.float32)
+
+
+def bridged(native, **options):
+    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv  # loads torch
+
+    return BaselinesVecEnv(native, **options)
 
 
 def native(**arguments):
@@ -20,7 +25,7 @@ def native(**arguments):
 
 
 def test_runs_are_those_of_the_native_environment_and_restart_at_their_end():
-    bridge, plain = BaselinesVecEnv(native()), native()
+    bridge, plain = bridged(native()), native()
     bridge.seed(3)
     np.testing.assert_array_equal(bridge.reset(), plain.reset(seed=3)[0])
     assert bridge.reset_infos[1]["wind_speed"] > 0.0
@@ -45,7 +50,7 @@ def test_runs_are_those_of_the_native_environment_and_restart_at_their_end():
 
 
 def test_the_options_apply_to_every_run():
-    bridge = BaselinesVecEnv(native(), options={"spring": 5, "wind_speed": 12.0})
+    bridge = bridged(native(), options={"spring": 5, "wind_speed": 12.0})
     bridge.reset()
     for _ in range(3):
         seen = bridge.step(ACTIONS)[0]
@@ -59,7 +64,7 @@ def test_the_options_apply_to_every_run():
 
 def test_the_statistics_of_the_normalisation_hold_every_observation_once():
     normal, seen = NormalizeObservation(native()), [native().reset(seed=3)[0]]
-    bridge, plain = BaselinesVecEnv(normal), BaselinesVecEnv(native())
+    bridge, plain = bridged(normal), bridged(native())
     for envs in (bridge, plain):
         envs.seed(3)
         envs.reset()
@@ -78,7 +83,7 @@ def test_the_statistics_of_the_normalisation_hold_every_observation_once():
 def test_an_agent_learns_through_the_bridge():
     from stable_baselines3 import PPO
 
-    envs = BaselinesVecEnv(NormalizeObservation(native()))
+    envs = bridged(NormalizeObservation(native()))
     model = PPO("MlpPolicy", envs, n_steps=8, batch_size=16, n_epochs=1, seed=1)
     before = model.policy.action_net.weight.detach().numpy().copy()
     model.learn(16)
