@@ -152,7 +152,10 @@ class Motions:
         return cls(law, rows, kept, winds, blocks, ringing)
 
     def alike(self) -> list[list[int]]:
-        """Indices of the runs grouped by equal motion: equal law, release and samples."""
+        """Indices of the runs grouped by equal motion: equal law, release and samples.
+
+        Constant arrays are those of inputs, of which equal ones are one object.
+        """
         numbers = self.rows.copy()
         for name in _POINTERS:
             numbers[name] = 0
@@ -161,7 +164,8 @@ class Motions:
         rows = np.concatenate([*parts, numbers.view(np.uint8).reshape(len(numbers), -1)], axis=1)
         found: dict[object, list[int]] = {}
         for place, (row, kept) in enumerate(zip(rows, self.kept, strict=True)):
-            found.setdefault((row.tobytes(), *(array.tobytes() for array in kept)), []).append(place)
+            samples = (array.tobytes() if array.flags.writeable else id(array) for array in kept)
+            found.setdefault((row.tobytes(), *samples), []).append(place)
         return list(found.values())
 
     def steps(self, place: int) -> tuple[float, ...]:
@@ -243,17 +247,19 @@ def read_together(
             angle[number], rate[number] = ringing.added(angle[number], rate[number], run.interval)
     if reads_plainly(asked.effects[places[0]]):
         return list(block_means(runs, angle, rate) + asked.zero[places, None])
-    found = []
-    for number, (place, run) in enumerate(zip(places, runs, strict=True)):
-        chain, zero = asked.chain(place), float(asked.zero[place])
+    found, chains = [], [asked.chain(place) for place in places]
+    steady = [number for number, chain in enumerate(chains) if not chain.skips]
+    of_steady = block_means([runs[i] for i in steady], angle[steady], rate[steady]) if steady else ()
+    means = dict(zip(steady, of_steady, strict=True))
+    for number, (chain, run) in enumerate(zip(chains, runs, strict=True)):
+        zero = float(asked.zero[places[number]])
         if not np.isfinite(angle[number, 0]):  # it diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
             ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
             found.append(sample_means(chain, Motion(ends, angle[number], rate[number]), run, zero))
         else:
-            mean = block_means([run], angle[number : number + 1], rate[number : number + 1])[0]
-            found.append(chain.reading(chain.angle(mean, run.times, run.derivative) + zero))
+            found.append(chain.reading(chain.angle(means[number], run.times, run.derivative) + zero))
     return found
 
 

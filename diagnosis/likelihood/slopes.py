@@ -27,10 +27,11 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, or the motion is read at times of its own.
+        no derivative, its rod twists, or the motion is read at times of its own, and in driven runs.
     """
     acting = {type(effect) for effects in asked.effects for effect in effects}
-    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
+    without = any(asked.physics.rod_twist) or any(asked.physics.drive)
+    if without or any(effect.skips for effect in acting):
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
