@@ -21,7 +21,7 @@ from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_mot
 from tunnel_sim.physics.moment_law import run_dtype
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
-from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
+from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
@@ -129,6 +129,9 @@ class Motions:
         length = np.array([run.duration for run in runs])
         blocks = size + np.ceil(np.maximum(0.0, physics["duration"] - length) / interval).astype(np.int64)
         substeps = fit_substeps(physics, interval)
+        inputs = {place: drive.exerted for place, drive in enumerate(physics.drive) if drive is not None}
+        for place, drive in inputs.items():
+            substeps[place] = input_substeps(int(substeps[place]), float(interval[place]), drive)
         # joins between steps would show in a derivative of the angle
         derived = np.array([run.derivative > 0 for run in runs])
         flexible = np.array([twist is not None for twist in physics.rod_twist])
@@ -148,6 +151,8 @@ class Motions:
         still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
         law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
         rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
+        for place, drive in inputs.items():
+            rows["moment_interval"][place] = drive.interval if drive.on_steps(float(step[place])) else 0.0
         ringing = [slow[place][3] if place in slow else None for place in range(count)]
         return cls(law, rows, kept, winds, blocks, ringing)
 
