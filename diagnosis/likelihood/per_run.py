@@ -117,8 +117,8 @@ def excited(fit: Fit) -> Sought | None:
         driven runs; None where no run on a spring is driven, or no frequency is distinct from the motion.
     """
     runs, own = fit.problem.data.runs, []
-    # by length and interval, of which the modes are the same: frequencies, and sums over the runs of the products of a
-    # mode's spectrum with the residual's and with itself
+    # by length and interval, on which a mode's response depends: the frequencies, and sums over the runs of the
+    # products of the input's spectrum with the residual's and with itself
     sums: dict[tuple[int, float], tuple[Array, np.ndarray, Array]] = {}
     for number, run in enumerate(runs):
         stated = fit.problem.stated(fit.point.common, fit.point.release[number], run)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.slopes import most_winds, slopes, terms
+from tunnel_sim.physics.steps import meets_steps
 from tunnel_sim.vocabulary.record import Array
 
 #: The fields of a run that say which samples its input has.
@@ -30,10 +31,13 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, or the motion is read at times of its own.
+        no derivative, its rod twists, the samples of an input are not at the starts of steps, or the motion is
+        read at times of its own.
     """
     acting = {type(effect) for effects in asked.effects for effect in effects}
-    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
+    inputs = zip(asked.runs[:count], asked.physics.drive, strict=False)
+    between = any(drive is not None and not meets_steps(drive.exerted, run.interval) for run, drive in inputs)
+    if between or any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)

@@ -22,7 +22,16 @@ from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
-from tunnel_sim.vocabulary.quantities import Angles, Moments, Number, PerSample, RadPerS, Rates, Seconds, Times
+from tunnel_sim.vocabulary.quantities import (
+    Angles,
+    Moments,
+    Number,
+    PerSample,
+    RadPerS,
+    Rates,
+    Seconds,
+    Times,
+)
 from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -191,7 +200,9 @@ class DriveMoment:
         """Whether it acts from sample to sample at even times, each a whole number of steps from 0."""
         apart, first = self.interval / step, (self.time_s[0] + self.delay) / step
         within = _EVEN * apart
-        return round(apart) >= 1 and abs(apart - round(apart)) <= within and abs(first - round(first)) <= within
+        return (
+            round(apart) >= 1 and abs(apart - round(apart)) <= within and abs(first - round(first)) <= within
+        )
 
     def at_steps(self, step: Seconds) -> bool:
         """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay."""

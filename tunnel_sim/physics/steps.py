@@ -79,19 +79,26 @@ def fit_substeps(runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.in
     return np.ceil(interval / longest).astype(np.int64)
 
 
-def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
-    """The number of steps in an interval, so that those of a fit begin at the samples of an input where they can.
+def meets_steps(drive: DriveMoment, interval: Seconds) -> bool:
+    """Whether an interval between block ends can be divided so that steps begin at the samples of an input.
 
     Args:
-        least: least number.
+        drive: without an actuator.
+    """
+    return drive.interval > 0.0 and drive.on_steps(interval / max(1, round(interval / drive.interval)))
+
+
+def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
+    """The number of steps in an interval, at least a given one, that begin at the samples of an input if they can.
+
+    Args:
         interval: between block ends.
         drive: of the run, without an actuator.
     """
-    if drive.interval == 0.0:
+    if not meets_steps(drive, interval):
         return least
     inside = max(1, round(interval / drive.interval))  # samples in an interval
-    number = inside * ceil(least / inside)
-    return number if drive.on_steps(interval / number) else least
+    return inside * ceil(least / inside)
 
 
 def fit_stride(rig: Rig, runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:
