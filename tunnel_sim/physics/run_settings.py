@@ -148,8 +148,9 @@ class DriveMoment:
         """Copy and check the samples."""
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
-        numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay, self.offset]])
-        if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
+        finite = all(map(isfinite, (self.scale, self.delay, self.offset)))
+        finite = finite and bool(np.isfinite(self.time_s).all() and np.isfinite(self.values).all())
+        if self.time_s.shape != self.values.shape or not self.time_s.size or not finite:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
@@ -177,7 +178,7 @@ class DriveMoment:
         """Time between its samples; 0 where they are not even."""
         interval = float(self.time_s[-1] - self.time_s[0]) / max(1, self.time_s.size - 1)
         even = self.time_s[0] + interval * np.arange(self.time_s.size)
-        return interval if np.allclose(self.time_s, even, rtol=0.0, atol=_EVEN * interval) else 0.0
+        return interval if np.max(np.abs(self.time_s - even)) <= _EVEN * interval else 0.0
 
     @property
     def through_actuator(self) -> bool:
