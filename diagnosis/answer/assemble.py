@@ -20,7 +20,7 @@ from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfall
+from diagnosis.facts.closure import Confirmation, NoiseSummary, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Remainder
@@ -80,12 +80,12 @@ def assemble(
     Args:
         said: the reasons for the place of the gap.
         left_out: caveats on runs and effects that were left out.
-        patched: the given model with the causes written into it; the share closed is then its own.
+        patched: the given model with the causes written into it.
         kinds: the effects that may act unnamed beside those of an answer.
     """
     chosen, settings, similarity = study.chosen, study.settings, study.similarity
     weighed = candidates(study, excess_base(study))
-    closes = _closes(study, patched)
+    closes = _closes(study)
     begun = time.perf_counter()
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)
@@ -147,7 +147,7 @@ class _Closes:
     seconds: Mapping[str, float]  # by step
 
 
-def _closes(study: Study, patched: PatchedModel | None) -> _Closes:
+def _closes(study: Study) -> _Closes:
     """The gap before and after by MuJoCo, and as the causes are added."""
     base, chosen = excess_base(study), study.chosen
     nominal_out = predict_held_out(study.nominal)
@@ -157,9 +157,6 @@ def _closes(study: Study, patched: PatchedModel | None) -> _Closes:
     reported = time.perf_counter()
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     gap = held_out_totals(gap_summary(study, base, shown), steps)
-    if patched is not None and study.named:
-        on = f"{patched.closure.on}, {PATCHED}"
-        gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds = {"confirmation": reported - begun, "waterfall": time.perf_counter() - reported}
     return _Closes(gap, steps, shown.confirmation, seconds)
 

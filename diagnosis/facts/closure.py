@@ -12,7 +12,6 @@ from tunnel_sim.files.writing import as_json
 ON_RUNS = "on runs held out of the fit"
 ON_STRETCHES = "on stretches of time held out of the fit"
 ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
-PATCHED = "simulated with the patched model"
 FITTED = "in the fitted runs (none could be held out)"
 """The readings on which a gap before and after is measured, as in the document."""
 

@@ -29,14 +29,14 @@ def native_actuator(
 
     Returns:
         The limits; None where there are none, or where MuJoCo has no element for one of them: a rate limit, which
-        acts between the other two, and an input that acts earlier than stated.
+        acts between the other two, a soft limit, and an input that acts earlier than stated.
     """
     chain = problem.chain(common, release, problem.data.runs[index])
     stated, found = chain.stated.drive, chain.physics().drive
     assert stated is not None
     assert found is not None
     made, delay = found.actuator, found.delay - stated.delay
-    if made.rate > 0.0 or delay < 0.0 or (made == stated.actuator and delay == 0.0):
+    if made.rate > 0.0 or made.softness > 0.0 or delay < 0.0 or (made == stated.actuator and delay == 0.0):
         return None
     return ActuatorPatch(
         actuator.index,

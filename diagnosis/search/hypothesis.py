@@ -333,8 +333,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
         # adding the ringing to the slow motion is not exact enough; the confirmation states the error
         first = try_fit(problem, first.point) or first
-    forms = next(_choices(first), ())
-    better = _free_forms(first, forms, tolerance=_POLISH) or try_fit(
+    better = _free_forms(first, _likeliest_forms(first), tolerance=_POLISH) or try_fit(
         first.problem, first.point, tolerance=_POLISH
     )
     if better is None or better.total > first.total:
@@ -349,6 +348,20 @@ def polish(chosen: Hypothesis) -> Hypothesis:
         start = Point(np.array([values[name] for name in problem.names]), better.point.release)
         textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
+
+
+def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
+    """The first forms of all effects; others where these leave a significant residual and others less of it."""
+    choices = list(_choices(fitted))
+    weighing = fitted.settings.weighing
+    by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * fitted.count)
+    if len(choices) < 2 or fitted.total - fitted.count < by_chance:
+        return choices[0] if choices else ()
+    totals = [
+        fitted.total if (freed := _free_forms(fitted, forms)) is None else freed.total for forms in choices
+    ]
+    best = int(np.argmin(totals))
+    return choices[best if totals[best] < totals[0] - weighing.needless_chi2 else 0]
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:

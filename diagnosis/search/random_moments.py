@@ -36,6 +36,7 @@ from diagnosis.search.random_spectra import SOURCES, Source
 from diagnosis.search.scatter import settled
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
+from diagnosis.settings import RandomMomentSettings
 from tunnel_sim.effects import Effect
 
 if TYPE_CHECKING:
@@ -80,8 +81,9 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
         hypotheses: those found without a random moment.
 
     Returns:
-        The likeliest random moment with the best set of effects, and one of another source that explains the runs
-        nearly as well: runs in one wind do not separate the stream from the surroundings. It must lower −2 ln L
+        The likeliest random moment with the best set of effects, and others that explain the runs nearly as well:
+        runs at one wind speed do not separate the stream from the surroundings, nor vortices, whose frequency
+        follows the wind, from turbulence about a fixed frequency. It must lower −2 ln L
         beside the same set by more than chance, and be steady noise, alike in all runs in which it acts. Empty
         where none qualifies, where the likeliest may not be named, where no random moment could explain enough of
         the gap, and where one law explains nearly all of the residual.
@@ -98,8 +100,7 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
             one = _Beside.found(source, best, view)
             found += [] if one is None else [one]
     least = min((one.cost for one in found), default=0.0)
-    likely = [one for one in found if one.cost < least + within]
-    return [answer for one in likely if (answer := one.answer()) is not None]
+    return [answer for one in found if one.cost < least + within for answer in one.answers()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +108,12 @@ class _Beside:
     """A random moment of a source, and the best set of effects beside it.
 
     Args:
+        alike: the likeliest, and those of other kinds that explain the runs nearly as well.
         top: the set with the response to the random moment in the noise.
         seen: the same with the sensor's noise alone.
     """
 
-    process: ProcessNoise
+    alike: tuple[ProcessNoise, ...]
     top: Hypothesis
     seen: Hypothesis
     view: View
@@ -129,9 +131,10 @@ class _Beside:
                 top = further[0]
             seen = _seen_in(top, view.base.problem.data)
             steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
-            process = likeliest((one for one in steady if _shown_apart(one, source, seen.fit)), chosen)
+            shown = [one for one in steady if _shown_apart(one, source, seen.fit)]
+            process = likeliest(shown, chosen)
             if process is not None and _is_random(process, source, seen.fit):
-                return cls(process, top, seen, view)
+                return cls((process, *_others_alike(process, shown, chosen)), top, seen, view)
         return None
 
     def cost_from(self, source: Source) -> float:
@@ -147,11 +150,14 @@ class _Beside:
     @property
     def cost(self) -> float:
         """−2 ln L without constants of all runs, and the prices of parts and effects, dimensionless."""
-        return _cost(self.process, self.top)
+        return _cost(self.alike[0], self.top)
 
-    def answer(self) -> RandomAnswer | None:
-        """The answer to be weighed; None where a part of the moment is of a kind that may not be named."""
-        view, seen, process = self.view, self.seen, self.process
+    def answers(self) -> list[RandomAnswer]:
+        """The answers to be weighed, the likeliest first; without those a part of which may not be named."""
+        return [answer for one in self.alike if (answer := self._answer(one)) is not None]
+
+    def _answer(self, process: ProcessNoise) -> RandomAnswer | None:
+        view, seen = self.view, self.seen
         allowed = [kind for kind in view.prepared.kinds if kind.random]
         of_parts = [[kind for kind in allowed if part.is_of(kind)] for part in process.spectrum]
         if not all(of_parts):
@@ -165,6 +171,25 @@ class _Beside:
         numbers, compared = seen.further_numbers, self.top.fit.compared
         left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
+
+
+def _others_alike(
+    process: ProcessNoise, shown: Sequence[ProcessNoise], chosen: RandomMomentSettings
+) -> list[ProcessNoise]:
+    """Moments about a fixed frequency beside one that follows the wind, and the reverse, if as likely."""
+    kind, found = _kind(process), dict[frozenset[str], ProcessNoise]()
+    about = [one for one in shown if any(part.states > 1 for part in one.spectrum)]
+    if process not in about:
+        return []
+    for one in sorted(about, key=lambda one: -one.cost):
+        if _kind(one) != kind and one.cost < process.cost + chosen.alike_within:
+            found[_kind(one)] = one
+    return sorted(found.values(), key=lambda one: one.cost)
+
+
+def _kind(process: ProcessNoise) -> frozenset[str]:
+    """The kinds of spectrum of its parts."""
+    return frozenset(part.band for part in process.spectrum)
 
 
 def _explained(source: Source, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:

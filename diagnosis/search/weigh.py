@@ -171,9 +171,20 @@ def misfit_scale(
     """
     needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
     by_chance = needless if chance is None else chance
+    return np.asarray(by_chance + error_of_form(nominal, chosen, common), np.float64)
+
+
+def error_of_form(nominal: ChannelMisfit, chosen: WeighingSettings, common: float = 0.0) -> Array:
+    """χ² by channel that an effect may leave because its form is not exact, shape (6,), dimensionless.
+
+    A share of the amplitude of its gap: most of it in the channels of the gap, some of it in the others.
+
+    Args:
+        nominal: misfit of the nominal model, and the motion.
+        common: χ² of a channel that remains under every set (`common_misfit`), dimensionless.
+    """
     by_form = chosen.form_error**2 * _leaked(nominal.excess, ALL_CHANNELS, chosen.leak)
-    error = np.minimum(np.maximum(by_form, common), chosen.model_error**2 * nominal.motion)
-    return np.asarray(by_chance + error, np.float64)
+    return np.minimum(np.maximum(by_form, common), chosen.model_error**2 * nominal.motion)
 
 
 def log_weight(

@@ -8,10 +8,10 @@ rate, then lagged. At the start of a recorded run the actuator has settled at it
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.base import Drawn, Effect, Text
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -21,6 +21,8 @@ _SLOW = 0.03
 """Least ωτ of a lag: the gain of a faster one falls by (ωτ)²/2, less than half a thousandth, and it is a delay."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.3)
 """Greatest moments that are tried, over the greatest one asked for."""
+_SOFT_LIMITS, _SOFT = (3.0, 1.5, 0.75), 0.45
+"""The same with a soft limit, and its softness: about that of a hyperbolic tangent."""
 _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
 """Greatest rates that are tried, over the greatest one asked for: of a smooth input, and of one that jumps."""
 
@@ -57,26 +59,42 @@ class _OfActuator(Effect):
 
 @dataclass(frozen=True)
 class ActuatorSaturation(_OfActuator):
-    """An actuator whose moment is limited."""
+    """An actuator whose moment is limited: by its supply, sharply, or by a magnet that saturates, softly."""
 
     name = "actuator_saturation"
     place = 30
     size = "an actuator that exerts at most {limit}"
     advice = "Ask the actuator for less, or record the moment that it exerts"
-    equation = "|moment| ≤ M, in driven runs"
+    equation = "|moment| ≤ M, in driven runs; general form: u/(1 + |u/M|^(1/s))^s for the demanded moment u"
     signature = (
         "Small inputs act as stated; at the peaks of large ones the motion falls short of the nominal model."
     )
-    references = (_FRANKLIN,)
+    references = (
+        _FRANKLIN,
+        "Rapp, Proc. 2nd European Conf. Satellite Communications, Liège (1991) 179 (the soft limit)",
+    )
     example = (0.6,)
     tries = 2
 
     limit: float = parameter("M", "N m", "greatest moment (0: no limit)", scale=1.0, lower=0.0, upper=1e6)
+    softness: float = parameter(
+        "s", "1", "softness of the limit (0: hard; near 0.4: a hyperbolic tangent)",
+        scale=0.4, lower=0.0, upper=1.0, fit_lower=0.02, form=True,
+    )  # fmt: skip
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
+        """The greatest moment, and whether the actuator approaches it softly."""
+        said = super().phrase(values, stds, text)
+        return f"{said}, which it approaches softly" if values.get("softness", 0.0) > 0.0 else said
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Limits below the greatest demanded moment of any run."""
-        return [Trial({"limit": share * campaign.greatest_moment}, None) for share in _LIMITS]
+        """Limits near the greatest demanded moment of any run."""
+        greatest = campaign.greatest_moment
+        hard = [Trial({"limit": share * greatest}, None) for share in _LIMITS]
+        soft = [Trial({"limit": share * greatest, "softness": _SOFT}, None) for share in _SOFT_LIMITS]
+        return [*hard, *soft]
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ _JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot se
 _ULPS = 8.0  # at least, so that the times still increase in other units
 _SERIES = 0.01  # interval over time constant, below which a series is more accurate
 _FIRST_LOOK = 32  # intervals of the first search for the end of a ramp
+_BENT = 0.03  # change of an input over the greatest moment within which the curve of a soft limit is a line
+_PARTS = 256  # of an interval at most; only a jump in a linear input needs more
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,32 @@ class Samples:
             order = np.argsort(both, kind="stable")
             time, values = both[order], np.interp(both, time, values)[order]
         return type(self)(time, np.clip(values, -limit, limit), self.held)
+
+    def saturated(self, limit: float, softness: float) -> Self:
+        """The input v limited softly: v / (1 + |v/L|^(1/s))^s, which approaches ±L (Rapp 1991).
+
+        Exact for a held input. A linear one is followed at points between which it changes by `_BENT` of the limit
+        at most.
+
+        Args:
+            limit: L above 0, in the unit of the values.
+            softness: s, dimensionless; at 0 it is `clipped`, and near 0.4 a hyperbolic tangent.
+        """
+        if softness == 0.0:
+            return self.clipped(limit)
+        time, values = self.time_s, self.values
+        if not self.held and time.size > 1:
+            count = np.clip(np.ceil(np.abs(np.diff(values)) / (_BENT * limit)), 1, _PARTS).astype(np.intp)
+            first = np.repeat(np.cumsum(count) - count, count)
+            places = np.repeat(np.arange(count.size), count)
+            part = (np.arange(first.size) - first) / count[places]
+            time = np.append(time[places] + part * np.diff(time)[places], time[-1])
+            values = np.append(values[places] + part * np.diff(values)[places], values[-1])
+        size = np.abs(values) / limit
+        less = np.minimum(size, 1.0 / np.maximum(size, 1.0))  # neither power overflows
+        with np.errstate(under="ignore"):
+            bent = np.minimum(size, 1.0) * (1.0 + less ** (1.0 / softness)) ** -softness
+        return type(self)(time, np.copysign(limit * bent, values), self.held)
 
     def at_rate(self, rate: float) -> Self:
         """The input followed at a limited rate, in the unit per s; exact for both holds."""
@@ -181,11 +209,13 @@ class Actuator:
         limit: greatest moment, N m; 0: none.
         rate: greatest rate of change of the moment, N m/s; 0: none.
         lag: time constant, s.
+        softness: of the limit's approach, dimensionless (`Samples.saturated`); 0: a hard limit.
     """
 
     limit: float = 0.0
     rate: float = 0.0
     lag: float = 0.0
+    softness: float = 0.0
 
     def exerted(self, asked: Samples, scale: float) -> Samples:
         """The moment exerted for the demanded samples.
@@ -196,7 +226,7 @@ class Actuator:
         size = abs(scale)
         if size == 0.0:
             return asked
-        found = asked.clipped(self.limit / size) if self.limit else asked
+        found = asked.saturated(self.limit / size, self.softness) if self.limit else asked
         found = found.at_rate(self.rate / size) if self.rate else found
         return found.lagged(self.lag)
 

@@ -29,7 +29,7 @@ from diagnosis.search.scatter import (
 )
 from diagnosis.search.sets import Sets, prune
 from diagnosis.search.views.view import View
-from diagnosis.search.weigh import OF_MOTION, UNKNOWN, log_misfit, misfit_scale
+from diagnosis.search.weigh import OF_MOTION, UNKNOWN, error_of_form, log_misfit, misfit_scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,13 +191,8 @@ class WholeRuns(View):
         return replace(part, fit=settled(part.fit), repeating=try_fit(*without_deviations(part.fit)))
 
     def _explains(self, beside: Hypothesis) -> bool:
-        """Whether a set beside chance differences explains the runs up to chance and an error of its form.
-
-        That error shows in the same channels as the cause.
-        """
-        weighing, gap = self.base.settings.weighing, self._scattering_gap
-        by_form = weighing.form_error**2 * np.maximum(gap.excess, 0.0)
-        return beside.leaves_within(np.minimum(by_form, weighing.model_error**2 * gap.motion))
+        """Whether a set beside chance differences explains the runs up to chance and an error of its form."""
+        return beside.leaves_within(error_of_form(self._scattering_gap, self.base.settings.weighing))
 
     def _beside_scatter(
         self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock

@@ -127,6 +127,11 @@ def test_what_a_fit_found_of_the_actuator_is_written_in_the_units_of_the_rig(
         assert patch is None
         assert bool(said & {"actuator", "delayed input"}) == any(kind.driven for kind in kinds)
         return
+    soft = Problem(
+        prepared, kinds, (*fixed, ("actuator_saturation.softness", 0.4)), ("actuator_saturation.softness",)
+    )
+    if "actuator_saturation" in values:  # a control range is hard
+        assert native_actuator(soft, common, own, 0, model.law.actuator, change) is None
     assert patch is not None
     limit, lag, delay = expected
     assert (patch.limit * model.law.actuator.gain, patch.lag, patch.delay) == pytest.approx(

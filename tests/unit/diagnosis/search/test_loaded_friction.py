@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import mujoco
 import numpy as np
 import pytest
 
+from diagnosis import diagnose, vocabulary
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.patch.native_friction import native_friction
 from diagnosis.search.hypothesis import _choices
+from tests.reference.robot_joints import LEVEL, MOTOR, NOISE, RATE, TIME, multisine, robot
 from tests.support.gap_campaigns import campaign, nominal
+from tests.support.robots import KINDS, TRUE, near, own_model
 from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
 FRICTION, GRAVITY = effect_class("coulomb_friction"), effect_class("gravity_stiffness")
@@ -60,3 +69,48 @@ def test_the_patch_adds_what_gravity_adds_and_leaves_out_what_a_drive_does():
     without = native_friction({**parameters, "load_stiffness": 0.0}, np.ones(1), law, 0.0, 0.02)
     assert (without.loss, without.program) == (0.01, ())
     assert [fact.kind for fact in without.differences] == ["friction against load"]
+
+
+SLIDING, SHARE = 0.1, 0.08
+
+
+def swing(xml: str, start: float, control: Array) -> Array:
+    """Positions of a joint with gravity, rad, whose friction MuJoCo sets before every step to its load."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data, found = mujoco.MjData(model), np.empty(control.size)
+    data.qpos[0] = start
+    for k, value in enumerate(control):
+        found[k] = data.qpos[0]
+        for _ in range(round(1.0 / (RATE * model.opt.timestep))):
+            data.ctrl[:] = value
+            mujoco.mj_forward(model, data)
+            carried = max(abs(float(data.qfrc_bias[0])), abs(float(data.qfrc_actuator[0])))
+            model.dof_frictionloss[0] = SLIDING + SHARE * carried
+            mujoco.mj_step(model, data)
+    return found
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, driven: bool) -> None:
+    """The fit explains either; MuJoCo has no element for friction against an actuator's moment, which is stated."""
+    actuators = MOTOR if driven else ""
+    xml = robot(
+        f'{TRUE} frictionloss="0.1" solreffriction="0.002 1"', axis=LEVEL, actuators=actuators, tip=0.2
+    )
+    runs = []
+    for seed, (start, peak) in enumerate([(0.4, 0.3), (0.8, 0.25)]):
+        control = multisine(seed, peak) if driven else np.zeros(TIME.size)
+        noise = np.random.default_rng([seed, 1]).normal(0.0, NOISE, TIME.size)
+        drive = Drive("drive", control, "zero", None) if driven else None
+        runs.append(Run(f"r{seed + 1}", Record(TIME, swing(xml, start, control) + noise), 0.0, drive=drive))
+    data = Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))
+    model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, actuators=actuators, tip=0.2))
+    answer = diagnose(data, kinds=vocabulary(KINDS), model=model)
+    assert answer.causes == ("coulomb_friction",)
+    assert near(answer, "load", SHARE)
+    assert near(answer, "friction_moment", SLIDING, 0.01)
+    assert answer.gap.closed > 0.999
+    assert answer.model is not None
+    left_out = "friction against load" in {fact.kind for fact in answer.model.differences}
+    assert left_out == driven
+    assert left_out or answer.model.closure.native_closed > 0.99

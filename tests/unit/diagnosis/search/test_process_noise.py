@@ -380,6 +380,16 @@ def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     assert weigh_random_moments(whole_runs(fit, BUFFETING), []) == []
 
 
+def test_at_one_wind_speed_vortices_are_not_told_from_turbulence_about_a_frequency():
+    """The frequency of vortices follows the wind, which one speed cannot show: both are answers, as likely."""
+    data = with_moment(campaign(), about_a_frequency(0.3, 8.0))
+    fastest = max(run.wind_speed for run in data.runs)
+    one_speed = replace(data, runs=tuple(run for run in data.runs if run.wind_speed in (0.0, fastest)))
+    found = weigh_random_moments(whole_runs(nominal(one_speed), BOTH), [])
+    assert {answer.effects for answer in found} == {("vortex_shedding",), ("buffeting",)}
+    assert found[0].share == pytest.approx(found[1].share, abs=0.02)
+
+
 def both_at_once():
     return nominal(with_moment(buffeted(campaign(), 0.006, 2.0), wandering_vortices(0.15, 0.05, seed=8)))
 
@@ -447,17 +457,22 @@ def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence
     assert answer.effects == ("buffeting",)
 
 
-def test_turbulence_about_a_frequency_is_recovered():
+def about_a_frequency(bandwidth, centre):
+    """A moment of first order about a fixed frequency, both in Hz."""
     rng = np.random.default_rng(9)
 
     def moment(time, speed):
         del speed
-        corner, turn = 2.0 * np.pi * 0.8, 2.0 * np.pi * 5.0
+        corner, turn = 2.0 * np.pi * bandwidth, 2.0 * np.pi * centre
         pole = np.exp((-corner + 1j * turn) * time[1])
         drive = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
         return 0.02 * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], drive))
 
-    fit = nominal(with_moment(campaign(), moment))
+    return moment
+
+
+def test_turbulence_about_a_frequency_is_recovered():
+    fit = nominal(with_moment(campaign(), about_a_frequency(0.8, 5.0)))
     broad, centred = fit_turbulence(fit), fit_turbulence(fit, centred=True)
     assert broad is not None
     assert centred is not None

@@ -35,7 +35,6 @@ KNOWN_IN_SEVERAL = {
     "part_price": "a part is tried, taken and compared at one price",
     "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
-    "form_error": "an error of form, of all sets or of the one that ends a search",
     "leak": "wherever channels are compared",
     "common_first": "the sentence states the share",
     "own_number_gain": "wherever an instant or a phase counts",

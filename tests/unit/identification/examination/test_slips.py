@@ -15,7 +15,7 @@ from identification.examination.examine import examine
 from identification.status import Outcome
 from tests.marks import slow
 from tests.support.slip_cases import FURTHER, PLAIN, TABLE, Case
-from tests.support.slip_rig import SPEEDS, SPRINGS, Condition, honest, repeated
+from tests.support.slip_rig import SPEEDS, SPRINGS, Condition, high_passed, honest, repeated
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -138,6 +138,24 @@ def test_nothing_knows_how_fast_or_heavy_a_rig_is(time_scale: float, moment: flo
         sensor = replace(data.sensor, sample_rate=data.sensor.sample_rate / time_scale)
         remarks = examine(replace(data, runs=runs, rig=rig, sensor=sensor)).remarks
         assert [remark.outcome for remark in remarks] == ([] if case is None else [Outcome.REFUSED])
+
+
+def test_a_drift_that_settles_is_no_coupled_sensor_where_a_few_runs_lead_by_chance():
+    data, lead = honest(), high_passed(4.5, held=False)
+    free = [run for run in data.runs if run.drive is None]
+    led = {run.id for run in free[: (len(free) - 1) // 2]}
+
+    def warmed(run, leading):
+        record = run.record
+        yaw = lead(record.yaw_rad) if leading else record.yaw_rad - 0.02 * np.exp(-record.time_s / 4.5)
+        return replace(run, record=Record(record.time_s, yaw))
+
+    def said(leading):
+        runs = tuple(warmed(run, run.id in leading) for run in data.runs)
+        return [one for one in examine(replace(data, runs=runs)).remarks if "AC-coupled" in one.what]
+
+    assert not said(led)
+    assert said({run.id for run in free})
 
 
 def test_what_looks_like_a_wrong_unit_is_kept_where_the_campaign_vouches_for_it():

@@ -11,6 +11,7 @@ from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.parameters import SWING, WindOnRun
+from tunnel_sim.engine.effect_laws import DRIVE
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -39,12 +40,14 @@ def test_a_form_bends_the_effect_and_its_default_is_the_textbooks(kind, info) ->
     assert plain == stated
 
     def act(effect):
-        chain = EffectChain.draw(STATED, [effect], np.random.default_rng(1))
+        settings = dataclasses.replace(STATED, drive=DRIVE) if kind.driven else STATED
+        chain = EffectChain.draw(settings, [effect], np.random.default_rng(1))
         run, reading = chain.physics(), chain.reading(chain.angle(ANGLE, TIME))
-        return dataclasses.replace(run, duration=1.0), reading
+        moment = run.drive.acting.values if run.drive is not None else np.zeros(0)
+        return dataclasses.replace(run, duration=1.0, drive=None), reading, moment
 
-    (run, reading), (curved_run, curved_reading) = act(plain), act(curved)
-    assert run != curved_run or not np.array_equal(reading, curved_reading)
+    (run, *arrays), (curved_run, *curved_arrays) = act(plain), act(curved)
+    assert run != curved_run or not all(map(np.array_equal, arrays, curved_arrays))
 
 
 def settled(time: np.ndarray, constant: float) -> np.ndarray:

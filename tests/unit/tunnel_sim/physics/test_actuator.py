@@ -94,6 +94,35 @@ def test_a_greatest_moment_clips_at_every_time(
     assert at(asked.clipped(limit), fine) == pytest.approx(np.clip(at(asked, fine), -limit, limit), abs=1e-9)
 
 
+@each_input
+@each_hold
+@each_clock
+@pytest.mark.parametrize("softness", [0.1, 0.4, 1.0])
+def test_a_soft_limit_follows_its_equation(
+    values: np.ndarray, held: bool, time: np.ndarray, softness: float
+) -> None:
+    asked, fine = Samples(time, values, held), np.linspace(time[0], time[-1], 5001)
+    found, wanted = asked.saturated(0.9, softness), at(asked, fine)
+    exact = wanted / (1.0 + np.abs(wanted / 0.9) ** (1.0 / softness)) ** softness
+    assert np.max(np.abs(at(found, fine) - exact)) < (1e-12 if held else 1e-3)
+    assert np.max(np.abs(found.values)) < 0.9
+
+
+@each_hold
+def test_a_soft_limit_tends_to_a_hard_one(held: bool) -> None:
+    asked, fine = Samples(TIME, 1e3 * VALUES, held), np.linspace(TIME[0], TIME[-1], 5001)
+    hard = at(asked.clipped(300.0), fine)
+    away = [float(np.max(np.abs(at(asked.saturated(300.0, s), fine) - hard))) for s in (0.1, 0.05, 0.025)]
+    assert away[0] > 1.5 * away[1] > 2.25 * away[2] > 0.0
+    assert np.array_equal(at(asked.saturated(300.0, 0.0), fine), hard)
+
+
+def test_a_soft_limit_contains_a_hyperbolic_tangent() -> None:
+    asked = np.linspace(-1.0, 1.0, 401)
+    found = Samples(np.arange(401.0), asked, True).saturated(1.133, 0.4755).values
+    assert np.max(np.abs(found - np.tanh(asked))) < 1e-3
+
+
 @pytest.mark.parametrize("limited", [{"limit": 4.0}, {"rate": 1e6}, {}])
 def test_a_limit_that_is_not_reached_changes_no_bit(limited: dict[str, float]) -> None:
     asked = Samples(TIME, VALUES, held=False)
@@ -272,6 +301,13 @@ def test_each_is_named_with_its_value(name: str, value: float) -> None:
     own = found.candidates[0].parameters[NULL[name]]
     assert own.std is not None
     assert abs(own.value - value) < 4.0 * own.std < 0.02 * value
+    assert found.gap.closed > 0.99
+
+
+def test_a_limit_approached_as_a_hyperbolic_tangent_is_a_saturation_alone() -> None:
+    found = diagnose(through(limit=0.8, soft=True), kinds=KINDS)
+    assert found.causes == ("actuator_saturation",)
+    assert found.candidates[0].parameters["softness"].value == pytest.approx(0.45, abs=0.1)
     assert found.gap.closed > 0.99
 
 
