@@ -317,7 +317,9 @@ def repeatability_lines(document: Document) -> list[str]:
     if seen:
         ways.append(f"attributed to chance, {', '.join(seen)}")
         told = "; tunnel diagnose distinguishes chance from a cause"
-    differs = f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
+    differs = (
+        f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
+    )
     return [
         f"Between runs: {differs} beyond the noise (standard deviations): {'; '.join(ways)}. The intervals include "
         f"it{told}."

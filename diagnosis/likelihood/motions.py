@@ -21,7 +21,7 @@ from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_mot
 from tunnel_sim.physics.moment_law import run_dtype
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
-from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
+from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
@@ -129,6 +129,9 @@ class Motions:
         length = np.array([run.duration for run in runs])
         blocks = size + np.ceil(np.maximum(0.0, physics["duration"] - length) / interval).astype(np.int64)
         substeps = fit_substeps(physics, interval)
+        inputs = {place: drive.exerted for place, drive in enumerate(physics.drive) if drive is not None}
+        for place, drive in inputs.items():
+            substeps[place] = input_substeps(int(substeps[place]), float(interval[place]), drive)
         # joins between steps would show in a derivative of the angle
         derived = np.array([run.derivative > 0 for run in runs])
         flexible = np.array([twist is not None for twist in physics.rod_twist])
@@ -148,11 +151,16 @@ class Motions:
         still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
         law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
         rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
+        for place, drive in inputs.items():
+            rows["moment_interval"][place] = drive.interval if drive.on_steps(float(step[place])) else 0.0
         ringing = [slow[place][3] if place in slow else None for place in range(count)]
         return cls(law, rows, kept, winds, blocks, ringing)
 
     def alike(self) -> list[list[int]]:
-        """Indices of the runs grouped by equal motion: equal law, release and samples."""
+        """Indices of the runs grouped by equal motion: equal law, release and samples.
+
+        Constant arrays are those of inputs, of which equal ones are one object.
+        """
         numbers = self.rows.copy()
         for name in _POINTERS:
             numbers[name] = 0
@@ -161,7 +169,8 @@ class Motions:
         rows = np.concatenate([*parts, numbers.view(np.uint8).reshape(len(numbers), -1)], axis=1)
         found: dict[object, list[int]] = {}
         for place, (row, kept) in enumerate(zip(rows, self.kept, strict=True)):
-            found.setdefault((row.tobytes(), *(array.tobytes() for array in kept)), []).append(place)
+            samples = (array.tobytes() if array.flags.writeable else id(array) for array in kept)
+            found.setdefault((row.tobytes(), *samples), []).append(place)
         return list(found.values())
 
     def steps(self, place: int) -> tuple[float, ...]:
@@ -243,17 +252,19 @@ def read_together(
             angle[number], rate[number] = ringing.added(angle[number], rate[number], run.interval)
     if reads_plainly(asked.effects[places[0]]):
         return list(block_means(runs, angle, rate) + asked.zero[places, None])
-    found = []
-    for number, (place, run) in enumerate(zip(places, runs, strict=True)):
-        chain, zero = asked.chain(place), float(asked.zero[place])
+    found, chains = [], [asked.chain(place) for place in places]
+    steady = [number for number, chain in enumerate(chains) if not chain.skips]
+    of_steady = block_means([runs[i] for i in steady], angle[steady], rate[steady]) if steady else ()
+    means = dict(zip(steady, of_steady, strict=True))
+    for number, (chain, run) in enumerate(zip(chains, runs, strict=True)):
+        zero = float(asked.zero[places[number]])
         if not np.isfinite(angle[number, 0]):  # it diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
             ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
             found.append(sample_means(chain, Motion(ends, angle[number], rate[number]), run, zero))
         else:
-            mean = block_means([run], angle[number : number + 1], rate[number : number + 1])[0]
-            found.append(chain.reading(chain.angle(mean, run.times, run.derivative) + zero))
+            found.append(chain.reading(chain.angle(means[number], run.times, run.derivative) + zero))
     return found
 
 

@@ -116,7 +116,10 @@ def excited(fit: Fit) -> Sought | None:
         Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which are unused in
         driven runs; None where no run on a spring is driven, or no frequency is distinct from the motion.
     """
-    runs, parts, own = fit.problem.data.runs, [], []
+    runs, own = fit.problem.data.runs, []
+    # by length and interval, on which a mode's response depends: the frequencies, and sums over the runs of the
+    # products of the input's spectrum with the residual's and with itself
+    sums: dict[tuple[int, float], tuple[Array, np.ndarray, Array]] = {}
     for number, run in enumerate(runs):
         stated = fit.problem.stated(fit.point.common, fit.point.release[number], run)
         if run.drive is None or stated.drive is None or not stated.spring_stiffness > 0.0:
@@ -127,9 +130,12 @@ def excited(fit: Fit) -> Sought | None:
         static = run.input_means * stated.drive.scale / (REFERENCE_RELEASE * stated.spring_stiffness)
         seen = np.fft.rfft(static, size) * (1j * omega) ** run.derivative
         seen *= run.response(omega / (2.0 * np.pi)) / run.noise.scale
-        parts.append((omega, seen, np.fft.rfft(fit.residuals[number], size), 2.0 / size))
+        seen *= np.sqrt(2.0 / size)
+        left = np.conj(seen) * np.fft.rfft(fit.residuals[number], size) * np.sqrt(2.0 / size)
+        _, product, power = sums.get((size, run.interval), (omega, 0.0, 0.0))
+        sums[size, run.interval] = omega, product + left, power + np.abs(seen) ** 2
         own.append(2.0 * np.pi * resonance(fit, number))
-    if not parts:
+    if not sums:
         return None
     grid = np.exp(
         np.arange(np.log(0.1 * min(own)), np.log(0.8 * np.pi / max(r.interval for r in runs)), _APART)
@@ -140,11 +146,11 @@ def excited(fit: Fit) -> Sought | None:
     for frequency in grid.tolist():
         for damping_ratio in _DAMPINGS:
             product = power = 0.0
-            for omega, seen, left, scale in parts:
+            for omega, left, seen in sums.values():
                 turn = omega / frequency
-                mode = seen / (1.0 - turn**2 + 2j * damping_ratio * turn)
-                product += scale * float(np.vdot(mode, left).real)
-                power += scale * float(np.vdot(mode, mode).real)
+                mode = 1.0 / (1.0 - turn**2 + 2j * damping_ratio * turn)
+                product += float(np.vdot(mode, left).real)
+                power += float((np.abs(mode) ** 2) @ seen)
             if product**2 / power > found.drop:
                 values = abs(product) / power, frequency, damping_ratio
                 sign = float(np.sign(product))
@@ -224,6 +230,7 @@ class _Skipping:
                 ((more - second * rate) / (first - second), np.ones(rate.size), np.exp(first * run.interval))
                 for first, second in ((one, other), (other, one))
             ]
+        self.powers = [z ** np.arange(rate.size) for *_, z in self.terms]
         self.scale = np.asarray(scale, np.float64)
         self.left = self._unabsorbed(residual)
         power = self._powers() - np.sum(self._seen(run.noise.transposed(self.basis)) ** 2, axis=1)
@@ -262,9 +269,10 @@ class _Skipping:
     def _change(self, steps: list[tuple[_Skip, float]]) -> Array:
         added = np.zeros(self.left.size)
         for step, time in steps:
-            since = np.arange(self.left.size - step.block)
-            added[step.block :] += time * sum(
-                (a[step.block] * b[step.block :] * z**since).real for a, b, z in self.terms
+            after = slice(step.block, None)
+            added[after] += time * sum(
+                (a[step.block] * b[after] * power[: self.left.size - step.block]).real
+                for (a, b, _), power in zip(self.terms, self.powers, strict=True)
             )
         return self._unabsorbed(self.run.scaled(added))
 
@@ -283,7 +291,7 @@ class _Skipping:
             return self.run.noise.powers_onward(np.real(self.terms[0][1] * self.scale))
         size = self.left.size
         white = self.run.noise.white
-        free = [z ** np.arange(size) / self.run.noise.scale for _, _, z in self.terms]
+        free = [power / self.run.noise.scale for power in self.powers]
         whitened = [white(np.real(one)) + 1j * white(np.imag(one)) for one in free]
         power = np.zeros(size)
         for (a, _, _), one in zip(self.terms, whitened, strict=True):

@@ -187,12 +187,11 @@ class Problem:
         physics = stated.copy()
         for number, kind in enumerate(kinds):
             kind.on_rows(physics, stated, [row[number] for row in effects], [row[number] for row in drawn])
-        for place, drive in enumerate(physics.drive):
-            if (
-                drive is not None and not drive.on_body
-            ):  # a spring whose root moves, as in `EffectChain.physics`
-                scale = float(physics.spring_stiffness[place])
-                physics.drive[place] = replace(drive, scale=scale)
+        # a spring whose root moves, as in `EffectChain.physics`
+        physics.change_drives(
+            physics.spring_stiffness.tolist(),
+            lambda spring, drive: drive if drive.on_body else replace(drive, scale=spring),
+        )
         if not reads_plainly(effects[0]) or any(physics.rod_twist):
             runs = [run.fine for run in runs]
         zero = values.get("zero", np.zeros(len(runs)))

@@ -9,12 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.slopes import most_winds, slopes, terms
+from tunnel_sim.physics.steps import meets_steps
 from tunnel_sim.vocabulary.record import Array
 
+#: The fields of a run that say which samples its input has.
+_OF_SAMPLES = ("moment", "moment_time", "moment_count", "moment_delay", "moment_held", "moment_on_end")
 _TOGETHER = 8  # motions in a part of the work: those that the integrator takes side by side
 
 
@@ -27,10 +31,13 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, or the motion is read at times of its own.
+        no derivative, its rod twists, the samples of an input are not at the starts of steps, or the motion is
+        read at times of its own.
     """
     acting = {type(effect) for effects in asked.effects for effect in effects}
-    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
+    inputs = zip(asked.runs[:count], asked.physics.drive, strict=False)
+    between = any(drive is not None and not meets_steps(drive.exerted, run.interval) for run, drive in inputs)
+    if between or any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
@@ -38,6 +45,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
     moved = np.swapaxes(values[1:] - values[0], 0, 1)
     blown = [_winds(motions, place, count) for place in range(count)]
+    redriven = [_has_other_input(motions.rows[place::count]) for place in range(count)]
     equal: dict[tuple[float, ...], list[int]] = {}
     for place in range(count):
         equal.setdefault(motions.steps(place), []).append(place)
@@ -51,6 +59,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     def follow(part: list[int]) -> None:
         winds = [blown[place] for place in part]
         for place, change in zip(part, _part(asked, motions, part, moved[part], winds), strict=True):
+            change[redriven[place]] = np.nan
             found[place] = change
 
     side_by_side(follow, parts, asked.data)
@@ -71,6 +80,15 @@ def _winds(motions: Motions, place: int, count: int) -> Array:
         elif first.size > 1:
             change[:] = arrays[0] - first
     return found
+
+
+def _has_other_input(rows: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether a run's input has other samples than at the first point, shape (points,).
+
+    Equal samples are one array, as `Motions.alike` has it.
+    """
+    of_samples = list(_OF_SAMPLES)
+    return np.asarray(rows[of_samples][1:] != rows[of_samples][0], np.bool_)
 
 
 def _part(

@@ -19,7 +19,7 @@ from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.expression import Expression, parse
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
@@ -228,12 +228,14 @@ class NominalModel:
         for name, column in columns.items():
             table[name][:] = column
         table.set(slice(None), self.law_parameters)
+        moments: dict[tuple[RunData, float, float], DriveMoment | None] = {}  # equal ones are one object
         for place, (row, run) in enumerate(zip(rows, runs, strict=True)):
             if self.moment:
                 table.program[place] = _program(self.moment, spring[place])
-            if run.drive is not None:
-                gain, offset = row.get(run.multiplied_by, 1.0), row.get("moment_offset", 0.0)
-                table.drive[place] = run.moment(gain, offset)
+            key = run, row.get(run.multiplied_by, 1.0), row.get("moment_offset", 0.0)
+            if key not in moments:
+                moments[key] = run.moment(*key[1:])
+            table.drive[place] = moments[key]
         return table
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:

@@ -182,9 +182,16 @@ class RunData:
                 does not matter.
             offset: a constant moment beside the input, N m; 0 where that of the input is 0 throughout.
         """
+        if self._seen_drive is None:
+            return None
+        scale = self._seen_drive.scale * (gain if self.multiplied_by else 1.0)
+        return dataclasses.replace(self._seen_drive, scale=scale, offset=offset)
+
+    @cached_property
+    def _seen_drive(self) -> DriveMoment | None:
+        """The samples of the input that the blocks see, with the delay from the first block on."""
         if self.drive is None:
             return None
-        scale = self.drive.scale * (gain if self.multiplied_by else 1.0)
         end = self.start + (self.reading.size + 1) * self.interval
         first, last = np.searchsorted(self.drive.time_s, (self.start, end))
         seen = slice(max(int(first) - 1, 0), int(last) + 2)
@@ -192,8 +199,6 @@ class RunData:
             self.drive,
             time_s=self.drive.time_s[seen],
             values=self.drive.values[seen],
-            scale=scale,
-            offset=offset,
             delay=self.drive.delay - self.start,
         )
 

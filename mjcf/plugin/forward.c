@@ -270,8 +270,7 @@ Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weight
   return s;
 }
 
-// The drive from the step's start on. Returns the time of its next sample, s, or infinity after the last.
-static double set_drive(Step* s) {
+double vwt_set_drive(Step* s) {
   const vwt_run* run = s->run;
   const int last = (int)run->moment_count - 1;
   const double delay = run->moment_delay, *time = run->moment_time;
@@ -281,7 +280,7 @@ static double set_drive(Step* s) {
     s->sample++;
   }
   const int at = s->sample < 0 ? 0 : s->sample;
-  s->moment = run->moment_scale * run->moment[at];
+  s->moment = run->moment_scale * run->moment[at] + run->moment_offset;
   s->moment_slope = 0;
   s->moment_from = time[at] + delay;
   if (s->sample >= 0 && s->sample < last && run->moment_held == 0) {
@@ -294,7 +293,7 @@ static double set_drive(Step* s) {
 static void step_with_drive(Step* s, double h, int coulomb) {
   const double end = s->start + h, least = kReached * h;
   for (;;) {
-    const double next = set_drive(s), left = end - s->start;
+    const double next = vwt_set_drive(s), left = end - s->start;
     const double part = next < end - least ? next - s->start : left;
     if (coulomb) {
       vwt_step_with_friction(s, part);

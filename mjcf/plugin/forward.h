@@ -33,6 +33,8 @@
   NUMBER(moment_delay)     /* s, by which the drive acts later than its samples */  \
   NUMBER(moment_held)      /* 1: constant from one sample to the next; 0: linear */ \
   NUMBER(moment_on_end)    /* 1: moves the spring's root; 0: acts on the body */    \
+  NUMBER(moment_offset)    /* N m, a constant moment beside the samples */          \
+  NUMBER(moment_interval)  /* s, between even samples, each at the start of a step; 0: they are not so */ \
   POINTER(program)         /* of the moment by expression, program_count elements */ \
   NUMBER(program_count)    /* 0: none */                                            \
   NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \
@@ -79,6 +81,7 @@ VWT_API int vwt_forward(int count, const vwt_parameters* parameters, const vwt_r
   X(square)                                                                           \
   X(play)                  /* 1/s2, of the part of the angle within the free play */   \
   X(constant)              /* 1/s2 */                                                  \
+  X(drive)                 /* of its input */                                          \
   X(gravity_sine)                                                                     \
   X(gravity_cosine)                                                                   \
   X(friction)                                                                         \

@@ -6,9 +6,16 @@
 
 #include "lanes.h"
 
+// Whether the root of a spring moves as far as the input says, where it moves.
+static int is_plain_drive(const vwt_parameters* p, const vwt_run* run) {
+  const int turned = run->moment_on_end == 0 || (run->moment_scale == p->spring_stiffness && run->moment_offset == 0);
+  return run->moment_interval > 0 && run->wind_count == 1 && p->friction_load == 0 && turned;
+}
+
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
   const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
-  return steady && run->forcing_count == 0 && run->ambient_count == 0 && run->moment_count == 0 &&
+  return steady && run->forcing_count == 0 && run->ambient_count == 0 &&
+         (run->moment_count == 0 || is_plain_drive(p, run)) &&
          run->program_count == 0 && run->twist_stiffness == 0 && run->twist == 0 && run->twist_rate == 0 &&
          !(p->presliding > 0);
 }
@@ -21,22 +28,26 @@ int vwt_alike(const vwt_run* one, const vwt_run* other) {
 INLINE void runge_kutta(const Lanes* c, const State* s, int features, Lane* angle, Lane* rate) {
   const Lane h = c->whole_step, half = c->half_step, none = {0};
   const int sheds = features & SHEDDING, lags = features & LAG;
+  const Input in = input_of(c, features, s->start, half);
   Lane shed = sheds ? shed_at(&c->law, s->start) : none;
   Air air = air_at(c, features, s->start);
-  const Lane a1 = acceleration_at(c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
+  Lane input = input_at(&in, features, s->start);
+  const Lane a1 = acceleration_at(c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged, input);
   const Lane y2 = s->angle + half * s->rate, r2 = s->rate + half * a1;
   shed = sheds ? shed_at(&c->law, s->start + half) : none;
   air = air_at(c, features, s->start + half);
+  input = input_at(&in, features, s->start + half);
   Lane lagged = lags ? lagged_at(c, s, c->half, half, y2, r2) : none;
-  const Lane a2 = acceleration_at(c, &air, s->slip, features, y2, r2, shed, lagged);
+  const Lane a2 = acceleration_at(c, &air, s->slip, features, y2, r2, shed, lagged, input);
   const Lane y3 = s->angle + half * r2, r3 = s->rate + half * a2;
   lagged = lags ? lagged_at(c, s, c->half, half, y3, r3) : none;
-  const Lane a3 = acceleration_at(c, &air, s->slip, features, y3, r3, shed, lagged);
+  const Lane a3 = acceleration_at(c, &air, s->slip, features, y3, r3, shed, lagged, input);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
   shed = sheds ? shed_at(&c->law, s->start + h) : none;
   air = air_at(c, features, s->start + h);
+  input = input_at(&in, features, s->start + h);
   lagged = lags ? lagged_at(c, s, c->whole, h, y4, r4) : none;
-  const Lane a4 = acceleration_at(c, &air, s->slip, features, y4, r4, shed, lagged);
+  const Lane a4 = acceleration_at(c, &air, s->slip, features, y4, r4, shed, lagged, input);
   *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }

@@ -27,8 +27,14 @@ typedef struct {
   int count;  // of the lanes that are runs; the others repeat the first one's start
   const vwt_run* run[VWT_LANES];
   Lane step, whole_step, half_step, body, inertia, damping, rod, friction, least_rate;
+  Lane scale, offset, turns;  // of a drive: N m per unit and N m, seen from the upper end; 1 where it turns the root
   double half[VWT_LANES][4], whole[VWT_LANES][4];  // weights of the lag
 } Lanes;
+
+// The input of a drive in a step, by lane: its value at a time, s, and its slope from there on; 0 without a drive.
+typedef struct {
+  Lane value, slope, from;
+} Input;
 
 // The start of a step, by lane.
 typedef struct {
@@ -42,7 +48,7 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   set_coefficients(&c->law, k, p);
   set_wake(&c->law, k, p, wind);
   set_air(&c->air, k, p, wind);
-  c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0);
+  c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0) | (run->moment_count > 0 ? DRIVE : 0);
   c->rubs |= vwt_rubs(p);
   c->dry[k] = -vwt_rubs(p);
   c->run[k] = run;
@@ -55,6 +61,12 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   c->damping[k] = p->mechanical_damping;
   c->friction[k] = p->friction_moment;
   c->least_rate[k] = vwt_friction_least_rate(p, p->yaw_inertia, run->step);
+  if (run->moment_count > 0) {
+    const double share = run->moment_on_end != 0 ? 1 : c->body[k];
+    c->scale[k] = share * run->moment_scale;
+    c->offset[k] = share * run->moment_offset;
+    c->turns[k] = run->moment_on_end != 0 && p->spring_stiffness > 0;
+  }
   const double lag = fabs(c->law.lag[k]);
   if (lag != 0) {
     vwt_lag_weights(c->half_step[k] / lag, c->half[k]);
@@ -83,15 +95,49 @@ INLINE Air air_at(const Lanes* c, int features, Lane time) {
   return out;
 }
 
-// Angular acceleration at a motion, with the powers in it; `shed` and `lagged` are read only with the features they
-// belong to.
+// The input in a step from `start` on, whose middle is half a step later.
+INLINE Input input_of(const Lanes* c, int features, Lane start, Lane half) {
+  Input out = {{0}, {0}, {0}};
+  for (int k = 0; features & DRIVE && k < VWT_LANES; k++) {
+    const vwt_run* run = c->run[k];
+    const int last = (int)run->moment_count - 1;
+    if (last < 0) {
+      continue;
+    }
+    const double first = run->moment_time[0] + run->moment_delay;
+    const double passed = floor((start[k] + half[k] - first) / run->moment_interval);
+    const int at = passed < 0 ? 0 : passed < last ? (int)passed : last;
+    out.value[k] = run->moment[at];
+    out.from[k] = first + at * run->moment_interval;
+    if (passed >= 0 && at < last && run->moment_held == 0) {
+      out.slope[k] = (run->moment[at + 1] - run->moment[at]) / run->moment_interval;
+    }
+  }
+  return out;
+}
+
+INLINE Lane input_at(const Input* in, int features, Lane time) {
+  return features & DRIVE ? in->value + in->slope * (time - in->from) : in->value;
+}
+
+// The angle by which the spring is deflected.
+INLINE Lane deflection_at(const Lanes* c, int features, Lane angle, Lane input) {
+  return features & DRIVE ? angle - c->turns * input : angle;
+}
+
+// Angular acceleration at a motion, with the powers in it; `shed`, `lagged` and `input` are read only with the features
+// they belong to.
 INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
-                         Lane lagged, Powers* powers) {
+                         Lane lagged, Lane input, Powers* powers) {
   const Coefficients* law = &c->law;
   const Lane air = moment_of_air(law, flow, features, c->body * angle, c->body * rate, shed, lagged, powers);
-  Lane moment = moment_of_mechanism(law, features, angle, angle, rate, powers);
+  const Lane deflection = deflection_at(c, features, angle, input);
+  Lane moment = moment_of_mechanism(law, features, angle, deflection, rate, powers);
   moment = moment - law->spring * angle - c->damping * rate;
   moment = moment + c->body * air - c->rod * angle;
+  if (features & DRIVE) {
+    moment = moment + (c->scale * input + c->offset);
+  }
   Lane friction = c->friction;
   if (features & RATE) {
     for (int k = 0; k < VWT_LANES; k++) {
@@ -103,9 +149,9 @@ INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int feature
 }
 
 INLINE Lane acceleration_at(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
-                            Lane lagged) {
+                            Lane lagged, Lane input) {
   Powers powers;
-  return acceleration(c, flow, slip, features, angle, rate, shed, lagged, &powers);
+  return acceleration(c, flow, slip, features, angle, rate, shed, lagged, input, &powers);
 }
 
 INLINE Lane lagged_at(const Lanes* c, const State* s, const double weights[][4], Lane duration,
@@ -135,13 +181,16 @@ static void step_alone(const Lanes* c, State* s, int k, Step* alone) {
   alone->from.rate = s->rate[k];
   alone->lagged = s->lagged[k];
   alone->slip = (int)s->slip[k];
+  if (alone->run->moment_count > 0) {
+    vwt_set_drive(alone);
+  }
   vwt_step_with_friction(alone, c->whole_step[k]);
   s->angle[k] = alone->from.angle;
   s->rate[k] = alone->from.rate;
   s->lagged[k] = alone->lagged;
   s->slip[k] = alone->slip;
   const int changed = s->rate[k] != 0 || rate != 0 || s->angle[k] != angle || s->lagged[k] != lagged;
-  s->rests[k] = !changed && c->law.shedding[k] == 0;
+  s->rests[k] = !changed && c->law.shedding[k] == 0 && alone->run->moment_count == 0;
 }
 
 // Up to `VWT_LANES` runs at their start.

@@ -38,8 +38,8 @@ INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : othe
 #endif
 
 // What a law has that needs a function of the library, or a loop. RATE: friction that depends on rate or load; WIND: of
-// samples, where a run has them
-enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16, WIND = 32, ANY = 63 };
+// samples, where a run has them; DRIVE: a drive, where a run has one
+enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16, WIND = 32, DRIVE = 64, ANY = 127 };
 
 // The coefficients of the law, by lane.
 typedef struct {

@@ -57,17 +57,21 @@ INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane m
                     const LagSlopes* whole, int width, const int* columns, Change* change, Lane* angle, Lane* rate) {
   const Lanes* c = law->c;
   const int lags = features & LAG;
+  const Input in = input_of(c, features, s->start, middle);
+  Lane input = input_at(&in, features, s->start);
   Stage at[4];
-  const Lane a1 = evaluate(law, s->slip, features, s->start, s->angle, s->rate, s->lagged, &at[0]);
+  const Lane a1 = evaluate(law, s->slip, features, s->start, s->angle, s->rate, s->lagged, input, &at[0]);
   const Lane y2 = s->angle + middle * s->rate, r2 = s->rate + middle * a1;
   Lane lagged = lags ? lagged_at(c, s, half->w, middle, y2, r2) : (Lane){0};
-  const Lane a2 = evaluate(law, s->slip, features, s->start + middle, y2, r2, lagged, &at[1]);
+  input = input_at(&in, features, s->start + middle);
+  const Lane a2 = evaluate(law, s->slip, features, s->start + middle, y2, r2, lagged, input, &at[1]);
   const Lane y3 = s->angle + middle * r2, r3 = s->rate + middle * a2;
   lagged = lags ? lagged_at(c, s, half->w, middle, y3, r3) : (Lane){0};
-  const Lane a3 = evaluate(law, s->slip, features, s->start + middle, y3, r3, lagged, &at[2]);
+  const Lane a3 = evaluate(law, s->slip, features, s->start + middle, y3, r3, lagged, input, &at[2]);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
   lagged = lags ? lagged_at(c, s, whole->w, h, y4, r4) : (Lane){0};
-  const Lane a4 = evaluate(law, s->slip, features, s->start + h, y4, r4, lagged, &at[3]);
+  input = input_at(&in, features, s->start + h);
+  const Lane a4 = evaluate(law, s->slip, features, s->start + h, y4, r4, lagged, input, &at[3]);
   *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
   Lane by_lag_after = {0};
@@ -222,7 +226,9 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
   if (asked->pace >= 0) {
     const Lane none = {0}, shed = features & SHEDDING ? shed_at(&law->c->law, s->start) : none;
     const Air air = air_at(law->c, features, s->start);
-    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged);
+    const Input in = input_of(law->c, features, s->start, law->c->half_step);
+    const Lane input = input_at(&in, features, s->start);
+    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged, input);
     const Mask rests = law->c->dry & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);

@@ -27,7 +27,7 @@ typedef struct {
 
 // A stage of a step, and the derivatives of the acceleration there.
 typedef struct {
-  Lane angle, rate, time, seen;
+  Lane angle, rate, time, seen, input, deflection;
   Air air;
   Lane speed, pressure;  // of a wind of samples, m/s and (m/s)2; 1 in a constant wind
   Lane by_speed;         // of the acceleration, in a wind of samples
@@ -155,27 +155,30 @@ INLINE void blow(const Law* law, Stage* at) {
 }
 
 // The acceleration at a stage, and its derivatives by the motion there.
-INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged,
+INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged, Lane input,
                      Stage* at) {
   const Lanes* c = law->c;
   const Lane none = {0}, body = c->body * angle, size = size_of(body);
+  const Lane deflection = deflection_at(c, features, angle, input), bend = size_of(deflection);
   at->angle = angle;
   at->rate = rate;
   at->time = time;
+  at->input = input;
+  at->deflection = deflection;
   at->seen = seen_at(&c->law, features, body, lagged);
   at->air = air_at(c, features, time);
   const Air air = at->air;
   const Lane shed = features & SHEDDING ? shed_at(&c->law, time) : none;
-  const Lane found = acceleration(c, &air, slip, features, angle, rate, shed, lagged, &at->powers);
+  const Lane found = acceleration(c, &air, slip, features, angle, rate, shed, lagged, input, &at->powers);
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
-       square = 2 * size_of(angle);
+       square = 2 * bend;
   if (features & POWERS) {
     steepening = steepness(p->steepening, size, law->steepening);
     thickening = steepness(p->thickening, size, law->thickening);
     turning_rate = steepness(p->rate, size_of(rate), law->rate);
-    cube = steepness(p->cube, size_of(angle), law->cube);
-    square = steepness(p->square, size_of(angle), law->square);
+    cube = steepness(p->cube, bend, law->cube);
+    square = steepness(p->square, bend, law->square);
   }
   const Lane leads = choose(c->law.lag < 0, 2 * c->body, c->body);
   const Lane seen_by_angle = features & LAG ? choose(c->law.lag > 0, none, leads) : c->body;
@@ -187,8 +190,8 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
                              air.stiffness * at->seen * c->law.moment_cubic * with_sign(steepening, body) * c->body +
                              air.damping * c->law.damping_quadratic * with_sign(thickening, body) * c->body *
                                  (c->body * rate));
-  by_angle -= c->law.cubic * cube + c->law.quadratic * with_sign(square, angle) + c->rod;
-  by_angle -= choose(size_of(angle) < c->law.free_play, none, c->law.spring);
+  by_angle -= c->law.cubic * cube + c->law.quadratic * with_sign(square, deflection) + c->rod;
+  by_angle -= choose(bend < c->law.free_play, none, c->law.spring);
   if (features & GRAVITY) {
     for (int k = 0; k < VWT_LANES; k++) {
       by_angle[k] -= c->law.gravity[k] != 0 ? c->law.gravity[k] * cos(angle[k] - c->law.gravity_angle[k]) : 0;
@@ -237,7 +240,7 @@ INLINE Lane by_wind(const Law* law, int change, const Stage* at) {
 // The derivative of the acceleration at a stage by a term, `features` those of the law.
 INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Stage* at) {
   const Lanes* c = law->c;
-  const Lane none = {0}, angle = at->angle, rate = at->rate;
+  const Lane none = {0}, angle = at->angle, rate = at->rate, bend = at->deflection;
   const Powers* p = &at->powers;
   const double quarter = 1.5707963267948966192313216916398;
   const Lane speed = features & WIND ? at->speed : none + 1, pressure = features & WIND ? at->pressure : none + 1;
@@ -260,13 +263,15 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
     case VWT_TERM_rate_power:
       return -with_sign(p->rate, rate);
     case VWT_TERM_cube:
-      return -with_sign(p->cube, angle);
+      return -with_sign(p->cube, bend);
     case VWT_TERM_square:
       return -p->square;
     case VWT_TERM_play:
-      return taken_up(&c->law, angle);
+      return taken_up(&c->law, bend);
     case VWT_TERM_constant:
       return pressure;
+    case VWT_TERM_drive:
+      return at->input;
     case VWT_TERM_gravity_sine: {
       Lane out;
       for (int k = 0; k < VWT_LANES; k++) {
@@ -297,11 +302,11 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Sta
       return -law->inverse * c->law.quadratic_damping * with_sign(p->rate, rate) *
              logarithm(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_cube_exponent:
-      return -law->inverse * c->law.cubic * with_sign(p->cube, angle) * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.cubic * with_sign(p->cube, bend) * logarithm(size_of(bend), VWT_ANGLE_REFERENCE);
     case VWT_TERM_square_exponent:
-      return -law->inverse * c->law.quadratic * p->square * logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.quadratic * p->square * logarithm(size_of(bend), VWT_ANGLE_REFERENCE);
     case VWT_TERM_gap:
-      return choose(size_of(angle) > c->law.free_play, with_sign(law->inverse * c->law.spring, angle), none);
+      return choose(size_of(bend) > c->law.free_play, with_sign(law->inverse * c->law.spring, bend), none);
     case VWT_TERM_friction_exponent:
       return law->features & RATE ? at->by_friction[0]
                                   : -slip * law->inverse * c->friction * logarithm(size_of(rate), VWT_RATE_REFERENCE);
@@ -338,7 +343,8 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_cube] = c->law.cubic[k] * inverse;
   out[VWT_TERM_square] = c->law.quadratic[k] * inverse;
   out[VWT_TERM_play] = c->law.free_play[k] > 0 ? c->law.spring[k] * inverse : 0;
-  out[VWT_TERM_constant] = air * c->law.flow_angle[k];
+  out[VWT_TERM_constant] = air * c->law.flow_angle[k] + c->offset[k] * inverse;
+  out[VWT_TERM_drive] = c->scale[k] * inverse;
   out[VWT_TERM_gravity_sine] = c->law.gravity[k] * inverse * cos(c->law.gravity_angle[k]);
   out[VWT_TERM_gravity_cosine] = c->law.gravity[k] * inverse * sin(c->law.gravity_angle[k]);
   out[VWT_TERM_friction] = c->friction[k] * inverse;

@@ -103,7 +103,8 @@ class EffectChain:
             The measured angle or its derivative, in the same unit, shape (n,).
         """
         stated = self.stated
-        if stated.drive is not None:  # with its delay and its actuator
+        swings = any(_overrides(effect, "oscillation") for effect in self.effects)
+        if swings and stated.drive is not None:  # with its delay and its actuator
             stated = replace(stated, drive=self.physics().drive)
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             beside = effect.oscillation(time_s, stated, drawn, derivative)

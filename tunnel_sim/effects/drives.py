@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.effects.traits import Text
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
 _SLOW = 0.03
@@ -40,11 +41,21 @@ class _OfActuator(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the actuator; a free decay has none."""
         del stated, drawn
-        if self.is_null or run.drive is None or not run.drive.through_actuator:
-            return run
+        return run if run.drive is None else dataclasses.replace(run, drive=self._exerted(run.drive))
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Change the actuators of many runs."""
+        del stated, drawn
+        runs.change_drives(effects, cls._exerted)
+
+    def _exerted(self, drive: DriveMoment) -> DriveMoment:
+        if self.is_null or not drive.through_actuator:
+            return drive
         own = {info.name: getattr(self, info.name) for info in self.parameters()}
-        actuator = dataclasses.replace(run.drive.actuator, **own)
-        return dataclasses.replace(run, drive=dataclasses.replace(run.drive, actuator=actuator))
+        return dataclasses.replace(drive, actuator=dataclasses.replace(drive.actuator, **own))
 
 
 @dataclass(frozen=True)

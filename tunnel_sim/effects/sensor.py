@@ -12,7 +12,7 @@ from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effec
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.forward import backlash
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
@@ -475,7 +475,15 @@ class InputDelay(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Shift the input; a free decay has none."""
         del stated, drawn
-        if self.is_null or run.drive is None:
-            return run
-        later = dataclasses.replace(run.drive, delay=run.drive.delay + self.delay)
-        return dataclasses.replace(run, drive=later)
+        return run if run.drive is None else dataclasses.replace(run, drive=self._later(run.drive))
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Shift the inputs of many runs."""
+        del stated, drawn
+        runs.change_drives(effects, cls._later)
+
+    def _later(self, drive: DriveMoment) -> DriveMoment:
+        return drive if self.is_null else dataclasses.replace(drive, delay=drive.delay + self.delay)

@@ -72,7 +72,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     imposed = _NONE if forcing is None else np.array(forcing.values, dtype=np.float64)
     beside = _NONE if ambient is None else np.array(ambient.values, dtype=np.float64)
     program = np.array(settings.program, dtype=np.float64) if settings.program else _NONE
-    drive = None if settings.drive is None else settings.drive.acting
+    drive = None if settings.drive is None else settings.drive.exerted
     driven = () if drive is None else (drive.values, drive.time_s)
     fields = {
         "wind": values.ctypes.data,
@@ -101,6 +101,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
             "moment_delay": drive.delay,
             "moment_held": float(drive.held),
             "moment_on_end": float(not drive.on_body),
+            "moment_offset": drive.offset,
         }
     if settings.rod_twist is not None:
         twist, end = settings.rod_twist, spring_end_angle(settings)

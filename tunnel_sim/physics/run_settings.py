@@ -22,7 +22,16 @@ from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
-from tunnel_sim.vocabulary.quantities import Angles, Moments, Number, PerSample, RadPerS, Rates, Times
+from tunnel_sim.vocabulary.quantities import (
+    Angles,
+    Moments,
+    Number,
+    PerSample,
+    RadPerS,
+    Rates,
+    Seconds,
+    Times,
+)
 from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -32,6 +41,7 @@ _OWNED = frozenset(
         "spring_stiffness", "mechanical_damping", "yaw_inertia",
     }
 )  # fmt: skip
+_EVEN = 1e-6  # of an interval: a smaller departure from even samples is rounding
 
 
 def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
@@ -138,21 +148,37 @@ class DriveMoment:
         """Copy and check the samples."""
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
-        numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay, self.offset]])
-        if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
+        finite = all(map(isfinite, (self.scale, self.delay, self.offset)))
+        finite = finite and bool(np.isfinite(self.time_s).all() and np.isfinite(self.values).all())
+        if self.time_s.shape != self.values.shape or not self.time_s.size or not finite:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
     @cached_property
-    def acting(self) -> DriveMoment:
-        """The acting moment, as samples without an actuator or an offset."""
-        if self.actuator == DIRECT and not self.offset:
+    def exerted(self) -> DriveMoment:
+        """The moment behind the actuator, as samples and an offset; none where the scale is 0."""
+        offset = self.offset if self.scale else 0.0
+        if self.actuator == DIRECT and offset == self.offset:
             return self
         given = self.actuator.exerted(Samples(self.time_s, self.values, self.held), self.scale)
-        beside = self.offset / self.scale if self.scale and self.offset else 0.0
         return DriveMoment(
-            given.time_s, given.values + beside, self.scale, self.delay, given.held, self.on_body
+            given.time_s, given.values, self.scale, self.delay, given.held, self.on_body, offset=offset
         )
+
+    @cached_property
+    def acting(self) -> DriveMoment:
+        """The acting moment, as samples without an actuator or an offset."""
+        exerted = self.exerted
+        if not exerted.offset:
+            return exerted
+        return replace(exerted, values=exerted.values + exerted.offset / exerted.scale, offset=0.0)
+
+    @cached_property
+    def interval(self) -> Seconds:
+        """Time between its samples; 0 where they are not even."""
+        interval = float(self.time_s[-1] - self.time_s[0]) / max(1, self.time_s.size - 1)
+        even = self.time_s[0] + interval * np.arange(self.time_s.size)
+        return interval if np.max(np.abs(self.time_s - even)) <= _EVEN * interval else 0.0
 
     @property
     def through_actuator(self) -> bool:
@@ -171,20 +197,17 @@ class DriveMoment:
         rates = np.abs(np.diff(self.values)) / np.diff(self.time_s)
         return size * float(np.max(np.abs(self.values))), size * float(np.max(rates, initial=0.0))
 
-    def at_steps(self, step: float) -> bool:
-        """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay.
-
-        Args:
-            step: s.
-        """
-        interval = float(self.time_s[-1]) / max(1, self.time_s.size - 1)
-        apart = interval / step
-        if self.delay != 0.0 or self.time_s.size < 2 or round(apart) < 1:
-            return False
-        even = np.allclose(
-            self.time_s, interval * np.arange(self.time_s.size), rtol=0.0, atol=1e-6 * interval
+    def on_steps(self, step: Seconds) -> bool:
+        """Whether it acts from sample to sample at even times, each a whole number of steps from 0."""
+        apart, first = self.interval / step, (self.time_s[0] + self.delay) / step
+        within = _EVEN * apart
+        return (
+            round(apart) >= 1 and abs(apart - round(apart)) <= within and abs(first - round(first)) <= within
         )
-        return bool(even) and abs(apart - round(apart)) <= 1e-6 * apart
+
+    def at_steps(self, step: Seconds) -> bool:
+        """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay."""
+        return self.delay == 0.0 and abs(self.time_s[0]) <= _EVEN * self.interval and self.on_steps(step)
 
     def means(self, ends: Times) -> PerSample:
         """Means of the delayed input between successive times since the run's start, which keep its impulse."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -113,6 +114,22 @@ class SettingsTable:
         """
         for name, value in values.items():
             self.numbers[rows, _further()[name]] = value
+
+    def change_drives(
+        self, by: Sequence[Hashable], changed: Callable[[Any, DriveMoment], DriveMoment]
+    ) -> None:
+        """Change the inputs of the driven runs; equal changes of one input give one object.
+
+        Args:
+            by: what changes the input of every run.
+            changed: the input after a change.
+        """
+        known: dict[tuple[Hashable, DriveMoment], DriveMoment] = {}
+        for place, (change, drive) in enumerate(zip(by, self.drive, strict=True)):
+            if drive is not None:
+                if (change, drive) not in known:
+                    known[change, drive] = changed(change, drive)
+                self.drive[place] = known[change, drive]
 
     def row(self, place: int) -> RunSettings:
         """The settings of one run, whose numbers are not checked again; its step is the usual one."""

@@ -19,7 +19,7 @@ from math import ceil, inf, isfinite, log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
@@ -77,6 +77,28 @@ def fit_substeps(runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.in
             fastest = rod.free_frequency(float(runs["yaw_inertia"][place]))
             longest[place] = min(longest[place], max(ROD_TURN / fastest, _FIT_SHORTEST))
     return np.ceil(interval / longest).astype(np.int64)
+
+
+def meets_steps(drive: DriveMoment, interval: Seconds) -> bool:
+    """Whether an interval between block ends can be divided so that steps begin at the samples of an input.
+
+    Args:
+        drive: without an actuator.
+    """
+    return drive.interval > 0.0 and drive.on_steps(interval / max(1, round(interval / drive.interval)))
+
+
+def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
+    """The number of steps in an interval, at least a given one, that begin at the samples of an input if they can.
+
+    Args:
+        interval: between block ends.
+        drive: of the run, without an actuator.
+    """
+    if not meets_steps(drive, interval):
+        return least
+    inside = max(1, round(interval / drive.interval))  # samples in an interval
+    return inside * ceil(least / inside)
 
 
 def fit_stride(rig: Rig, runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:

@@ -17,10 +17,17 @@ _GAP = 4.0  # mean intervals: a longer step is a gap
 
 
 def read_only(values: ArrayLike) -> Array:
-    """A read-only float64 copy."""
+    """A read-only float64 copy, or the values themselves where they are one already."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and _is_constant(values):
+        return values
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
+
+
+def _is_constant(values: np.ndarray) -> bool:
+    owner = values if values.base is None else values.base
+    return not values.flags.writeable and isinstance(owner, np.ndarray) and not owner.flags.writeable
 
 
 @dataclass(frozen=True, eq=False)

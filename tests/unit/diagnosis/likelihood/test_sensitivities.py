@@ -1,5 +1,7 @@
 """Sensitivities without finite differences of motions: what they agree with, and where there are none."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from diagnosis.likelihood.sensitivities import motion_changes, moves
 from diagnosis.model.parameters import Point
 from tests.unit.diagnosis.likelihood.test_least_squares import SIX, prepared
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
+from tunnel_sim.physics.run_settings import DriveMoment
 
 NOMINAL = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, "cn_r": -0.11, "zero": 0.004}
 #: Parameters that take finite differences: a law, or samples of the wind, that exist on one side only.
@@ -94,3 +97,39 @@ def test_first_order_changes_are_those_of_predictions(data, name, tolerance):
             expected = (after[r] - before[r]) / 8.0
             error = np.linalg.norm(change[i] - expected)
             assert error <= tolerance * np.linalg.norm(expected) + 1e-12, (i, r)
+
+
+def driven(data, *, on_body):
+    """The same runs with an input at the times of their samples."""
+    runs = []
+    for number, run in enumerate(data.runs):
+        times = np.arange(run.reading.size * run.block) * (run.interval / run.block)
+        values = (0.5 if on_body else 0.1) * np.sin((3.0 + number) * times + times**2)
+        runs.append(dataclasses.replace(run, drive=DriveMoment(times, values, on_body=on_body)))
+    return data.with_runs(tuple(runs))
+
+
+@pytest.mark.parametrize("on_body", [True, False], ids=["moment", "root"])
+@pytest.mark.parametrize(
+    "name", ["spring_miscalibration", "cubic_stiffness", "coulomb_friction", "second_mode"]
+)
+def test_driven_runs_have_derivatives(data, name, on_body):
+    kind = effect_class(name)
+    problem, point = at_example(driven(data, on_body=on_body), kind)
+    points, _ = moves(problem, point)
+    found = motion_changes(problem, point, points)
+    expected = problem.predict([point, *points])
+    for i, there in enumerate(expected[1:]):
+        for change, after, before in zip(found, there, expected[0], strict=True):
+            error = np.linalg.norm(change[i] - (after - before))
+            assert error <= 2e-2 * np.linalg.norm(after - before) + 1e-12, i
+
+
+def test_other_samples_of_the_input_take_finite_differences(data):
+    """All parameters do where the samples that act are not at the starts of steps."""
+    problem, point = at_example(driven(data, on_body=True), effect_class("input_delay"))
+    point.common[problem.names.index("input_delay.delay")] = 0.0
+    assert without_derivative(problem, point) == {"delay"}
+    problem, point = at_example(driven(data, on_body=True), effect_class("actuator_lag"))
+    every = {name.rpartition(".")[2] for name in (*problem.names, *problem.parameters.own_names)}
+    assert without_derivative(problem, point) == every

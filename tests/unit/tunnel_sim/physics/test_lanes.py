@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.unit.tunnel_sim.physics.test_slopes import runs
+from tests.unit.tunnel_sim.physics.test_slopes import DRIVES, JUMPING, KINKED, SMOOTH, driven, runs
 from tunnel_sim.physics.forward import integrate
 
 FORMS = {
@@ -40,3 +40,25 @@ def test_a_sampled_wind_of_one_value_is_a_constant_one():
     wind = np.full(4, 15.0)
     run["wind"], run["wind_count"], run["wind_interval"] = wind.ctypes.data, 4, 0.5
     assert np.array_equal(integrate(law, run, 400)[0], constant)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_driven_runs_move_side_by_side_as_alone(drive):
+    """Inputs whose samples are not known to be at the starts of steps keep runs from the others."""
+    for name, (values, _) in {**SMOOTH, **KINKED, **JUMPING}.items():
+        law, run = driven(*runs(values, count=11), drive)
+        run["angle"] += 0.01 * np.arange(11)
+        together = integrate(law, run, 400)
+        run["moment_interval"] = 0.0
+        alone = integrate(law, run, 400)
+        assert together[2] == alone[2] == 0
+        np.testing.assert_allclose(together[0], alone[0], rtol=0.0, atol=1e-10, err_msg=name)
+
+
+def test_a_driven_run_has_free_ones_beside_it():
+    law, run = driven(*runs({}, count=3), "linear moment")
+    expected = integrate(law[:1], run[:1], 400)[0][0]
+    run["moment_count"][1:] = 0
+    found = integrate(law, run, 400)[0]
+    np.testing.assert_array_equal(found[0], expected)
+    np.testing.assert_array_equal(found[1], integrate(*runs({}), 400)[0][0])

@@ -97,6 +97,26 @@ def blown(law, run, wind):
     return law, run
 
 
+#: Inputs, sampled at every second step of the runs from two samples before their start on.
+INPUT = 0.1 * np.concatenate([[3.0, -2.0], np.sin(np.arange(250) ** 1.3), np.zeros(90)])
+INPUT_TIME = 0.008 * (np.arange(INPUT.size) - 2.0)  # s
+#: How an input acts: on the body, or on the root of the spring, linear or constant between its samples.
+DRIVES = {
+    "linear moment": {"moment_scale": 8.0, "moment_offset": 0.05},
+    "held moment": {"moment_scale": 8.0, "moment_offset": 0.05, "moment_held": 1},
+    "root": {"moment_scale": NOMINAL["spring_stiffness"], "moment_on_end": 1},
+}
+
+
+def driven(law, run, drive):
+    """The same runs with an input."""
+    run = run.copy()
+    given = {"moment": INPUT.ctypes.data, "moment_time": INPUT_TIME.ctypes.data, "moment_count": INPUT.size}
+    for name, value in {**given, "moment_interval": 0.008, **DRIVES[drive]}.items():
+        run[name] = value
+    return law, run
+
+
 def moved(law, run, name, by):
     law, run = law.copy(), run.copy()
     if name in parameter_names():
@@ -112,9 +132,11 @@ def difference(of: Callable[[float], np.ndarray], step: float) -> np.ndarray:
     return (8.0 * near - far) / (12.0 * step)
 
 
-def errors(values, names, relative, wind=WIND, **steps):
+def errors(values, names, relative, wind=WIND, drive=None, **steps):
     """How far the derivatives are from those of differences, relative to their norm, by parameter."""
     law, run = runs(values, **steps)
+    if drive is not None:
+        law, run = driven(law, run, drive)
     if wind.size > 1:
         law, run = blown(law, run, wind)
     for name in names:
@@ -144,6 +166,17 @@ def test_derivatives_of_a_smooth_law_are_those_of_the_motion(name, steps):
     for parameter, error in errors(values, names, 1e-4, **steps):
         if parameter != "width" or "strouhal_number" in values:  # else it changes nothing
             assert error < 1e-8, parameter
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_derivatives_of_a_driven_run_are_those_of_the_motion(drive):
+    own = ("moment_scale", "moment_offset", "spring_stiffness") if drive != "root" else ()
+    laws = {**SMOOTH, **JUMPING}
+    for name in ("linear", "cubic, other power", "quadratic", "lag", "gravity", "friction"):
+        values, names = laws[name]
+        names = [one for one in (*own, *names) if one != "width" and (own or one != "spring_stiffness")]
+        for parameter, error in errors(values, names, 1e-4 if name in SMOOTH else 1e-5, drive=drive):
+            assert error < (1e-8 if name in SMOOTH else 1e-5), (name, parameter)
 
 
 @pytest.mark.parametrize("wind", WINDS)
