@@ -35,6 +35,7 @@ KNOWN_IN_SEVERAL = {
     "part_price": "a part is tried, taken and compared at one price",
     "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
+    "alike_within": "of random moments of two sources, and of two kinds of one source",
     "leak": "wherever channels are compared",
     "common_first": "the sentence states the share",
     "own_number_gain": "wherever an instant or a phase counts",
