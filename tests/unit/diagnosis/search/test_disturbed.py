@@ -226,7 +226,7 @@ def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monke
     found = diagnose(struck, kinds=FEW).to_json_dict()
     (one,) = found["disturbed"]
     assert (one["run"], one["kept_until_s"], one["used"]) == ("r2", None, True)
-    assert "is used nevertheless: the other runs do not determine the model." in verdict(found, "")
+    assert "It is used nevertheless, because the other runs do not determine the model." in verdict(found, "")
 
 
 def test_rows_too_few_for_the_harmonics_are_not_judged() -> None:
