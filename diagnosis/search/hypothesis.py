@@ -347,7 +347,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first form of every effect; another where these leave a significant residual and it explains more."""
+    """The first form of every effect; another where they leave a significant residual and it explains much of that."""
     by_effect, weighing = _forms_by_effect(fitted), fitted.settings.weighing
     best = tuple(forms[0] for forms in by_effect)
 
@@ -362,7 +362,8 @@ def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
     for place, forms in enumerate(by_effect):
         for form in forms[1:]:
             tried = (*best[:place], form, *best[place + 1 :])
-            if (left := total(tried)) < least - weighing.needless_chi2:
+            gain = fitted.settings.search.form_needed * (least - fitted.count)
+            if (left := total(tried)) < least - max(gain, weighing.needless_chi2):
                 best, least = tried, left
     return best
 

@@ -30,6 +30,7 @@ KNOWN_IN_SEVERAL = {
     "grown_from": "on whole runs and on stretches",
     "most_causes": "on whole runs and beside a random moment",
     "form_open": "on whole runs and on stretches",
+    "form_needed": "a form is kept, while sets grow and in the answer",
     "freed_hypotheses": "growth frees the forms of fewer beside other effects",
     "mode_runs": "of a free and of an excited mode",
     "part_price": "a part is tried, taken and compared at one price",
