@@ -347,7 +347,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first form of every effect; another where they leave a significant residual and it explains much of that."""
+    """The first form of every effect, or another that explains much of the significant residual of the first."""
     by_effect, weighing = _forms_by_effect(fitted), fitted.settings.weighing
     best = tuple(forms[0] for forms in by_effect)
 
