@@ -18,8 +18,8 @@ _JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot se
 _ULPS = 8.0  # at least, so that the times still increase in other units
 _SERIES = 0.01  # interval over time constant, below which a series is more accurate
 _FIRST_LOOK = 32  # intervals of the first search for the end of a ramp
-_BENT = 0.03  # change of an input over the greatest moment within which the curve of a soft limit is a line
-_PARTS = 256  # of an interval at most; only a jump in a linear input needs more
+_BENT = 0.03  # change of an input over the greatest moment, or over itself, in which a soft limit is nearly a line
+_BEYOND = 1e6  # of the greatest moment: a soft limit is then reached to one part in a million
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Samples:
         """The input v limited softly: v / (1 + |v/L|^(1/s))^s, which approaches ±L (Rapp 1991).
 
         Exact for a held input. A linear one is followed at points between which it changes by `_BENT` of the limit
-        at most.
+        at most, or of itself beyond the limit.
 
         Args:
             limit: L above 0, in the unit of the values.
@@ -76,12 +76,18 @@ class Samples:
             return self.clipped(limit)
         time, values = self.time_s, self.values
         if not self.held and time.size > 1:
-            count = np.clip(np.ceil(np.abs(np.diff(values)) / (_BENT * limit)), 1, _PARTS).astype(np.intp)
-            first = np.repeat(np.cumsum(count) - count, count)
-            places = np.repeat(np.arange(count.size), count)
-            part = (np.arange(first.size) - first) / count[places]
-            time = np.append(time[places] + part * np.diff(time)[places], time[-1])
-            values = np.append(values[places] + part * np.diff(values)[places], values[-1])
+            place = _stretched(values / limit)
+            count = np.ceil(np.abs(np.diff(place)) / _BENT).astype(np.intp).clip(1)
+            at = np.repeat(np.arange(count.size), count)
+            part = (np.arange(at.size) - np.repeat(np.cumsum(count) - count, count)) / count[at]
+            change = np.diff(values)[at]
+            moved = limit * _compressed(place[at] + part * np.diff(place)[at]) - values[at]
+            inside = (part > 0.0) & (change != 0.0)
+            part = np.where(inside, np.clip(moved / np.where(inside, change, 1.0), 0.0, 1.0), 0.0)
+            time = np.append(time[at] + part * np.diff(time)[at], time[-1])
+            values = np.append(values[at] + part * change, values[-1])
+            new = np.append(True, np.diff(time) > 0.0)
+            time, values = time[new], values[new]
         size = np.abs(values) / limit
         less = np.minimum(size, 1.0 / np.maximum(size, 1.0))  # neither power overflows
         with np.errstate(under="ignore"):
@@ -248,6 +254,18 @@ def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
         factor[reach:] *= factor[:-reach]
         reach *= 2
     return state
+
+
+def _stretched(ratio: Array) -> Array:
+    """A ratio to a limit on a scale that is linear up to 1 and logarithmic beyond, to `_BEYOND`, shape (n,)."""
+    size = np.abs(ratio)
+    return np.copysign(np.where(size > 1.0, 1.0 + np.log(np.clip(size, 1.0, _BEYOND)), size), ratio)
+
+
+def _compressed(place: Array) -> Array:
+    """The ratio at a place on the scale of `_stretched`, shape (n,)."""
+    size = np.abs(place)
+    return np.copysign(np.where(size > 1.0, np.exp(np.maximum(size, 1.0) - 1.0), size), place)
 
 
 def _tilt(ratio: Array, left: Array, missed: Array) -> Array:

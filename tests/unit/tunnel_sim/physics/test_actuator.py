@@ -117,6 +117,14 @@ def test_a_soft_limit_tends_to_a_hard_one(held: bool) -> None:
     assert np.array_equal(at(asked.saturated(300.0, 0.0), fine), hard)
 
 
+@pytest.mark.parametrize("limit", [0.5, 1e-3, 1e-9])
+def test_a_soft_limit_far_below_the_input_adds_samples_at_its_zeros_alone(limit: float) -> None:
+    time = np.arange(5000) / 1000.0
+    found = Samples(time, np.sin(4.0 * np.pi * time), held=False).saturated(limit, 0.4)
+    assert np.all(np.diff(found.time_s) > 0.0)
+    assert found.time_s.size < 6 * time.size
+
+
 def test_a_soft_limit_contains_a_hyperbolic_tangent() -> None:
     asked = np.linspace(-1.0, 1.0, 401)
     found = Samples(np.arange(401.0), asked, True).saturated(1.133, 0.4755).values
