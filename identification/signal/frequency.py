@@ -402,7 +402,7 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
     if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)) or np.linalg.cond(vectors) > 1e8:
         return None
-    exponents = np.log(poles.astype(np.complex128)) / interval
+    exponents: Complex = np.log(poles.astype(np.complex128)) / interval
     vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
     images = right.astype(np.complex128) @ (vectors / sizes[:, None])
