@@ -34,7 +34,7 @@ _AIR = (
     "shedding_amplitude",
 )  # fmt: skip
 _Part = TypeVar("_Part")
-_POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
+_POINTERS = ("wind", "forcing", "program", "moment", "moment_time", "moment_slope")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +151,17 @@ class Motions:
         still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
         law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
         rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
+        beside = count if like is None else like
+        apart = {place % beside for place, drive in inputs.items() if not drive.on_steps(float(step[place]))}
         for place, drive in inputs.items():
-            rows["moment_interval"][place] = drive.interval if drive.on_steps(float(step[place])) else 0.0
+            within = int(blocks[place] * substeps[place])
+            lines = drive.lines(float(step[place]), within, sampled=place % beside not in apart)
+            row, parts = rows[place], (lines.values, lines.slopes, lines.time_s)
+            for name, part in zip(("moment", "moment_slope", "moment_time"), parts, strict=True):
+                row[name] = part.ctypes.data
+            row["moment_count"], row["moment_interval"] = lines.values.size, lines.interval
+            row["moment_delay"] = lines.delay
+            kept[place] = (*parts, *kept[place])
         ringing = [slow[place][3] if place in slow else None for place in range(count)]
         return cls(law, rows, kept, winds, blocks, ringing)
 

@@ -202,7 +202,7 @@ def test_derivatives_along_changes_of_the_wind_are_those_of_the_motion(values, f
     law, run = runs(values | {"friction_moment": friction}, **steps, count=2)
     run[1:] = blown(law, run[1:], wind)[1]
     column = [term_places()["angle"]]
-    found = slopes(law, run, SAMPLES, column, winds=[np.zeros((2, 1)), changes])
+    found = slopes(law, run, SAMPLES, column, changes=[np.zeros((2, 1)), changes])
     assert np.isnan(found.by_angle[0, 1:]).all()
     for change, exact in zip(changes, found.by_angle[1, 1:], strict=True):
 
