@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +19,7 @@ from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import run_dtype
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.run_settings import DriveMoment, Lines, Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -151,11 +151,7 @@ class Motions:
         still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
         law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
         rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
-        beside = count if like is None else like
-        apart = {place % beside for place, drive in inputs.items() if not drive.on_steps(float(step[place]))}
-        for place, drive in inputs.items():
-            within = int(blocks[place] * substeps[place])
-            lines = drive.lines(float(step[place]), within, sampled=place % beside not in apart)
+        for place, lines in _lines(inputs, step, blocks * substeps, count if like is None else like).items():
             row, parts = rows[place], (lines.values, lines.slopes, lines.time_s)
             for name, part in zip(("moment", "moment_slope", "moment_time"), parts, strict=True):
                 row[name] = part.ctypes.data
@@ -275,6 +271,27 @@ def read_together(
         else:
             found.append(chain.reading(chain.angle(means[number], run.times, run.derivative) + zero))
     return found
+
+
+def _lines(inputs: Mapping[int, DriveMoment], step: Array, steps: Array, like: int) -> dict[int, Lines]:
+    """The inputs of driven runs as lines, which begin at equal times for a run and its like.
+
+    Args:
+        inputs: by place, without actuators.
+        step: of every run, s, shape (n,).
+        steps: their number, shape (n,).
+        like: period after which the same runs follow.
+    """
+    apart = set()
+    for place, drive in inputs.items():
+        first = inputs[place % like]
+        moved = drive.delay != first.delay or drive.time_s[0] != first.time_s[0]
+        if moved or not drive.on_steps(float(step[place])):
+            apart.add(place % like)
+    return {
+        place: drive.lines(float(step[place]), int(steps[place]), sampled=place % like not in apart)
+        for place, drive in inputs.items()
+    }
 
 
 def end_weights(runs: Sequence[RunData], blocks: int) -> Array:

@@ -16,7 +16,14 @@ from tunnel_sim.physics.slopes import most_changes, slopes, terms
 from tunnel_sim.vocabulary.record import Array
 
 #: The fields of a run that say at which times it has samples.
-_OF_TIMES = ("wind_count", "wind_interval", "moment_count", "moment_interval", "moment_delay", "moment_on_end")
+_OF_TIMES = (
+    "wind_count",
+    "wind_interval",
+    "moment_count",
+    "moment_interval",
+    "moment_delay",
+    "moment_on_end",
+)
 _TOGETHER = 8  # motions in a part of the work: those that the integrator takes side by side
 
 

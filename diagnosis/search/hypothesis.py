@@ -259,7 +259,8 @@ def with_forms(
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a large residual and they gain weight.
 
-    A hypothesis that would weigh less than the best one with no residual is not tried. The deepest minimum of the textbook form is sought first: a rod that misses its ringing does not lack a form.
+    A hypothesis that would weigh less than the best one with no residual is not tried. The deepest minimum of the
+    textbook form is sought first: a rod that misses its ringing does not lack a form.
 
     Args:
         gap: misfit of the nominal model.

@@ -241,7 +241,7 @@ class DriveMoment:
             steps: number of steps.
             sampled: whether a line runs from sample to sample, which are at the starts of steps; else there is
                 one for each step, with the impulse of the input and its product with the time. The motion of
-                a body then differs in the order of step³.
+                a body then differs by less than the order of step².
         """
         of = _Same(self.time_s), _Same(self.values), self.held, self.delay
         return _lines_of_samples(*of) if sampled else _lines_of_steps(*of, step, steps)
@@ -274,7 +274,7 @@ def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
 
 
 def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
-    """Integrals of an input's delayed samples between successive times, and of their products with the time since."""
+    """Integrals of an input's delayed samples between times, and of their products with the time since the last."""
     kinks = drive.time_s + drive.delay
     inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
     starts = np.sort(np.concatenate([ends[:-1], inside]), kind="stable")  # of two sorted parts: fast
