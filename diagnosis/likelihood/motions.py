@@ -27,6 +27,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
+_STEPS_OF_A_THREAD = 3e4  # in a part: about a millisecond, several times its overhead
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 #: Parameters of the law without effect in still air, and fields of a run that point to samples.
 _AIR = (
@@ -221,14 +222,19 @@ def readings(asked: Asked) -> list[Array]:
         for (_, place), one in zip(members, values, strict=True):
             found[place] = one
 
-    side_by_side(read, parts, asked.data)
+    side_by_side(read, parts, motions, asked.data)
     return found
 
 
-def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], data: Data) -> None:
-    """Run some work on parts of a campaign's runs, in the number of threads that its settings allow."""
-    threads = data.settings.work.threads
-    list(_pool(threads).map(work, parts) if threads > 1 and len(parts) > 1 else map(work, parts))
+def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], motions: Motions, data: Data) -> None:
+    """Run some work on parts of a campaign's runs, in several threads where the settings allow and the parts are long.
+
+    The integrator alone runs beside another thread: short parts would wait for the interpreter.
+    """
+    threads, steps = data.settings.work.threads, motions.blocks * motions.rows["steps"] / motions.rows["stride"]
+    longest = float(np.max(steps, initial=0.0)) * len(steps) / max(len(parts), 1)
+    apart = threads > 1 and len(parts) > 1 and longest > _STEPS_OF_A_THREAD
+    list(_pool(threads).map(work, parts) if apart else map(work, parts))
 
 
 @lru_cache(maxsize=4)

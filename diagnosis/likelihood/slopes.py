@@ -62,7 +62,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
         for place, change in zip(part, _part(asked, motions, part, moved[part], of_part), strict=True):
             found[place] = change
 
-    side_by_side(follow, parts, asked.data)
+    side_by_side(follow, parts, motions, asked.data)
     return found
 
 
