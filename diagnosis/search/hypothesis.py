@@ -336,7 +336,8 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
         # adding the ringing to the slow motion is not exact enough; the confirmation states the error
         first = try_fit(problem, first.point) or first
-    better = _free_forms(first, _likeliest_forms(first), tolerance=_POLISH) or try_fit(
+    forms = _first_forms(first) if chosen.plain is chosen.fit else _likeliest_forms(first)
+    better = _free_forms(first, forms, tolerance=_POLISH) or try_fit(
         first.problem, first.point, tolerance=_POLISH
     )
     if better is None or better.total > first.total:
@@ -353,10 +354,14 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     return Hypothesis(chosen.effects, better, textbook)
 
 
+def _first_forms(fitted: Fit) -> tuple[Form, ...]:
+    """The first form of every effect."""
+    return tuple(forms[0] for forms in _forms_by_effect(fitted))
+
+
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
     """The first form of every effect, or another that explains much of the significant residual of the first."""
-    by_effect, weighing = _forms_by_effect(fitted), fitted.settings.weighing
-    best = tuple(forms[0] for forms in by_effect)
+    by_effect, weighing, best = _forms_by_effect(fitted), fitted.settings.weighing, _first_forms(fitted)
 
     def total(forms: tuple[Form, ...]) -> float:
         freed = _free_forms(fitted, forms)
