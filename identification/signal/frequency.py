@@ -340,6 +340,7 @@ _LEAST_BLOCKS = 8
 _DENSE = 64  # values up to which a full decomposition is faster than the iteration, slow in pure noise
 _MAX_SWEEPS = 60
 _SETTLED = 1e-10  # change of the subspace in a sweep
+_LEAST_POLE = 1e-9  # a decay that is over before the second value
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,10 +400,10 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     upper, lower = left[:-1], left[1:]
     solver = np.linalg.pinv(upper)
     poles, vectors = np.linalg.eig(solver @ lower)
-    # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
-    if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)) or np.linalg.cond(vectors) > 1e8:
+    # Two real poles are an overdamped decay; a negative pole, or one that rounding errors hide, is not a decay.
+    if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= _LEAST_POLE)) or np.linalg.cond(vectors) > 1e8:
         return None
-    exponents: Complex = np.log(poles.astype(np.complex128)) / interval
+    exponents = np.asarray(np.log(poles.astype(np.complex128)) / interval, np.complex128)
     vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
     images = right.astype(np.complex128) @ (vectors / sizes[:, None])

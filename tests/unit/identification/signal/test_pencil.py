@@ -56,3 +56,9 @@ def test_short_and_long_records_are_decomposed_alike(zeta, monkeypatch):
 def test_it_says_when_there_is_nothing():
     assert pencil_decay(np.ones(5), 0.1, 5.0) is None
     assert pencil_decay(np.full(50, 0.3), 0.1, 5.0) is None
+
+
+def test_a_decay_that_is_over_before_the_second_value_is_none():
+    values = np.exp(-0.4 * np.arange(15))
+    values[0] += 0.5
+    assert pencil_decay(values, 1.0, 0.4) is None
