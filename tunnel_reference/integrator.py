@@ -214,10 +214,13 @@ class _Batch:
         beta, rate = state[:n], state[n : 2 * n]
         theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
         deflection = theta if self.inputs is None else theta - self.inputs.root(time, self.middle)
+        changed = (self.ones, beta, deflection)
+        if self.early:
+            changed = (self.ones.copy(), beta.copy(), deflection.copy())
+        level, hung, driven = np.zeros((3, n))
         return Stage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
-            self.ones.copy(), beta.copy(), deflection.copy(), deflection, self.ones, self.ones, np.zeros(n),
-            np.zeros(n), np.zeros(n),
+            *changed, deflection, self.ones, self.ones, level, hung, driven,
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
@@ -227,9 +230,12 @@ class _Batch:
         out = np.zeros(state.size)
         self._apply(stage, state, out, self.early)
         stage.top = -self.stiffness * stage.spring_angle - self.damping * stage.omega
-        stage.body = stage.speed_ratio * (
-            stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
-        )
+        if self.early:
+            stage.body = stage.speed_ratio * (
+                stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
+            )
+        else:
+            stage.body = self.air_stiffness * stage.beta + self.air_damping * stage.rate
         if self.inputs is not None:
             stage.driven = self.inputs.moment(time, self.middle)
             stage.body = stage.body + stage.driven
@@ -242,13 +248,15 @@ class _Batch:
         self._apply(stage, state, out, self.late)
         if not self.flexible:
             stage.top = stage.top + stage.body
-        friction = self.sign * stage.level
         self.stage = stage
         if self.flexible:
             out[:n], out[n : 2 * n] = stage.rate, stage.body / self.body_inertia
         top = out[2 * n : 4 * n] if self.flexible else out[: 2 * n]
-        top[:n] = stage.omega * self.moving
-        top[n:] = (stage.top - friction) / self.top_inertia * self.moving
+        if self.dry.size:
+            top[:n] = stage.omega * self.moving
+            top[n:] = (stage.top - self.sign * stage.level) / self.top_inertia * self.moving
+        else:
+            top[:n], top[n:] = stage.omega, stage.top / self.top_inertia
         return out
 
     def _apply(self, stage: Stage, state: Array, out: Array, groups: Sequence[_Group]) -> None:

@@ -6,10 +6,13 @@ A record is refused here for numerical reasons only; the methods judge everythin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from math import sqrt
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE, LEAST_SAMPLES
@@ -17,6 +20,7 @@ from identification.signal.decay_fit import Reading, mean_of_blocks, projected_c
 from identification.signal.free_decay import Decay
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
+Complex = NDArray[np.complex128]
 # Fourth powers of readings and of times are summed over a record: beyond these limits they overflow or underflow.
 _LEAST, _GREATEST = 1e-60, 1e60
 _ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, with no detectable motion
@@ -71,19 +75,23 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
         falling: whether the window falls from the start of the record instead of rising first: it then includes a
             decay that ends long before the record does.
     """
+    frequency, power = _spectral_peak(record, padding, falling)
+    highest = float(power[:-1].max(initial=0.0))
+    return SpectralPeak(frequency, highest / max(float(np.median(power)), 1e-300) if frequency else 0.0)
+
+
+def _spectral_peak(record: Record, padding: int, falling: bool) -> tuple[float, Array]:
+    """The frequency of `psd_peak`, Hz, and the power from one cycle per record on, shape (n,)."""
     if not holds_motion(record):
-        return SpectralPeak(0.0, 0.0)
+        return 0.0, np.zeros(1)
     record = evenly_spaced(record, bridged=False)
     centred = record.yaw_rad - record.yaw_rad.mean()
     size = 1 << int(np.ceil(np.log2(padding * centred.size)))
     # Below one cycle per record the spectrum contains the remaining offset, not the oscillation.
     lowest = max(1, int(size / centred.size))
     place, power = highest_peak(centred * _window(centred.size, falling), size, lowest)
-    highest = float(power[lowest:-1].max())
-    if highest <= 0.0:
-        return SpectralPeak(0.0, 0.0)
-    median = max(float(np.median(power[lowest:])), 1e-300)
-    return SpectralPeak(place * record.sample_rate / size, highest / median)
+    seen = power[lowest:]
+    return (place * record.sample_rate / size if seen[:-1].max() > 0.0 else 0.0), seen
 
 
 def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Array]:
@@ -159,15 +167,27 @@ def starting_decay(record: Record) -> Decay | None:
     return candidates[best] if np.isfinite(costs[best]) else None
 
 
+_FREQUENCIES: WeakKeyDictionary[Record, float | None] = WeakKeyDictionary()
+
+
 def starting_frequency(record: Record) -> float | None:
-    """The approximate frequency of the strongest oscillation, Hz; None where the record contains no motion."""
+    """The approximate frequency of the strongest oscillation, Hz; None where the record contains no motion.
+
+    It is found once for each record: the examination and the methods all begin with it.
+    """
+    if record not in _FREQUENCIES:
+        _FREQUENCIES[record] = _find_frequency(record)
+    return _FREQUENCIES[record]
+
+
+def _find_frequency(record: Record) -> float | None:
     if not holds_motion(record):
         return None
     # A block mean hides an oscillation of at most two samples per cycle: a record of some two thousand cycles.
     factor = max(1, record.time_s.size // _LONG)
     if factor > 1:
         record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
-    frequency = psd_peak(record, padding=8 if factor == 1 else 1, falling=True).frequency
+    frequency, _ = _spectral_peak(record, padding=8 if factor == 1 else 1, falling=True)
     return None if frequency == 0.0 else frequency
 
 
@@ -275,7 +295,7 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
             if high - low < 3:
                 break
             x = (time[low:high] - at) / width
-            bend, slope, height = np.polyfit(x, record.yaw_rad[low:high], 2)
+            bend, slope, height = _parabola(x, record.yaw_rad[low:high])
             place = -0.5 * slope / bend if bend != 0.0 else np.inf
             if abs(place) <= 0.5:
                 vertex = at + float(place) * width, float(height + 0.5 * slope * place)
@@ -291,6 +311,19 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
         heights.append(vertex[1])
         expected = vertex[0] + half
     return np.array(times), np.array(heights)
+
+
+def _parabola(x: Array, y: Array) -> Array:
+    """Coefficients of the least-squares parabola, highest power first, shape (3,).
+
+    Args:
+        x: places within ±1, shape (n,).
+        y: values, shape (n,).
+    """
+    columns = np.ones((3, x.size))
+    np.multiply(x, x, out=columns[0])
+    columns[1] = x
+    return np.asarray(np.linalg.lstsq(columns.T, y, rcond=None)[0])
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:
@@ -314,11 +347,33 @@ class PencilDecay:
     """A decay and its sensitivity to the noise.
 
     Args:
-        weights: first-order change of (a, k) per rad of each value, shape (2, n).
+        exponents: of both poles, shape (2,), 1/s.
+        duals: left vectors of the shift, by pole, shape (2, rows - 1).
+        images: right vectors of the matrix, by pole, shape (columns, 2).
+        interval: between the values, s.
     """
 
     decay: Decay
-    weights: Array
+    exponents: Complex
+    duals: Complex
+    images: Complex
+    interval: float
+
+    @cached_property
+    def weights(self) -> Array:
+        """First-order change of (a, k) per rad of each value, shape (2, n)."""
+        gradients = []
+        for exponent, dual, image in zip(self.exponents, self.duals, self.images.T, strict=True):
+            # To first order δλ = Σᵢⱼ q(i) e(i + j) v(j) with the noise e: q is the shift's residual on the dual
+            # vector; the mean of v is removed, like the mean of the rows.
+            pole = np.exp(exponent * self.interval)
+            q = np.zeros(dual.size + 1, dtype=np.complex128)
+            q[1:] += dual
+            q[:-1] -= pole * dual
+            gradients.append(np.convolve(q, image - image.mean()) / (pole * self.interval))
+        first, second = self.exponents
+        slope = [-0.5 * (gradients[0] + gradients[1]), second * gradients[0] + first * gradients[1]]
+        return np.ascontiguousarray(np.real(slope))
 
 
 def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | None:
@@ -347,27 +402,12 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
     if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)) or np.linalg.cond(vectors) > 1e8:
         return None
-    exponents = np.log(poles.astype(np.complex128)) / interval
+    exponents: Complex = np.log(poles.astype(np.complex128)) / interval
     vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
     images = right.astype(np.complex128) @ (vectors / sizes[:, None])
-    gradients = []
-    for pole, dual, image in zip(poles, duals, images.T, strict=True):
-        # To first order δλ = Σᵢⱼ q(i) e(i + j) v(j) with the noise e: q is the shift's residual on the dual vector;
-        # the mean of v is removed, like the mean of the rows.
-        q = np.zeros(dual.size + 1, dtype=np.complex128)
-        q[1:] += dual
-        q[:-1] -= pole * dual
-        gradients.append(np.convolve(q, image - image.mean()) / (pole * interval))
-    stiffness = exponents[0] * exponents[1]
-    slope = np.array(
-        [
-            -0.5 * (gradients[0] + gradients[1]),
-            exponents[1] * gradients[0] + exponents[0] * gradients[1],
-        ]
-    )
-    decay = Decay(float(-0.5 * (exponents[0] + exponents[1]).real), float(stiffness.real))
-    return PencilDecay(decay, np.ascontiguousarray(slope.real))
+    decay = Decay(float(-0.5 * (exponents[0] + exponents[1]).real), float((exponents[0] * exponents[1]).real))
+    return PencilDecay(decay, exponents, duals, images, interval)
 
 
 def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array, Array]:
@@ -378,21 +418,32 @@ def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array,
         vectors, sizes, turn = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)
         return vectors[:, :2], sizes[:2], turn[:2].T
     size = next_fast_len(values.size, real=True)
-    spectrum = rfft(values, size)[:, None]
+    spectrum = rfft(values, size)
 
     def times(block: Array, count: int) -> Array:
-        return np.asarray(irfft(spectrum * rfft(block, size, axis=0).conj(), size, axis=0)[:count])
+        return np.asarray(irfft(spectrum * rfft(block, size).conj(), size)[:, :count])
 
-    steps = angle * np.arange(columns)[:, None]
-    right = np.hstack((np.cos(steps), np.sin(steps)))
-    right = np.linalg.qr(right - right.mean(axis=0))[0]
+    steps = angle * np.arange(columns)
+    right = np.stack((np.cos(steps), np.sin(steps)))
+    right = _orthonormal(right - right.mean(axis=1, keepdims=True))
     for _ in range(_MAX_SWEEPS):
-        left = np.linalg.qr(times(right, rows))[0]
+        left = _orthonormal(times(right, rows))
         image = times(left, columns)
-        image -= image.mean(axis=0)
+        image -= image.mean(axis=1, keepdims=True)
         before = right
-        right = np.linalg.qr(image)[0]
-        if np.linalg.norm(right - before @ (before.T @ right)) < _SETTLED:
+        right = _orthonormal(image)
+        if np.linalg.norm(right - (right @ before.T) @ before) < _SETTLED:
             break
-    vectors, sizes, turn = np.linalg.svd(image, full_matrices=False)
-    return left @ turn.T, sizes, vectors
+    turn, sizes, vectors = np.linalg.svd(image, full_matrices=False)
+    return left.T @ turn, sizes, vectors.T
+
+
+def _orthonormal(pair: Array) -> Array:
+    """Two rows of length 1, at right angles, that span the given ones, shape (2, n); 0 where there is none."""
+    found = np.array(pair)
+    first, second = found
+    first /= sqrt(first @ first) or 1.0
+    for _ in range(3):  # the rest of a nearly parallel row is at right angles only when it is projected again
+        second -= (first @ second) * first
+        second /= sqrt(second @ second) or 1.0
+    return found

@@ -157,7 +157,7 @@ class Oracle:
             event.terminal = True
         leg = solve_ivp(
             lambda t, y: self.derivative(t, y, slip),
-            (t, stop), y, method="DOP853", rtol=1e-12, atol=1e-15, events=events, dense_output=True,
+            (t, stop), y, method="DOP853", rtol=1e-11, atol=1e-14, events=events, dense_output=True,
         )  # fmt: skip
         here = (times >= t) & (times <= leg.t[-1])
         if np.any(here):

@@ -74,10 +74,9 @@ CONTRASTS = """() => {
     }
     return getComputedStyle(document.body).backgroundColor;
   };
-  // colours in mid-transition, from one scheme to the other, are nobody's to read
-  for (const one of document.getAnimations()) {
-    if (one.effect.getComputedTiming().endTime < Infinity) one.finish();
-  }
+  // colours in mid-transition, from one scheme to the other, are nobody's to read; the end of one may begin another
+  const moving = () => document.getAnimations().filter((one) => one.effect.getComputedTiming().endTime < Infinity);
+  for (let i = 0, left = moving(); i < 9 && left.length; i++, left = moving()) left.forEach((one) => one.finish());
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
   for (let node = walker.nextNode(); node; node = walker.nextNode()) {
     const parent = node.parentElement;

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +22,13 @@ _MOST_PICTURES = 60  # of a film
 CONNECTED = "() => window.socket?.connected"
 """Whether the page has its websocket: leaving earlier is a message on the console."""
 SETTLED = """() => {
-  const count = document.querySelectorAll("*").length, before = window.countBefore;
-  window.countBefore = count;
+  const count = document.querySelectorAll("*").length, now = performance.now();
+  if (count !== window.countBefore) [window.countBefore, window.countedAt] = [count, now];
   const moving = document.getAnimations().filter((one) => one.playState === "running"
     && one.effect.getComputedTiming().iterations !== Infinity);
-  return count === before && moving.length === 0 && document.fonts.status === "loaded";
+  return now - window.countedAt > 300 && moving.length === 0 && document.fonts.status === "loaded";
 }"""
-"""Whether nothing has been added to the page since the last question, and no colour is on its way to another."""
+"""Whether nothing has been added to the page for 0.3 s, and no colour is on its way to another."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,16 @@ def bench(folder: Path, *, crash: bool = False, prelude: str = "") -> Iterator[B
 
 
 class Tab:
-    """A tab, and what it has complained about or asked for."""
+    """A tab, and what it has complained about or asked for.
 
-    def __init__(self, browser: Any, served: Bench, **given: Any) -> None:
-        self.context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | given))
+    All tabs of a browser are in one context, whose cache holds the scripts of the pages.
+    """
+
+    def __init__(self, browser: Any, served: Bench, *, width: int = 1280, height: int = 900) -> None:
+        self.context = browser.contexts[0] if browser.contexts else browser.new_context()
         self.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=served.base)
         self.page = self.context.new_page()
+        self.page.set_viewport_size({"width": width, "height": height})
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self.clicks = 0
@@ -112,7 +116,7 @@ class Tab:
     def settle(self, selector: str) -> None:
         """Wait until the last part of the page is there, and nothing of it changes any more."""
         self.page.wait_for_selector(selector)
-        self.page.wait_for_function(SETTLED, polling=300)
+        self.page.wait_for_function(SETTLED)
 
     def click(self, words: str) -> None:
         """Click on a button or a link, count it, and keep a picture of it."""
@@ -137,15 +141,22 @@ class Tab:
                 self.shoot()
             self.page.wait_for_timeout(3000)
 
+    def until(self, holds: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Wait until something holds outside the page."""
+        end = time.monotonic() + seconds
+        while not holds():
+            assert time.monotonic() < end
+            self.page.wait_for_timeout(50)
+
     def close(self) -> None:
-        self.context.close()
+        self.page.close()
         assert self.complaints == []
         foreign = [url for url in self.requests if not url.startswith((self._base, "data:", "blob:"))]
         assert foreign == []
 
 
 @contextmanager
-def tab(browser: Any, served: Bench, **given: Any) -> Iterator[Tab]:
+def tab(browser: Any, served: Bench, **given: int) -> Iterator[Tab]:
     found = Tab(browser, served, **given)
     yield found
     found.close()

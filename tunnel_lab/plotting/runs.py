@@ -264,14 +264,12 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
 @styled
 def import_picture(imported: Imported) -> bytes:
     """Draw imported records as PNG: left-out samples are grey, vertical lines mark the beginning of runs."""
-    from matplotlib.figure import Figure
-
     raws = {id(part.raw): part.raw for part in imported.parts}
     shown = list(raws)[:MOST_PANELS]
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    figure = Figure(figsize=(max(4.5 * columns, 8.0), 2.2 * rows + 0.8), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    picture = figure(max(4.5 * columns, 8.0), 2.2 * rows + 0.8)
+    panels = picture.subplots(rows, columns, squeeze=False).ravel()
     for key, axes in zip(shown, panels, strict=False):
         raw, parts = raws[key], [part for part in imported.parts if id(part.raw) == key]
         time, reading = raw.cleaned.file_time_s, raw.cleaned.reading
@@ -300,12 +298,12 @@ def import_picture(imported: Imported) -> bytes:
     for axes in panels[len(shown) :]:
         axes.remove()
     more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
-    figure.suptitle(
+    picture.suptitle(
         figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey{more}"),
         fontsize=9,
     )
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=120)
+    picture.savefig(stream, format="png", dpi=120)
     return stream.getvalue()
 
 

@@ -6,7 +6,7 @@ The colours follow Okabe and Ito (2008), which colour-blind readers can distingu
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import cache, wraps
 from importlib import resources
 from itertools import pairwise
 from math import ceil, floor, inf, log10
@@ -74,9 +74,25 @@ def figure(width: float, height: float) -> Figure:
         width: inches.
         height: inches.
     """
-    from matplotlib.figure import Figure
+    return _laid_out_once()(figsize=(width, height), layout="constrained")
 
-    return Figure(figsize=(width, height), layout="constrained")
+
+@cache
+def _laid_out_once() -> type[Figure]:
+    from matplotlib.backend_bases import RendererBase
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    class LaidOutOnce(Figure):
+        def draw(self, renderer: RendererBase) -> None:
+            """Only lay out where ``savefig`` draws for the layout: it then draws again, without this engine."""
+            engine = self.get_layout_engine()
+            if isinstance(engine, ConstrainedLayoutEngine) and self.canvas.is_saving():
+                engine.execute(self)
+            else:
+                super().draw(renderer)
+
+    return LaidOutOnce
 
 
 def text_width(text: str, points: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import degrees
 from typing import TYPE_CHECKING
@@ -79,39 +79,50 @@ _AXES = {
 
 def diagnosis_figures(document: Document) -> dict[str, Figure]:
     """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
-    figures: dict[str, Figure | None] = dict(_first_figures(document))
-    if document.get("maps"):
-        figures |= {
-            "fit": where.fit_figure(document),
-            "where-runs": where.runs_figure(document),
-            "where-profiles": where.profiles_figure(document),
-            "where-spectrum": where.spectrum_figure(document),
-            "where-backbones": backbone_figure(document),
-            "where-phase-plane": where.phase_plane_figure(document),
-            "where-moment": where.moment_figure(document),
-        }
-    figures |= {
-        "which": candidates_figure(document),
-        "friction": friction_figure(document),
-        "repeatability": repeatability_figure(document),
-        "how-far": closure_figure(document),
-        "law": law_figure(document),
-        "coefficients": coefficients_figure(document),
-    }
+    figures = {name: make(document) for name, make in _makers(document).items()}
     return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def diagnosis_figure(document: Document, name: str) -> Figure | None:
+    """One of `diagnosis_figures`; None where there is no such figure."""
+    make = _makers(document).get(name)
+    return None if make is None else make(document)
+
+
+def _makers(document: Document) -> dict[str, Callable[[Document], Figure | None]]:
+    """By name, in the order of the report, what draws each figure, or finds that there is none."""
+    makers: dict[str, Callable[[Document], Figure | None]] = {}
+    if document.get("maps") and document["causes"]:
+        makers["place"] = where.place_figure
+    makers["waterfall"] = waterfall_figure
+    if document.get("maps"):
+        makers |= {
+            "fit": where.fit_figure,
+            "where-runs": where.runs_figure,
+            "where-profiles": where.profiles_figure,
+            "where-spectrum": where.spectrum_figure,
+            "where-backbones": backbone_figure,
+            "where-phase-plane": where.phase_plane_figure,
+            "where-moment": where.moment_figure,
+        }
+    return makers | {
+        "which": candidates_figure,
+        "friction": friction_figure,
+        "repeatability": repeatability_figure,
+        "how-far": closure_figure,
+        "law": law_figure,
+        "coefficients": coefficients_figure,
+    }
 
 
 def summary_figures(document: Document) -> dict[str, Figure]:
     """The figures of the printed summary; the fit over the data in several heights, one of which is shown."""
-    return _first_figures(document, _LOW) | where.fit_sheets(document)
-
-
-def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure]:
-    """A map of the gap, ``height`` inches high, and the explained part of the gap."""
     located = document.get("maps") and document["causes"]
-    place = where.place_figure(document, height) if located else None
+    place = where.place_figure(document, _LOW) if located else None
     figures = {"place": place, "waterfall": waterfall_figure(document)}
-    return {name: figure for name, figure in figures.items() if figure is not None}
+    return {name: figure for name, figure in figures.items() if figure is not None} | where.fit_sheets(
+        document
+    )
 
 
 @styled

@@ -21,7 +21,7 @@ from diagnosis.words.sections import sections
 from diagnosis.words.verdict import headline
 from identification.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
 from tunnel_lab.report.drawing import inline_svg, shown_text
-from tunnel_lab.report.figures import diagnosis_figures, summary_figures
+from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -157,13 +157,11 @@ def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Drawing:
     Raises:
         TunnelError: for a figure or a run that the diagnosis does not have.
     """
-    if what == "fit" and (drawn := fit_figure(document, runs)) is not None:
-        return drawn
-    figures = diagnosis_figures(document)
-    if what not in figures:
-        known = ", ".join(figures)
+    drawn = fit_figure(document, runs) if what == "fit" else diagnosis_figure(document, what)
+    if drawn is None:
+        known = ", ".join(diagnosis_figures(document))
         raise TunnelError(f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {known}")
-    return figures[what]
+    return drawn
 
 
 def page_of(title: str, body: str) -> str:

@@ -22,6 +22,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 4
 _MOST_AIR = 3.0  # air's stiffness over the total, a standard deviation: more is less likely, but not excluded
+_TINY = 1e-150  # of a column: it is without effect
 _LEAST = 1e-3  # of the usual g: lower bound of a fit to wrong labels
 
 
@@ -83,7 +84,7 @@ class Agreement:
         away: residual of each run in tolerances, shape (n,).
         inverse_inertia: g, 1/(kg m²).
         air: n, the air's part of k, 1/(kg m²) per m³.
-        air_std: standard deviation of n, 1/(kg m²) per m³.
+        columns: of g and n in the last fit, shape (rows, 2).
     """
 
     squares: float
@@ -91,7 +92,14 @@ class Agreement:
     away: Array
     inverse_inertia: float
     air: float
-    air_std: float
+    columns: Array
+
+    @property
+    def air_std(self) -> float:
+        """Standard deviation of n, 1/(kg m²) per m³; 0 without wind."""
+        sizes = np.maximum(np.linalg.norm(self.columns, axis=0), _TINY)
+        unit = self.columns / sizes
+        return float(np.sqrt(np.linalg.pinv(unit.T @ unit, rcond=1e-14, hermitian=True)[1, 1]) / sizes[1])
 
     @property
     def gross(self) -> bool:
@@ -125,44 +133,38 @@ def agreement(
     # rows of the runs, of the springs, and of n; columns g and n. The stiffness of each spring per unit inertia,
     # the third kind of unknown, is eliminated.
     group = np.concatenate((place, np.arange(springs), [springs]))
+    members = np.zeros((springs + 1, group.size))
+    members[group, np.arange(group.size)] = 1.0
+    alone = members[:, -1]
     of_spring = np.concatenate((np.ones(count), -np.ones(springs), [0.0]))
-    columns = np.zeros((count + springs + 1, 2))
-    columns[:count, 1] = -pressure
-    columns[count:-1, 0] = settings
-    columns[-1, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
-    target = np.concatenate((seen, np.zeros(springs + 1)))
-    inverse_inertia, air, stiffness = usual, 0.0, least
+    block = np.zeros((group.size, 3))  # the columns behind the target
+    block[:count, 0] = seen
+    block[:count, 2] = -pressure
+    block[count:-1, 1] = settings
+    block[-1, 2] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
+    scatter = (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2
+    inverse_inertia, air, stiffness, std = usual, 0.0, least, np.ones(group.size)
     for _ in range(_PASSES):  # the tolerances scale with the fitted values
-        of_runs = np.sqrt(
-            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2
-            + (2.0 * of_speed * air * pressure) ** 2
-        )
-        of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
-        std = np.concatenate((of_runs, of_springs, [1.0]))
+        std[:count] = np.sqrt(scatter + (2.0 * of_speed * air * pressure) ** 2)
+        std[count:-1] = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
         indicator = of_spring / std
-        squares = np.bincount(group, indicator**2) + np.r_[np.zeros(springs), 1.0]
-
-        def on_springs(values: Array, unit: Array = indicator, over: Array = squares) -> Array:
-            return np.asarray(np.bincount(group, unit * values) / over)
-
-        scaled, weighted = target / std, columns / std[:, None]
-        of_target = on_springs(scaled)
-        of_columns = np.column_stack([on_springs(column) for column in weighted.T])
-        scaled = scaled - indicator * of_target[group]
-        weighted = weighted - indicator[:, None] * of_columns[group]
-        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-150)
-        solution = np.linalg.lstsq(weighted / sizes, scaled, rcond=1e-12)[0] / sizes
-        away = scaled - weighted @ solution
+        shares = members * indicator
+        scaled = block / std[:, None]
+        on_springs = shares @ scaled / (shares @ indicator + alone)[:, None]
+        scaled -= indicator[:, None] * on_springs[group]
+        target, columns = scaled[:, 0], scaled[:, 1:]
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), _TINY)
+        solution = np.linalg.lstsq(columns / sizes, target, rcond=1e-12)[0] / sizes
+        away = target - columns @ solution
         inverse_inertia, air = (float(value) for value in solution)
-        stiffness = np.maximum((of_target - of_columns @ solution)[:springs], least)
-    variance = np.linalg.pinv((weighted / sizes).T @ (weighted / sizes), rcond=1e-14, hermitian=True)
+        stiffness = np.maximum((on_springs[:, 0] - on_springs[:, 1:] @ solution)[:springs], least)
     return Agreement(
         squares=float(away @ away),
         freedom=count - 1 - int(windy),
         away=np.abs(away[:count]),
         inverse_inertia=inverse_inertia,
         air=air,
-        air_std=float(np.sqrt(variance[1, 1]) / sizes[1]) if windy else 0.0,
+        columns=columns,
     )
 
 

@@ -56,7 +56,7 @@ def nonlinear(friction, quadratic, cubic):
         return rate, -0.1 * rate - 160.0 * angle * (1.0 + cubic * angle**2) - drag
 
     clock = np.arange(10000) / 1000.0
-    solution = solve_ivp(motion, (0.0, 10.0), (0.35, 0.0), t_eval=clock, max_step=2e-3, rtol=1e-8, atol=1e-10)
+    solution = solve_ivp(motion, (0.0, 10.0), (0.35, 0.0), "DOP853", clock, rtol=1e-8, atol=1e-10)
     return solution.y[0]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import http.client
 import shutil
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
         page.set_viewport_size({"width": 390, "height": 900})
         page.get_by_text("Missing information and corrections").click()
         page.get_by_label("Conditions in the file names").wait_for()
-        page.wait_for_function(SETTLED, polling=300)
+        page.wait_for_function(SETTLED)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         assert page.evaluate(CLIPPED_LABELS) == []
         page.set_viewport_size({"width": 1280, "height": 900})
@@ -239,7 +240,7 @@ def test_a_large_upload_is_refused_before_it_is_stored(browser: Any, served: Ben
 
 def test_a_refusal_can_be_read_at_every_width(browser: Any, served: Bench) -> None:
     papers = []
-    with tab(browser, served, color_scheme="light") as one:
+    with tab(browser, served) as one:
         for path in ("/nothing", f"/{'long' * 30}/report.html"):
             one.page.goto(served.base + path)
             for width in (390, 1280):
@@ -311,17 +312,21 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
 
 def test_two_tabs_of_one_campaign_do_not_undo_each_other(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "both")
+    sizes = (("width [m]", "width", 0.2), ("frontal area A [m²]", "frontal_area", 0.03))
     with tab(browser, served) as one, tab(browser, served) as two:
         for opened in (one, two):
             opened.open("/both/conditions")
             opened.page.wait_for_selector(".ag-row")
-        for opened, name, text in ((one, "width [m]", "0.2"), (two, "frontal area A [m²]", "0.03")):
-            field = opened.page.get_by_label(name)
-            field.fill(text)
+        for opened, (label, key, value) in zip((one, two), sizes, strict=True):
+            field = opened.page.get_by_label(label)
+            field.fill(str(value))
             field.press("Tab")
-            opened.page.wait_for_timeout(1500)
-    found = read_campaign(served.folder / "both").rig
-    assert (found.width, found.frontal_area) == (0.2, 0.03)
+            opened.until(partial(_stated, served.folder / "both", key, value))
+    assert all(_stated(served.folder / "both", key, value) for _, key, value in sizes)
+
+
+def _stated(campaign: Path, key: str, value: float) -> bool:
+    return bool(getattr(read_campaign(campaign).rig, key) == value)
 
 
 def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
@@ -409,7 +414,7 @@ PAGES = {
 def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench) -> None:
     session = Session(served.folder, "two")
     _diagnosed(session)
-    with tab(browser, served, color_scheme="light") as one:
+    with tab(browser, served) as one:
         for path, last in PAGES.items():
             one.open(path)
             one.settle(last)
@@ -423,7 +428,7 @@ def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench) -> N
             assert one.page.evaluate(NAMELESS) == [], path
             for scheme in ("dark", "light"):
                 one.page.emulate_media(color_scheme=scheme)
-                one.settle(last)  # colours change gradually
+                one.page.evaluate(DRAWN_AGAIN)  # colours begin to change; `CONTRASTS` takes them to their end
                 pairs = one.page.evaluate(CONTRASTS)
                 assert len(pairs) > 5, (path, scheme)
                 assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == [], (path, scheme)

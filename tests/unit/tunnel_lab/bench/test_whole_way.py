@@ -96,8 +96,7 @@ def to_the_report(one: Tab, name: str) -> Path:
 
 
 def test_a_real_file_becomes_a_report_in_seven_clicks(browser: Any, tmp_path: Path) -> None:
-    size = {"viewport": {"width": 1024, "height": 768}}
-    with bench(tmp_path / "work") as served, tab(browser, served, **size) as one:
+    with bench(tmp_path / "work") as served, tab(browser, served, width=1024, height=768) as one:
         one.shoot()
         one.page.set_input_files("input[type=file]", [str(RAW)])
         one.page.get_by_label("Column of the angle").click()  # of two channels

@@ -12,9 +12,11 @@ import pytest
 import tomli_w
 
 from tests.support.small_sweep import SMALL
+from tunnel_lab.experiments import sweep_work
+from tunnel_lab.experiments.answers import Failure
 from tunnel_lab.experiments.sweep import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_view import lines_of
-from tunnel_lab.experiments.sweep_work import run_shard
+from tunnel_lab.experiments.sweep_work import NOT_SIMULATED, run_shard
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -194,8 +196,12 @@ parameters.friction_moment = 0.002
 """
 
 
-def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
+def test_the_bound_is_that_of_a_long_lightly_damped_decay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
+    # the bounds are those of the plan, and simulating it takes nearly all of the time
+    monkeypatch.setattr(sweep_work, "_simulate", lambda cases, _: [Failure(NOT_SIMULATED, "-")] * len(cases))
     (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
     rows = pl.read_parquet(run_shard(read_sweep(tmp_path / "long.toml"), 0).files["results"])
     still = rows.filter((pl.col("wind_speed") == 0.0) & pl.col("run").is_not_null())
