@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from diagnosis.facts.closure import Misfit
-from identification.printing import significant, unit_mark, with_std
+from identification.printing import Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.quantities import Share
 from tunnel_sim.vocabulary.units import beside
@@ -227,7 +227,6 @@ def excess_std(document: Document) -> float | None:
     return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 
 
-Document = Mapping[str, Any]
 """A diagnosis in JSON's types (`Diagnosis.to_json_dict`)."""
 
 CHANNELS = {

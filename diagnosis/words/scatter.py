@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import Document, listed, plain, probability
+from diagnosis.words.numbers import listed, plain, probability
 from identification.blocks import Table
-from identification.printing import concise, significant, with_std
+from identification.printing import Document, concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.quantities import Share
 

@@ -7,9 +7,9 @@ from math import degrees
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, Document, part, plain
+from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
 from diagnosis.words.scatter import scattering
-from identification.printing import p_text
+from identification.printing import Document, p_text
 from tunnel_sim.effects import effect_class
 
 _WIND = "whether it needs wind cannot be determined"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ import typer
 from typer import Argument, Option
 
 from identification.blocks import Table
-from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.printing import Document, coefficient_label, estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.vocabulary.campaign import Campaign
 
-Document = Mapping[str, Any]
 _NONE = "–"
 _output = partial(Option, rich_help_panel="Output")
 _causes = partial(Option, rich_help_panel="Effects")

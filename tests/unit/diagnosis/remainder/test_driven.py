@@ -34,7 +34,7 @@ def multisine(seed: int, peak: float) -> Callable[[Array], Array]:
 
 
 def campaign(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Campaign:
-    """Three runs of a body on a spring, with friction that rises at low rates, with the angle, or with the input."""
+    """Three runs of a body on a spring, with friction that rises at low rates, with the angle or with the input."""
     runs = []
     clock = np.arange(round(SECONDS / STEP)) * STEP
     every = round(1.0 / (RATE * STEP))
