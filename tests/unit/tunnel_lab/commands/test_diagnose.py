@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,13 @@ import pytest
 
 from diagnosis.words.verdict import next_steps
 from tests.reference.free_decays import Setting, campaign
+from tests.support.command import Tunnel
 from tests.unit.tunnel_lab.conftest import PROGRESS
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.files.plan_file import load_plan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 CAUSE = "coulomb_friction"
 PLAN = """
 name = "dry"

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support.command import Tunnel
 from tests.unit.identification.signal.test_turning_points import OMEGA, ZETA, points
-
-Tunnel = Callable[..., tuple[int, str, str]]
 
 
 def table(folder: Path, head: str, delimiter: str = "\t") -> Path:
