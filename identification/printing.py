@@ -13,6 +13,7 @@ from typing import Any
 from identification.blocks import Block, Paragraph, Table
 from identification.status import Remark, Status
 from tunnel_sim.vocabulary.errors import counted
+from tunnel_sim.vocabulary.quantities import Rad
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -58,14 +59,9 @@ def coefficient_label(name: str, unit: str) -> str:
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
-def in_degrees(angle: float, digits: int = 2) -> str:
-    """An angle in degrees, such as ``5.2°``.
-
-    Args:
-        angle: rad.
-        digits: significant digits (a count).
-    """
-    return f"{significant(math.degrees(angle), digits)}°"
+def in_degrees(angle: Rad) -> str:
+    """An angle in degrees, such as ``5.2°``."""
+    return f"{significant(math.degrees(angle), 2)}°"
 
 
 def significant(value: float, digits: int = 4) -> str:

@@ -150,14 +150,9 @@ def of_swing(misfit: Misfit, excess: float) -> str:
     return f"{significant(share, 2) if share else '0'} % of the swing"
 
 
-def times_noise(value: float, decimals: int = 2) -> str:
-    """A gap in words, such as ``2.75 times the noise variance``.
-
-    Args:
-        value: the gap as an excess, in noise variances, a ratio.
-        decimals: of a gap below ten (a count).
-    """
-    return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise variance"
+def times_noise(value: float) -> str:
+    """A gap in words, such as ``2.75 times the noise variance``, from its excess, a ratio."""
+    return f"{significant(value, 4) if value >= 10.0 else f'{value:.2f}'} times the noise variance"
 
 
 def left_over(excess: float) -> str:

@@ -187,11 +187,6 @@ class Traits:
         """Whether the effect does nothing."""
         return self.severity == 0.0
 
-    @property
-    def depends_on_release(self) -> bool:
-        """Whether its moment or its reading depends on more than angle and rate: on time, or on the release."""
-        return not self.autonomous
-
     @classmethod
     def chosen_spring(cls) -> str | None:
         """Name of the parameter that is a spring's stiffness; None if there is none."""
