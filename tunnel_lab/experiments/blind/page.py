@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -280,7 +281,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md{drawn}",
     ]
     origin = [f"    {line}" for line in origin_lines(score)]
-    head = [_HEAD + about_scatter, "```bash", *commands, "```", "", *origin]
+    head = [_HEAD.format(day=date.today()) + about_scatter, "```bash", *commands, "```", "", *origin]
     blocks: list[Block] = []
     for section in sections(score):
         blocks += [Heading(section.title), replace(section, title=""), Paragraph(section.note)]
@@ -304,6 +305,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
 
 _HEAD = """# Blind check
 
+The numbers are those of the version of {day:%d %B %Y}.
 The campaigns are drawn and simulated by the reference simulator (`tunnel_reference`). It has another
 integrator, another friction law, and more forms of every effect than the fitted one. The campaigns
 are diagnosed without their truth, and the answers are scored against the sealed key. Half of all
