@@ -167,7 +167,7 @@ def stated_words(document: Document) -> str:
     if not stated or document["causes"] == ["unknown"]:
         return ""
     sizes = listed([f"{NUMBERS[SCATTERS[one['effect']]]} {_stated(one)}" for one in stated])
-    return f"The runs differ from each other within what is stated ({sizes}); the intervals allow for it."
+    return f"The runs differ no more than stated ({sizes}); the intervals allow for it."
 
 
 def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> list[str]:

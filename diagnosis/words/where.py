@@ -158,4 +158,4 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     if not there:
         return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."
     acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
-    return f"Of the causes {acts_there}, and {' and '.join(acting)}."
+    return f"{acts_there[0].upper()}{acts_there[1:]}; {' and '.join(acting)}."

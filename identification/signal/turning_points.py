@@ -120,7 +120,7 @@ class _Linear:
             said.append(f"the {name} scatter by {scatter:.2g} {unit}, {more}")
         else:
             scale = 1.0
-            said.append(f"the {name} scatter within what is stated, from which the errors follow")
+            said.append(f"the {name} scatter as stated, so the errors follow from the stated ones")
         std = np.asarray(std * scale, np.float64)
         white = columns / std[:, None]
         covariance = np.asarray(np.linalg.inv(white.T @ white), np.float64)

@@ -60,7 +60,7 @@ class IdentifyPage:
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
         with ui.expansion("Uncertainty budget"):
-            words = "Standard uncertainties of what is stated, in per cent; an empty field is exact."
+            words = "Standard uncertainties of the stated values, in per cent; an empty field means exact."
             ui.label(words).classes("soft")
             self._percents: dict[str, float | None] = {}
             if session.uncertainties.is_file():

@@ -116,7 +116,7 @@ def import_files(
             "--preview",
             callback=ending(".png"),
             metavar="FILE.png",
-            help="Draw what was read; write no campaign.",
+            help="Draw the records; write no campaign.",
         ),
     ] = None,
     yes: Annotated[bool, _output("--yes", "-y", help="Write without asking.")] = False,

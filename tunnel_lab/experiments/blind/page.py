@@ -28,9 +28,9 @@ CALIBRATION = "Calibration"
 NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
     "single": "one effect",
-    "single, below 1": "· below 1 × noise power",
-    "single, 1 to 10": "· 1 to 10 × noise power",
-    "single, above 10": "· above 10 × noise power",
+    "single, below 1": "· below 1 × noise variance",
+    "single, 1 to 10": "· 1 to 10 × noise variance",
+    "single, above 10": "· above 10 × noise variance",
     "pair": "two effects",
     "three": "three effects",
     "four": "four effects",
@@ -118,8 +118,8 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             "Calibration of inclusion",
             ("smooth calibration error", "95 %", "statements", "campaigns"),
             smooth,
-            "Of the probability of every effect that it is among the causes. The kernel is as wide as the error "
-            "that it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
+            "Calibration of the probability that each effect is among the causes. The kernel is as wide as the "
+            "resulting error (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
         ),
     ]
 
@@ -203,10 +203,10 @@ def _other_sections(score: Score) -> list[ScoreSection]:
         )
     return [
         _section(
-            "Closure on held-out runs, where the causes are right",
+            "Share of the gap explained on held-out runs, where the causes are right",
             ("", "number", "of", "share", "95 %"),
-            [("at least 0.95 of the gap closed", *_share(closed))] if closed.total else (),
-            f"Closed: median {median:.4f}, 5th percentile {low:.4f}",
+            [("at least 0.95 of the gap explained", *_share(closed))] if closed.total else (),
+            f"Median {median:.4f}, 5th percentile {low:.4f}",
         ),
         _section(
             "Coefficients before and after the causes are added",

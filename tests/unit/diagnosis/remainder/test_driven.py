@@ -1,4 +1,4 @@
-"""The formula for what no effect explains of driven runs. Truth: the friction that was simulated."""
+"""The formula for the residual of driven runs. Truth: the friction that was simulated."""
 
 from __future__ import annotations
 

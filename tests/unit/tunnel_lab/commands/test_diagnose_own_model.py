@@ -142,7 +142,7 @@ def test_the_control_of_a_robots_joint_from_its_folder(
     given = ("diagnose", folder, "--effects", "coulomb_friction", "--model", tmp_path / "arm.xml")
     status, _, err = tunnel(*given, "--joint", "elbow")
     assert (status, err.count("\n")) == (2, 1)
-    assert "name the one that the column drive is the control of with --actuator" in err
+    assert "name the actuator whose control is in the column drive with --actuator" in err
     answer, report, out = (tmp_path / name for name in ("answer.json", "report.html", "out.xml"))
     options = (
         "--joint",

@@ -38,8 +38,8 @@ def test_identify_gives_frequency_and_damping(
     status, out, err = tunnel("identify", path, "--json", tmp_path / "out.json")
     assert status == 0
     assert "peaks: 60 turning points" in out
-    assert "the times scatter within what is stated" in out
-    assert "the angles scatter within what is stated" in out
+    assert "the times scatter as stated" in out
+    assert "the angles scatter as stated" in out
     assert "need the angle between them too" in out
     assert "peaks: text" in err
     document = json.loads((tmp_path / "out.json").read_text())
