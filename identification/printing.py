@@ -13,7 +13,6 @@ from typing import Any
 from identification.blocks import Block, Paragraph, Table
 from identification.status import Remark, Status
 from tunnel_sim.vocabulary.errors import counted
-from tunnel_sim.vocabulary.quantities import Rad
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -59,8 +58,8 @@ def coefficient_label(name: str, unit: str) -> str:
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
-def in_degrees(angle: Rad) -> str:
-    """An angle in degrees, such as ``5.2°``."""
+def in_degrees(angle: float) -> str:
+    """An angle (rad) in degrees, such as ``5.2°``."""
     return f"{significant(math.degrees(angle), 2)}°"
 
 

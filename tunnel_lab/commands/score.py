@@ -13,8 +13,8 @@ from typer import Argument, Option
 from tunnel_lab.terminal.inputs import (
     SchedulerOption,
     chosen_estimators,
-    ending,
     estimator_option,
+    output_file,
     refuse_unwritable_files,
 )
 from tunnel_lab.terminal.outputs import console, say, say_written, show
@@ -76,13 +76,7 @@ def score(
         ),
     ] = None,
     write_baseline: Annotated[
-        Path | None,
-        Option(
-            "--write-baseline",
-            callback=ending(".parquet"),
-            metavar="FILE",
-            help="Write the trials as a baseline.",
-        ),
+        Path | None, output_file("--write-baseline", ".parquet", help="Write the trials as a baseline.")
     ] = None,
     breakdown: Annotated[
         bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")

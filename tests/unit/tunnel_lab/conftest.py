@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,15 @@ def tunnel(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
         return status, captured.out, captured.err
 
     return run
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, for the tests of a file."""
+    from tests.support.browser import chromium
+
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture

@@ -12,13 +12,12 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.browser import IN_A_BROWSER, chromium, screenshot
+from tests.support.browser import IN_A_BROWSER, screenshot
 from tests.support.served import Tab, bench, tab
 from tunnel_lab.bench import work
 
@@ -38,12 +37,6 @@ truth.cn_beta = 0.495
 truth.cn_r = -0.114
 """
 LONG_MS = 600_000
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
 
 
 def picture(one: Tab, name: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from tests.marks import slow
-from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
+from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
 
@@ -30,12 +30,6 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     given["provenance"] = {"versions": {"numpy": "2"}, "sha256": {"runs/alpha.csv": "ab" * 32}}
     path = tmp_path_factory.mktemp("report") / "report.html"
     return write_report(given, campaign(), path, Byline("2026-05-31", "A. Smith"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
 
 
 class Opened:
