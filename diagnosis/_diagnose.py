@@ -100,7 +100,7 @@ def diagnose(
 def _and_without_outlier(
     answer: Diagnosis, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
 ) -> Diagnosis:
-    """The answer, with that of the other runs beside it; unchanged where those cannot be diagnosed."""
+    """The answer, with the answer for the other runs beside it; unchanged where they cannot be diagnosed."""
     others = replace(chosen, campaign=chosen.campaign.without([runs.outlier]))
     try:
         study = _studied(others, None, settings, rivals)

@@ -61,7 +61,7 @@ def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
+    """Diagnose without a formula for the residual, which takes most of the time where a gap is not explained.
 
     It changes neither causes nor coefficients, and has tests of its own (``test_explain.py``).
     """

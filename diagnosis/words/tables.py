@@ -292,7 +292,7 @@ TESTS = {
     "noise in bursts": "whether the noise comes in bursts",
     "noise level": "whether the noise is above the level that the campaign states",
 }
-"""What each test of a gap looks at."""
+"""The tested properties, by the names of the tests."""
 
 
 def tests_table(document: Document) -> Table:

@@ -84,7 +84,7 @@ def is_too_wide(table: Table, width: int) -> bool:
 
 
 def _least_widths(table: Table) -> list[int]:
-    """Of each column: the longest word of its heading, line of a cell or word of a sentence."""
+    """Least width of each column: the longest word of its heading, line of a cell or word of a sentence."""
     return [
         max(
             (
