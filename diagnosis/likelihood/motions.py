@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +19,7 @@ from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import run_dtype
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.run_settings import DriveMoment, Lines, Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -27,6 +27,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 _TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
+_STEPS_OF_A_THREAD = 3e4  # in a part: about a millisecond, several times its overhead
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 #: Parameters of the law without effect in still air, and fields of a run that point to samples.
 _AIR = (
@@ -34,7 +35,7 @@ _AIR = (
     "shedding_amplitude",
 )  # fmt: skip
 _Part = TypeVar("_Part")
-_POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
+_POINTERS = ("wind", "forcing", "program", "moment", "moment_time", "moment_slope")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +152,13 @@ class Motions:
         still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
         law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
         rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
-        for place, drive in inputs.items():
-            rows["moment_interval"][place] = drive.interval if drive.on_steps(float(step[place])) else 0.0
+        for place, lines in _lines(inputs, step, blocks * substeps, count if like is None else like).items():
+            row, parts = rows[place], (lines.values, lines.slopes, lines.time_s)
+            for name, part in zip(("moment", "moment_slope", "moment_time"), parts, strict=True):
+                row[name] = part.ctypes.data
+            row["moment_count"], row["moment_interval"] = lines.values.size, lines.interval
+            row["moment_delay"] = lines.delay
+            kept[place] = (*parts, *kept[place])
         ringing = [slow[place][3] if place in slow else None for place in range(count)]
         return cls(law, rows, kept, winds, blocks, ringing)
 
@@ -216,14 +222,19 @@ def readings(asked: Asked) -> list[Array]:
         for (_, place), one in zip(members, values, strict=True):
             found[place] = one
 
-    side_by_side(read, parts, asked.data)
+    side_by_side(read, parts, motions, asked.data)
     return found
 
 
-def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], data: Data) -> None:
-    """Run some work on parts of a campaign's runs, in the number of threads that its settings allow."""
-    threads = data.settings.work.threads
-    list(_pool(threads).map(work, parts) if threads > 1 and len(parts) > 1 else map(work, parts))
+def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], motions: Motions, data: Data) -> None:
+    """Run some work on parts of a campaign's runs, in several threads where the settings allow and the parts are long.
+
+    The integrator alone runs beside another thread: short parts would wait for the interpreter.
+    """
+    threads, steps = data.settings.work.threads, motions.blocks * motions.rows["steps"] / motions.rows["stride"]
+    longest = float(np.max(steps, initial=0.0)) * len(steps) / max(len(parts), 1)
+    apart = threads > 1 and len(parts) > 1 and longest > _STEPS_OF_A_THREAD
+    list(_pool(threads).map(work, parts) if apart else map(work, parts))
 
 
 @lru_cache(maxsize=4)
@@ -266,6 +277,27 @@ def read_together(
         else:
             found.append(chain.reading(chain.angle(means[number], run.times, run.derivative) + zero))
     return found
+
+
+def _lines(inputs: Mapping[int, DriveMoment], step: Array, steps: Array, like: int) -> dict[int, Lines]:
+    """The inputs of driven runs as lines, which begin at equal times for a run and its like.
+
+    Args:
+        inputs: by place, without actuators.
+        step: of every run, s, shape (n,).
+        steps: their number, shape (n,).
+        like: period after which the same runs follow.
+    """
+    apart = set()
+    for place, drive in inputs.items():
+        first = inputs[place % like]
+        moved = drive.delay != first.delay or drive.time_s[0] != first.time_s[0]
+        if moved or not drive.on_steps(float(step[place])):
+            apart.add(place % like)
+    return {
+        place: drive.lines(float(step[place]), int(steps[place]), sampled=place % like not in apart)
+        for place, drive in inputs.items()
+    }
 
 
 def end_weights(runs: Sequence[RunData], blocks: int) -> Array:

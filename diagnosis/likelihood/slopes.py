@@ -9,16 +9,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
 from tunnel_sim.effects.chain import reads_plainly
-from tunnel_sim.physics.slopes import most_winds, slopes, terms
-from tunnel_sim.physics.steps import meets_steps
+from tunnel_sim.physics.slopes import most_changes, slopes, terms
 from tunnel_sim.vocabulary.record import Array
 
-#: The fields of a run that say which samples its input has.
-_OF_SAMPLES = ("moment", "moment_time", "moment_count", "moment_delay", "moment_held", "moment_on_end")
+#: The fields of a run that say at which times it has samples.
+_OF_TIMES = (
+    "wind_count",
+    "wind_interval",
+    "moment_count",
+    "moment_interval",
+    "moment_delay",
+    "moment_on_end",
+)
 _TOGETHER = 8  # motions in a part of the work: those that the integrator takes side by side
 
 
@@ -31,21 +36,17 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, the samples of an input are not at the starts of steps, or the motion is
-        read at times of its own.
+        no derivative, its rod twists, or it is read at times of its own.
     """
     acting = {type(effect) for effects in asked.effects for effect in effects}
-    inputs = zip(asked.runs[:count], asked.physics.drive, strict=False)
-    between = any(drive is not None and not meets_steps(drive.exerted, run.interval) for run, drive in inputs)
-    if between or any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
+    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
         points = len(asked.runs) // count - 1
         return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     motions = Motions.of(asked, like=count)
     points = len(asked.runs) // count - 1
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
     moved = np.swapaxes(values[1:] - values[0], 0, 1)
-    blown = [_winds(motions, place, count) for place in range(count)]
-    redriven = [_has_other_input(motions.rows[place::count]) for place in range(count)]
+    sampled = [_samples(motions, place, count) for place in range(count)]
     equal: dict[tuple[float, ...], list[int]] = {}
     for place in range(count):
         equal.setdefault(motions.steps(place), []).append(place)
@@ -57,70 +58,62 @@ def changes(asked: Asked, count: int) -> list[Array]:
     found = [np.zeros(0)] * count
 
     def follow(part: list[int]) -> None:
-        winds = [blown[place] for place in part]
-        for place, change in zip(part, _part(asked, motions, part, moved[part], winds), strict=True):
-            change[redriven[place]] = np.nan
+        of_part = [sampled[place] for place in part]
+        for place, change in zip(part, _part(asked, motions, part, moved[part], of_part), strict=True):
             found[place] = change
 
-    side_by_side(follow, parts, asked.data)
+    side_by_side(follow, parts, motions, asked.data)
     return found
 
 
-def _winds(motions: Motions, place: int, count: int) -> Array:
-    """Changes of a run's wind of samples, m/s, shape (points, samples): none in a constant wind.
+def _samples(motions: Motions, place: int, count: int) -> Array:
+    """Changes of the samples of a run's wind or drive, as in `slopes`, shape (points, samples): none without any.
 
-    NaN at a point where the wind has other samples than at the first.
+    NaN at a point where the samples are at other times than at the first.
     """
     rows, kept = motions.rows[place::count], motions.kept[place::count]
-    first = np.array(kept[0][0] if rows["wind_count"][0] > 1.0 else motions.winds[place], ndmin=1)
-    found = np.zeros((len(rows) - 1, first.size))
-    for change, row, arrays in zip(found, rows[1:], kept[1:], strict=True):
-        if (row["wind_count"], row["wind_interval"]) != (rows["wind_count"][0], rows["wind_interval"][0]):
+    of_wind, of_drive = rows["wind_count"][0] > 1.0, rows["moment_count"][0] > 0.0
+    arrays = 1 if of_wind else 2 if of_drive else 0  # of a drive, the values and their slopes
+    size = sum(array.size for array in kept[0][:arrays])
+    found = np.zeros((len(rows) - 1, max(size, 1)))
+    for change, row, there in zip(found, rows[1:], kept[1:], strict=True):
+        if any(row[name] != rows[name][0] for name in _OF_TIMES):
             change[:] = np.nan
-        elif first.size > 1:
-            change[:] = arrays[0] - first
+        elif any(one is not other for one, other in zip(kept[0][:arrays], there[:arrays], strict=True)):
+            change[:] = np.concatenate(there[:arrays]) - np.concatenate(kept[0][:arrays])
     return found
-
-
-def _has_other_input(rows: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Whether a run's input has other samples than at the first point, shape (points,).
-
-    Equal samples are one array, as `Motions.alike` has it.
-    """
-    of_samples = list(_OF_SAMPLES)
-    return np.asarray(rows[of_samples][1:] != rows[of_samples][0], np.bool_)
 
 
 def _part(
-    asked: Asked, motions: Motions, part: list[int], moved: Array, blown: Sequence[Array]
+    asked: Asked, motions: Motions, part: list[int], moved: Array, sampled: Sequence[Array]
 ) -> Sequence[Array]:
     """The changes of runs that are integrated side by side, shape (points, blocks) each.
 
     Args:
         part: their places.
         moved: changes of their terms, shape (runs, points, terms).
-        blown: changes of their winds, by run, as of `_winds`.
+        sampled: changes of their samples, by run, as of `_samples`.
     """
     count, points = len(asked.runs) // (moved.shape[1] + 1), moved.shape[1]
     columns = np.flatnonzero(moved.any(axis=(0, 1)))
-    gusts = np.array([change.any(axis=1) for change in blown])  # a change that is NaN is one, too
-    along = np.flatnonzero(gusts.any(axis=0))[: most_winds()]
+    resampled = np.array([change.any(axis=1) for change in sampled])  # a change that is NaN is one, too
+    along = np.flatnonzero(resampled.any(axis=0))[: most_changes()]
     runs, blocks = [asked.runs[place] for place in part], int(motions.blocks[part[0]])
     effects = asked.effects[part[0]]
     weights = (
         end_weights(runs, blocks)
         * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
     )
-    winds = [np.nan_to_num(change[along]) for change in blown]
-    found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights, winds)
+    changed = [np.nan_to_num(change[along]) for change in sampled]
+    found = slopes(motions.law[part], motions.rows[part], blocks + 1, columns.tolist(), weights, changed)
     if found.status:
         return [np.full((points, run.reading.size), np.nan) for run in runs]
-    changed = gusts[:, along, None] * (along[:, None] == np.arange(points))
-    steps = np.concatenate([moved[:, :, columns], np.swapaxes(changed, 1, 2)], axis=2)
+    whole = resampled[:, along, None] * (along[:, None] == np.arange(points))
+    steps = np.concatenate([moved[:, :, columns], np.swapaxes(whole, 1, 2)], axis=2)
     unknown = np.isnan(found.by_angle[:, :, 0])
     lost = np.any((steps != 0.0) & unknown[:, None], axis=2)
-    lost |= np.array([np.isnan(change).any(axis=1) for change in blown])
-    lost |= gusts & ~np.isin(np.arange(points), along)
+    lost |= np.array([np.isnan(change).any(axis=1) for change in sampled])
+    lost |= resampled & ~np.isin(np.arange(points), along)
     found.by_angle[unknown] = 0.0
     result = list(steps @ found.by_angle)
     if reads_plainly(effects):

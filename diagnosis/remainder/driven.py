@@ -15,7 +15,7 @@ from scipy.special import chdtri
 from diagnosis.facts.remainder import Ceiling, Closable
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import Ranges, paths, ranges
-from diagnosis.remainder.formula import Formula, Proposal, Term, propose
+from diagnosis.remainder.formula import Formula, Proposal, Term, predicted_drop, propose
 from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.study import Study
 
@@ -44,17 +44,18 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
     base = study.chosen
     if not study.causes or not significant or study.random is not None or base.excess <= 0.0:
         return None
+    settings, laws = base.settings.remainder, list(_formulas(base))
+    laws.sort(key=lambda law: -predicted_drop(base, law[1], law[0]))
     found = [
         (kind, proposal)
-        for kind, formula in _formulas(base)
+        for kind, formula in laws[: settings.laws_fitted]
         if (proposal := propose(base, formula, kind)) is not None
     ]
     if not found:
         return None
-    settings = base.settings.remainder
     kind, best = min(found, key=lambda one: one[1].fit.total)
     # One rate for all laws of the list together.
-    if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(found)):
+    if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(laws)):
         return None
     closed, std, held_out = held_out_share(base, best.fit)
     law = stated_law(base, best, study.similarity, closed, std)

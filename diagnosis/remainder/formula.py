@@ -16,8 +16,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from diagnosis.likelihood.ceiling import Normal, Ridge, Unexplained, held_out, total
-from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, normal_equations
 from diagnosis.likelihood.paths import Ranges
+from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
@@ -276,6 +277,45 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
 
 def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
     """Fit a formula beside a fit's effects like any other, named after the kind; None where the fit fails."""
+    stated = _stated(base, formula, kind)
+    if stated is None:
+        return None
+    table, problem, start = stated
+    moved = start.common.copy()
+    moved[: formula.delta.size] += formula.delta
+    found = []
+    for first in (moved, start.common) if formula.delta.any() else (start.common,):
+        with suppress(FitError, np.linalg.LinAlgError):
+            found.append(fit(problem, Point(first, base.point.release), base=base))
+            if found[-1].excess < base.settings.remainder.first_start * base.excess:
+                break
+    best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
+    return None if best is None or best.total >= base.total else Proposal(table, best)
+
+
+def predicted_drop(base: Fit, formula: Formula, kind: str) -> float:
+    """Drop of χ² that linear theory predicts for a formula beside a fit's effects; 0 where it has no motion."""
+    stated = _stated(base, formula, kind)
+    if stated is None:
+        return 0.0
+    _, problem, start = stated
+    runs = zip(problem.data.runs, problem.predict([start])[0], base.residuals, base.jacobian, strict=True)
+    changed, zero = [], base.problem.predict([base.point])[0]
+    for (run, moved, _, (common, release)), still in zip(runs, zero, strict=True):
+        changed.append((np.column_stack([common, run.scaled(moved - still)]), release))
+    if not all(np.isfinite(common).all() for common, _ in changed):
+        return 0.0
+    matrix, gradient, _ = normal_equations(changed, base.residuals)
+    width = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inner = matrix / np.outer(width, width)
+    solved = np.linalg.pinv(inner[:-1, :-1], rcond=1e-11, hermitian=True) @ inner[:-1, -1]
+    left = 1.0 - inner[-1, :-1] @ solved
+    along = (gradient[-1] - solved @ (gradient[:-1] * width[-1] / width[:-1])) / width[-1]
+    return float(along**2 / left) if left > 1e-6 else 0.0
+
+
+def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Problem, Point] | None:
+    """A formula's table, its problem beside a fit's effects, and the start there; None where it is no effect."""
     taken = {known.name for known in known_effects()}
     numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
     table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))
@@ -285,16 +325,8 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
         return None
     start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
-    own = np.array([start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]])
-    common = base.point.common + formula.delta
-    found = []
-    for first in (common, base.point.common):
-        with suppress(FitError, np.linalg.LinAlgError):
-            found.append(fit(problem, Point(np.concatenate([first, own]), base.point.release)))
-            if found[-1].excess < base.settings.remainder.first_start * base.excess:
-                break
-    best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
-    return None if best is None or best.total >= base.total else Proposal(table, best)
+    own = [start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]]
+    return table, problem, Point(np.concatenate([base.point.common, own]), base.point.release)
 
 
 def effect_table(formula: Formula, name: str) -> dict[str, Any]:

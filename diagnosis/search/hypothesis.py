@@ -37,6 +37,7 @@ class Hypothesis:
         textbook: the fit with the textbook form, where forms were freed; else None.
         short: the same set fitted to shorter stretches of the runs, where effects are added there.
         repeating: the same set fitted to runs that repeat exactly, from which effects are added too.
+        plain: a fit with the textbook form to which free forms add no weight; None: no such fit is known.
     """
 
     effects: tuple[str, ...]
@@ -44,6 +45,7 @@ class Hypothesis:
     textbook: Fit | None = None
     short: Hypothesis | None = None
     repeating: Fit | None = None
+    plain: Fit | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -152,11 +154,10 @@ class Scale:
         cost = 0.0 if repeating else hypothesis.fit.scatter_cost(self.known)
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
-    def form_may_gain(self, hypothesis: Hypothesis) -> bool:
-        """Whether the weight of a set would rise with one more form and no residual."""
+    def with_form(self, hypothesis: Hypothesis) -> float:
+        """Logarithm of the weight of the set with one more form and no residual."""
         cost = hypothesis.fit.scatter_cost(self.known)
-        best = self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
-        return best > self.weight(hypothesis)
+        return self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
 
     def _log_weight(
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
@@ -258,7 +259,8 @@ def with_forms(
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a large residual and they gain weight.
 
-    The deepest minimum of the textbook form is sought first: a rod that misses its ringing does not lack a form.
+    A hypothesis that would weigh less than the best one with no residual is not tried. The deepest minimum of the
+    textbook form is sought first: a rod that misses its ringing does not lack a form.
 
     Args:
         gap: misfit of the nominal model.
@@ -273,10 +275,13 @@ def with_forms(
         textbook, chosen = hypothesis.fit, hypothesis.fit.settings.search
         if place == (chosen.freed_hypotheses if count is None else count):
             break
-        if textbook.excess > least:
-            textbook = deepest(textbook)
-            ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
-        for forms in _choices(textbook) if textbook.excess > least else ():
+        scale = Scale.of(ranked, gap, textbook.settings.weighing)
+        needless = textbook is hypothesis.plain or textbook.excess <= least
+        if needless or scale.with_form(hypothesis) <= max(map(scale.weight, ranked)):
+            continue
+        textbook = deepest(textbook)
+        ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
+        for forms in _choices(textbook):
             freed = _free_forms(textbook, forms)
             if freed is None:
                 continue
@@ -286,6 +291,8 @@ def with_forms(
             ranked[place] = of_more_weight(
                 ranked[place], dataclasses.replace(hypothesis, fit=freed, textbook=textbook), gap
             )
+        if ranked[place] is hypothesis:
+            ranked[place] = dataclasses.replace(hypothesis, plain=textbook)
     return sorted(ranked, key=lambda h: h.fit.total)
 
 
@@ -329,7 +336,8 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
         # adding the ringing to the slow motion is not exact enough; the confirmation states the error
         first = try_fit(problem, first.point) or first
-    better = _free_forms(first, _likeliest_forms(first), tolerance=_POLISH) or try_fit(
+    forms = _first_forms(first) if chosen.plain is chosen.fit else _likeliest_forms(first)
+    better = _free_forms(first, forms, tolerance=_POLISH) or try_fit(
         first.problem, first.point, tolerance=_POLISH
     )
     if better is None or better.total > first.total:
@@ -346,10 +354,14 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     return Hypothesis(chosen.effects, better, textbook)
 
 
+def _first_forms(fitted: Fit) -> tuple[Form, ...]:
+    """The first form of every effect."""
+    return tuple(forms[0] for forms in _forms_by_effect(fitted))
+
+
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
     """The first form of every effect, or another that explains much of the significant residual of the first."""
-    by_effect, weighing = _forms_by_effect(fitted), fitted.settings.weighing
-    best = tuple(forms[0] for forms in by_effect)
+    by_effect, weighing, best = _forms_by_effect(fitted), fitted.settings.weighing, _first_forms(fitted)
 
     def total(forms: tuple[Form, ...]) -> float:
         freed = _free_forms(fitted, forms)

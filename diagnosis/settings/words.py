@@ -85,6 +85,13 @@ class RemainderSettings:
         "judgement",
     )
     most_terms: int = setting(3, "Maximum number of terms in a formula.", "judgement", unit="terms")
+    laws_fitted: int = setting(
+        3,
+        "Number of laws that are fitted to driven runs, those of greatest predicted drop of χ² first.",
+        "judgement",
+        "Time against coverage.",
+        unit="laws",
+    )
 
 
 @dataclass(frozen=True)

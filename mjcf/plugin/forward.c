@@ -283,7 +283,9 @@ double vwt_set_drive(Step* s) {
   s->moment = run->moment_scale * run->moment[at] + run->moment_offset;
   s->moment_slope = 0;
   s->moment_from = time[at] + delay;
-  if (s->sample >= 0 && s->sample < last && run->moment_held == 0) {
+  if (run->moment_slope) {
+    s->moment_slope = s->sample < 0 ? 0 : run->moment_scale * run->moment_slope[at];
+  } else if (s->sample >= 0 && s->sample < last && run->moment_held == 0) {
     s->moment_slope = run->moment_scale * (run->moment[at + 1] - run->moment[at]) / (time[at + 1] - time[at]);
   }
   return s->sample < last ? time[s->sample + 1] + delay : INFINITY;

@@ -32,9 +32,10 @@
   NUMBER(moment_scale)     /* N m per unit */                                       \
   NUMBER(moment_delay)     /* s, by which the drive acts later than its samples */  \
   NUMBER(moment_held)      /* 1: constant from one sample to the next; 0: linear */ \
+  POINTER(moment_slope)    /* per s, of the line from each sample on; null: as `moment_held` says */ \
   NUMBER(moment_on_end)    /* 1: moves the spring's root; 0: acts on the body */    \
   NUMBER(moment_offset)    /* N m, a constant moment beside the samples */          \
-  NUMBER(moment_interval)  /* s, between even samples, each at the start of a step; 0: they are not so */ \
+  NUMBER(moment_interval)  /* s, between samples with slopes, each at the start of a step */ \
   POINTER(program)         /* of the moment by expression, program_count elements */ \
   NUMBER(program_count)    /* 0: none */                                            \
   NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \
@@ -111,20 +112,21 @@ enum {
 #undef X
   VWT_TERM_COUNT
 };
-enum { VWT_MOST_WINDS = 8 };  // changes of a wind of samples, by which there are derivatives
+enum { VWT_MOST_CHANGES = 8 };  // of the samples of a wind or a drive, by which there are derivatives
 
 // Values of all terms of `count` plain runs, shape (count, VWT_TERM_COUNT).
 VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values);
 
 // As `vwt_forward`, for plain runs: also the derivatives of angle and rate by the terms in `columns`, `width` of them,
-// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of a wind of samples: the k-th row of
-// the run's `winds`, m/s, shape (VWT_MOST_WINDS at most, wind_count). With weights of the ends of an interval between
+// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of the run's samples: the k-th row of
+// its `changes`, at most VWT_MOST_CHANGES. A row holds a change of the wind, m/s, shape (wind_count,), or of the drive,
+// its samples before their slopes, shape (2, moment_count). With weights of the ends of an interval between
 // samples, by run, shape (4, weighed) for its first and last angle and its first and last rate, the derivatives are
 // those of the weighted sums instead, shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all
 // intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain, or its friction is
 // a root of the rate or depends on the load.
 VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-                       const double* const* winds, const double* const* weights, int weighed, double* const* angle,
+                       const double* const* changes, const double* const* weights, int weighed, double* const* angle,
                        double* const* rate, double* const* angle_slopes, double* const* rate_slopes);
 
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
@@ -147,7 +149,7 @@ VWT_API int vwt_operation_count(void);
 VWT_API const char* vwt_operation_name(int index);
 VWT_API int vwt_term_count(void);
 VWT_API const char* vwt_term_name(int index);
-VWT_API int vwt_most_winds(void);
+VWT_API int vwt_most_changes(void);
 VWT_API int vwt_run_size(void);  // bytes
 VWT_API int vwt_run_count(void);
 VWT_API const char* vwt_run_name(int index);

@@ -9,7 +9,7 @@
 // Whether the root of a spring moves as far as the input says, where it moves.
 static int is_plain_drive(const vwt_parameters* p, const vwt_run* run) {
   const int turned = run->moment_on_end == 0 || (run->moment_scale == p->spring_stiffness && run->moment_offset == 0);
-  return run->moment_interval > 0 && run->wind_count == 1 && p->friction_load == 0 && turned;
+  return run->moment_slope && run->wind_count == 1 && p->friction_load == 0 && turned;
 }
 
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {

@@ -33,7 +33,8 @@ typedef struct {
 
 // The input of a drive in a step, by lane: its value at a time, s, and its slope from there on; 0 without a drive.
 typedef struct {
-  Lane value, slope, from;
+  Lane value, slope, from, begun;  // 1 from the first sample on
+  int sample[VWT_LANES];
 } Input;
 
 // The start of a step, by lane.
@@ -97,7 +98,7 @@ INLINE Air air_at(const Lanes* c, int features, Lane time) {
 
 // The input in a step from `start` on, whose middle is half a step later.
 INLINE Input input_of(const Lanes* c, int features, Lane start, Lane half) {
-  Input out = {{0}, {0}, {0}};
+  Input out = {.value = {0}};
   for (int k = 0; features & DRIVE && k < VWT_LANES; k++) {
     const vwt_run* run = c->run[k];
     const int last = (int)run->moment_count - 1;
@@ -107,11 +108,11 @@ INLINE Input input_of(const Lanes* c, int features, Lane start, Lane half) {
     const double first = run->moment_time[0] + run->moment_delay;
     const double passed = floor((start[k] + half[k] - first) / run->moment_interval);
     const int at = passed < 0 ? 0 : passed < last ? (int)passed : last;
+    out.sample[k] = at;
     out.value[k] = run->moment[at];
     out.from[k] = first + at * run->moment_interval;
-    if (passed >= 0 && at < last && run->moment_held == 0) {
-      out.slope[k] = (run->moment[at + 1] - run->moment[at]) / run->moment_interval;
-    }
+    out.begun[k] = passed >= 0;
+    out.slope[k] = passed >= 0 ? run->moment_slope[at] : 0;
   }
   return out;
 }

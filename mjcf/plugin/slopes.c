@@ -94,7 +94,7 @@ INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane m
     }
     if (columns[i] < VWT_TERM_pace || columns[i] >= VWT_TERM_COUNT) {
       for (int j = 0; j < 4; j++) {
-        const Lane term = by_term(law, features, columns[i], s->slip, &at[j]);
+        const Lane term = by_term(law, features, columns[i], s->slip, &in, &at[j]);
         angle1 += of_angle.stage[j] * term;
         rate1 += of_rate.stage[j] * term;
       }
@@ -312,7 +312,7 @@ static int exists(const Lanes* c, int k, int term) {
     case VWT_TERM_air_rate:
       return is_sampled(c, k);
     default:
-      return term < VWT_TERM_COUNT || is_sampled(c, k);
+      return term < VWT_TERM_COUNT || is_sampled(c, k) || is_driven(c, k);
   }
 }
 
@@ -379,7 +379,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
 }
 
 CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width,
-                                  const int* columns, const double* const* winds, const Out* out) {
+                                  const int* columns, const double* const* changes, const Out* out) {
   Lanes c = {.count = count};
   State s = {.rests = {0}};
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
@@ -391,7 +391,7 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
   }
   Law law = law_of(&c);
   for (int k = 0; k < VWT_LANES; k++) {
-    law.winds[k] = winds ? winds[k < count ? k : 0] : 0;
+    law.changes[k] = changes ? changes[k < count ? k : 0] : 0;
   }
   Asked asked = {.width = width, .columns = columns, .pace = -1};
   for (int i = 0; i < width; i++) {
@@ -406,7 +406,7 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
 }
 
 int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-               const double* const* winds, const double* const* weights, int weighed, double* const* angle,
+               const double* const* changes, const double* const* weights, int weighed, double* const* angle,
                double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
     if (!vwt_is_plain(&parameters[i], &runs[i]) || !is_smooth(&parameters[i])) {
@@ -421,7 +421,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
     const Out out = {.samples = (int)runs[i].samples, .width = width, .angle = &angle[i], .rate = &rate[i],
                      .angle_slopes = &angle_slopes[i], .rate_slopes = weights ? 0 : &rate_slopes[i],
                      .weights = weights ? &weights[i] : 0, .weighed = weighed};
-    const int failed = slopes_of_lanes(together, &parameters[i], &runs[i], width, columns, winds ? &winds[i] : 0, &out);
+    const int failed = slopes_of_lanes(together, &parameters[i], &runs[i], width, columns, changes ? &changes[i] : 0, &out);
     if (failed) {
       return i + failed;
     }

@@ -8,11 +8,11 @@
 #include "lanes.h"
 
 // Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law; also
-// the changes of a wind of samples.
+// the changes of samples.
 typedef struct {
   const Lanes* c;
   int features;
-  const double* winds[VWT_LANES];
+  const double* changes[VWT_LANES];
   Lane inverse;
   Lane steepening, thickening, rate, cube, square;
   Lane seen, steep, thick;
@@ -31,6 +31,7 @@ typedef struct {
   Air air;
   Lane speed, pressure;  // of a wind of samples, m/s and (m/s)2; 1 in a constant wind
   Lane by_speed;         // of the acceleration, in a wind of samples
+  Lane by_input;         // of the acceleration, in a driven run
   Powers powers;
   Lane by_angle, by_rate, by_lagged, by_lag;
   Lane level;              // of the friction per unit of its moment
@@ -38,12 +39,14 @@ typedef struct {
 } Stage;
 
 // A small change of the motion by column, per unit of the column's term.
-enum { VWT_MOST_COLUMNS = VWT_TERM_COUNT + VWT_MOST_WINDS };
+enum { VWT_MOST_COLUMNS = VWT_TERM_COUNT + VWT_MOST_CHANGES };
 typedef struct {
   Lane angle[VWT_MOST_COLUMNS], rate[VWT_MOST_COLUMNS], lagged[VWT_MOST_COLUMNS];
 } Change;
 
 static int is_sampled(const Lanes* c, int k) { return c->run[k]->wind_count > 1; }
+
+static int is_driven(const Lanes* c, int k) { return c->run[k]->moment_count > 0; }
 
 // What the air's stiffness and damping have in common with those at any other speed, kg/m; times the model's length.
 static double flow_of(const vwt_parameters* p) {
@@ -190,7 +193,12 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
                              air.stiffness * at->seen * c->law.moment_cubic * with_sign(steepening, body) * c->body +
                              air.damping * c->law.damping_quadratic * with_sign(thickening, body) * c->body *
                                  (c->body * rate));
-  by_angle -= c->law.cubic * cube + c->law.quadratic * with_sign(square, deflection) + c->rod;
+  const Lane by_bend = c->law.cubic * cube + c->law.quadratic * with_sign(square, deflection);
+  by_angle -= by_bend + c->rod;
+  if (features & DRIVE) {
+    const Lane played = choose(bend < c->law.free_play, c->law.spring, none);
+    at->by_input = (c->scale + c->turns * (by_bend - played)) * law->inverse;
+  }
   by_angle -= choose(bend < c->law.free_play, none, c->law.spring);
   if (features & GRAVITY) {
     for (int k = 0; k < VWT_LANES; k++) {
@@ -224,28 +232,31 @@ INLINE Lane sine(const Stage* at, Lane turn, Lane phase, double shift) {
   return out;
 }
 
-// The derivative of the acceleration at a stage along a change of the wind.
-INLINE Lane by_wind(const Law* law, int change, const Stage* at) {
+// The derivative of the acceleration at a stage along a change of the samples of its wind or its drive.
+INLINE Lane by_samples(const Law* law, int change, const Input* in, const Stage* at) {
   Lane out = {0};
   for (int k = 0; k < VWT_LANES; k++) {
     const vwt_run* run = law->c->run[k];
-    const int count = (int)run->wind_count;
+    const int winds = (int)run->wind_count, drives = (int)run->moment_count;
     if (is_sampled(law->c, k)) {
-      out[k] = at->by_speed[k] * vwt_series(law->winds[k] + (long)change * count, count, run->wind_interval, at->time[k]);
+      out[k] = at->by_speed[k] * vwt_series(law->changes[k] + (long)change * winds, winds, run->wind_interval, at->time[k]);
+    } else if (drives > 0) {
+      const double* row = law->changes[k] + (long)change * 2 * drives + in->sample[k];
+      out[k] = at->by_input[k] * (row[0] + in->begun[k] * row[drives] * (at->time[k] - in->from[k]));
     }
   }
   return out;
 }
 
 // The derivative of the acceleration at a stage by a term, `features` those of the law.
-INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Stage* at) {
+INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Input* in, const Stage* at) {
   const Lanes* c = law->c;
   const Lane none = {0}, angle = at->angle, rate = at->rate, bend = at->deflection;
   const Powers* p = &at->powers;
   const double quarter = 1.5707963267948966192313216916398;
   const Lane speed = features & WIND ? at->speed : none + 1, pressure = features & WIND ? at->pressure : none + 1;
   if (term >= VWT_TERM_COUNT) {
-    return by_wind(law, term - VWT_TERM_COUNT, at);
+    return by_samples(law, term - VWT_TERM_COUNT, in, at);
   }
   switch (term) {
     case VWT_TERM_angle:

@@ -27,7 +27,7 @@ static const char* const term_names[] = {VWT_TERMS(X)};
 
 int vwt_term_count(void) { return VWT_TERM_COUNT; }
 const char* vwt_term_name(int index) { return term_names[index]; }
-int vwt_most_winds(void) { return VWT_MOST_WINDS; }
+int vwt_most_changes(void) { return VWT_MOST_CHANGES; }
 
 typedef struct {
   const char* name;

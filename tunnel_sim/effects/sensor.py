@@ -438,8 +438,8 @@ class SecondMode(Effect):
 class InputDelay(Effect):
     """An input that acts later than its time stamps.
 
-    It is exact for both holds and any delay: the integrator ends a step at each kink. Beyond its samples the
-    input keeps its first and its last value.
+    It serves both holds and any delay: a step that contains a kink has the input's impulse. Beyond its samples
+    the input keeps its first and its last value.
     """
 
     name = "input_delay"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
 from typing import Any
@@ -120,6 +120,25 @@ class RodTwist:
 
 
 @dataclass(frozen=True, eq=False)
+class Lines:
+    """An input as a line from each of its samples to the next, as the integrator takes it side by side.
+
+    Args:
+        time_s: of the samples, even, each at the start of a step.
+        values: there, in the unit of the input.
+        slopes: from there on, per s.
+        interval: between the samples, s.
+        delay: time by which it acts later, s.
+    """
+
+    time_s: Times
+    values: PerSample
+    slopes: PerSample
+    interval: float
+    delay: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class DriveMoment:
     """The moment of a drive: linear or constant between its samples, constant before the first and after the last.
 
@@ -211,14 +230,21 @@ class DriveMoment:
 
     def means(self, ends: Times) -> PerSample:
         """Means of the delayed input between successive times since the run's start, which keep its impulse."""
-        acting = self.acting
-        times, given, ends = acting.time_s, acting.values, ends - acting.delay
-        before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
-        now = given[before] if acting.held else np.interp(ends, times, given)
-        until = np.diff(times) * (given[:-1] if acting.held else 0.5 * (given[:-1] + given[1:]))
-        integral = np.append(0.0, np.cumsum(until))[before]
-        integral += 0.5 * (given[before] + now) * (ends - times[before])
-        return np.asarray(np.diff(integral) / np.diff(ends), np.float64)
+        means: Array = _impulses(self.acting, ends)[0] / np.diff(ends)
+        return means
+
+    def lines(self, step: Seconds, steps: int, *, sampled: bool) -> Lines:
+        """The samples without an actuator as lines; those of the same samples are one object.
+
+        Args:
+            step: of the integration.
+            steps: number of steps.
+            sampled: whether a line runs from sample to sample, which are at the starts of steps; else there is
+                one for each step, with the impulse of the input and its product with the time. The motion of
+                a body then differs by less than the order of step².
+        """
+        of = _Same(self.time_s), _Same(self.values), self.held, self.delay
+        return _lines_of_samples(*of) if sampled else _lines_of_steps(*of, step, steps)
 
     def oscillation(
         self, frequency: RadPerS, damping_ratio: Number, time_s: Times, derivative: int = 0
@@ -231,33 +257,103 @@ class DriveMoment:
             time_s: since the run's start, at which it begins at rest.
             derivative: which derivative of q is returned, per s or s²: 0, 1 or 2.
         """
-        ringing = np.sqrt(1.0 - damping_ratio**2)
-        pole = frequency * complex(-damping_ratio, ringing)
         acting = self.acting
-        kinks, last = acting.time_s + acting.delay, acting.values.size - 1
-        starts = np.concatenate([[0.0], kinks[kinks > 0.0]])
-        piece = np.searchsorted(kinks, starts, side="right") - 1  # -1 before the first sample
-        at = np.clip(piece, 0, last)
-        slope = np.append(np.diff(acting.values) / np.diff(acting.time_s), 0.0)[at]
-        slope = np.where((piece < 0) | acting.held, 0.0, slope)
-        level = acting.values[at] + slope * (starts - kinks[at])
+        of = _Same(acting.time_s), _Same(acting.values), acting.held, acting.delay
+        moment: Moments = self.scale * _oscillation(*of, frequency, damping_ratio, _Same(time_s), derivative)
+        return moment
 
-        def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
-            turn = pole * since
-            grown = np.expm1(turn)
-            found: np.ndarray = level[j] * grown / pole + slope[j] * (grown - turn) / pole**2
-            return found
 
-        factor = np.exp(pole * np.diff(starts))
-        state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
-        state = recurrence(np.concatenate([[0j], factor]), state)  # z at the starts
-        j = np.maximum(np.searchsorted(starts, time_s, side="right") - 1, 0)
-        since = np.maximum(time_s - starts[j], 0.0)
-        state = np.exp(pole * since) * state[j] + forced(j, since)
-        values = (pole**derivative * state).imag
-        if derivative == 2:
-            values = values + pole.imag * (level[j] + slope[j] * since)
-        return np.asarray(self.scale * frequency / ringing * values, np.float64)
+def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
+    """Level and slope, per s, of an input's delayed samples from given times since the run's start on."""
+    kinks = drive.time_s + drive.delay
+    piece = np.searchsorted(kinks, starts, side="right") - 1  # -1 before the first sample
+    at = np.clip(piece, 0, kinks.size - 1)
+    slope = np.append(np.diff(drive.values) / np.diff(drive.time_s), 0.0)[at]
+    slope = np.where((piece < 0) | drive.held, 0.0, slope)
+    return drive.values[at] + slope * (starts - kinks[at]), slope
+
+
+def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
+    """Integrals of an input's delayed samples between times, and of their products with the time since the last."""
+    kinks = drive.time_s + drive.delay
+    inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
+    starts = np.sort(np.concatenate([ends[:-1], inside]), kind="stable")  # of two sorted parts: fast
+    level, slope = _pieces(drive, starts)
+    last, length = ends.size - 1, np.diff(np.append(starts, ends[-1]))
+    within = np.searchsorted(ends, starts, side="right") - 1
+    impulse = length * (level + slope * length / 2.0)
+    product = (starts - ends[within]) * impulse + length**2 * (level / 2.0 + slope * length / 3.0)
+    return np.bincount(within, impulse, last), np.bincount(within, product, last)
+
+
+class _Same:
+    """An array as a key of a cache: equal to itself only."""
+
+    def __init__(self, array: Array) -> None:
+        self.array = array
+
+    def __hash__(self) -> int:
+        return id(self.array)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.array is self.array
+
+
+@lru_cache(maxsize=64)
+def _lines_of_samples(time_s: _Same, values: _Same, held: bool, delay: float) -> Lines:
+    drive = DriveMoment(time_s.array, values.array, delay=delay, held=held)
+    rise = 0.0 if held else np.diff(drive.values) / drive.interval
+    slopes = np.append(np.broadcast_to(rise, drive.values.size - 1), 0.0)
+    return Lines(drive.time_s, drive.values, read_only(slopes), drive.interval, delay)
+
+
+@lru_cache(maxsize=64)
+def _lines_of_steps(
+    time_s: _Same, values: _Same, held: bool, delay: float, step: Seconds, steps: int
+) -> Lines:
+    ends = step * np.arange(steps + 1)
+    impulse, product = _impulses(DriveMoment(time_s.array, values.array, delay=delay, held=held), ends)
+    slopes = 12.0 * (product - impulse * step / 2.0) / step**3
+    return Lines(
+        read_only(ends[:-1]), read_only(impulse / step - slopes * step / 2.0), read_only(slopes), step
+    )
+
+
+@lru_cache(maxsize=64)
+def _oscillation(
+    times: _Same,
+    values: _Same,
+    held: bool,
+    delay: float,
+    frequency: RadPerS,
+    damping_ratio: Number,
+    at: _Same,
+    derivative: int,
+) -> PerSample:
+    """As `DriveMoment.oscillation`, in the unit of the samples."""
+    drive, time_s = DriveMoment(times.array, values.array, delay=delay, held=held), at.array
+    ringing = np.sqrt(1.0 - damping_ratio**2)
+    pole = frequency * complex(-damping_ratio, ringing)
+    kinks = drive.time_s + drive.delay
+    starts = np.concatenate([[0.0], kinks[kinks > 0.0]])
+    level, slope = _pieces(drive, starts)
+
+    def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
+        turn = pole * since
+        grown = np.expm1(turn)
+        found: np.ndarray = level[j] * grown / pole + slope[j] * (grown - turn) / pole**2
+        return found
+
+    factor = np.exp(pole * np.diff(starts))
+    state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
+    state = recurrence(np.concatenate([[0j], factor]), state)  # z at the starts
+    j = np.maximum(np.searchsorted(starts, time_s, side="right") - 1, 0)
+    since = np.maximum(time_s - starts[j], 0.0)
+    state = np.exp(pole * since) * state[j] + forced(j, since)
+    response = (pole**derivative * state).imag
+    if derivative == 2:
+        response = response + pole.imag * (level[j] + slope[j] * since)
+    return read_only(frequency / ringing * response)
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ def term_places() -> Mapping[str, int]:
 
 
 @functools.cache
-def most_winds() -> int:
-    """Greatest number of changes of a sampled wind for which derivatives are computed."""
-    return int(forward_library().vwt_most_winds())
+def most_changes() -> int:
+    """Greatest number of changes of a wind's or a drive's samples for which derivatives are computed."""
+    return int(forward_library().vwt_most_changes())
 
 
 def terms(law: Laws, runs: NDArray[np.void]) -> Array:
@@ -47,7 +47,7 @@ class Slopes:
         angle: of the rod's upper end, rad, shape (n, samples).
         rate: of the rod's upper end, rad/s, shape (n, samples).
         by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where they do
-            not exist; or of the weighted sums, shape (n, columns, samples − 1). Along changes of the wind they are
+            not exist; or of the weighted sums, shape (n, columns, samples − 1). Along changes of samples they are
             last.
         by_rate: derivatives of the rate, of that shape; none for weighted sums.
         status: as of `integrate`, or −1 where a run is not plain, or its friction is a root of the rate.
@@ -66,7 +66,7 @@ def slopes(
     samples: int,
     columns: Sequence[int],
     weights: Array | None = None,
-    winds: Sequence[Array] = (),
+    changes: Sequence[Array] = (),
 ) -> Slopes:
     """Integrate plain runs of equal length, and their derivatives by some terms.
 
@@ -76,16 +76,17 @@ def slopes(
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
             between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
-        winds: changes of the sampled winds, along which derivatives are also computed, m/s, by run, shape (changes,
-            samples of the run's wind), at most `most_winds` changes; in a constant wind the derivatives are NaN.
+        changes: of the runs' samples, along which derivatives are also computed, by run, at most `most_changes`: of
+            the wind, m/s, shape (changes, samples), or of the drive's values and then their slopes, shape (changes,
+            2 samples). In a run with neither the derivatives are NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     runs["samples"] = samples
-    changes = len(winds[0]) if winds else 0
-    places = [*columns, *(len(term_places()) + change for change in range(changes))]
+    further = len(changes[0]) if changes else 0
+    places = [*columns, *(len(term_places()) + change for change in range(further))]
     chosen = np.ascontiguousarray(places, dtype=np.intc)
-    blown = [np.ascontiguousarray(change, dtype=np.float64) for change in winds]
-    at = np.array([change.ctypes.data for change in blown], dtype=np.uintp) if blown else None
+    moved = [np.ascontiguousarray(change, dtype=np.float64) for change in changes]
+    at = np.array([change.ctypes.data for change in moved], dtype=np.uintp) if moved else None
     angle, rate = np.empty((len(runs), samples)), np.empty((len(runs), samples))
     weights = None if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
     by_angle = np.empty((len(runs), chosen.size, samples - (weights is not None)))

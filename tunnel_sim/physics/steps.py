@@ -79,15 +79,6 @@ def fit_substeps(runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.in
     return np.ceil(interval / longest).astype(np.int64)
 
 
-def meets_steps(drive: DriveMoment, interval: Seconds) -> bool:
-    """Whether an interval between block ends can be divided so that steps begin at the samples of an input.
-
-    Args:
-        drive: without an actuator.
-    """
-    return drive.interval > 0.0 and drive.on_steps(interval / max(1, round(interval / drive.interval)))
-
-
 def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
     """The number of steps in an interval, at least a given one, that begin at the samples of an input if they can.
 
@@ -95,10 +86,10 @@ def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
         interval: between block ends.
         drive: of the run, without an actuator.
     """
-    if not meets_steps(drive, interval):
+    if not drive.interval:
         return least
     inside = max(1, round(interval / drive.interval))  # samples in an interval
-    return inside * ceil(least / inside)
+    return inside * ceil(least / inside) if drive.on_steps(interval / inside) else least
 
 
 def fit_stride(rig: Rig, runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, gap_left
 from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import grow, same_change, sets_with_one_more
-from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
+from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from tunnel_sim.effects import Effect
@@ -88,9 +88,6 @@ class View:
             level: the sets with one effect less from which they are grown, the best first.
         """
         chosen, parent = self.base.settings.search, level[0]
-        scale = Scale.of(children, self.gap, self.base.settings.weighing)
-        if not all(scale.form_may_gain(child) for child in children):
-            return children
         count = chosen.freed_hypotheses if not parent.effects else 1
         return with_forms(children, self.gap, chosen.form_open * parent.fit.excess, count)
 

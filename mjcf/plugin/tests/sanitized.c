@@ -207,7 +207,7 @@ static void check_slopes(void) {
     columns[i] = i;
     EXPECT(i >= kTerms || vwt_term_name(i)[0]);
   }
-  EXPECT(vwt_term_count() == kTerms && vwt_most_winds() == VWT_MOST_WINDS);
+  EXPECT(vwt_term_count() == kTerms && vwt_most_changes() == VWT_MOST_CHANGES);
   for (int features = 0; features < 8; features++) {
     for (int i = 0; i < kRuns; i++) {
       const int sampled = i % 2 && !(features & 5);  // a lag and vortices want a constant wind

@@ -99,23 +99,29 @@ def test_first_order_changes_are_those_of_predictions(data, name, tolerance):
             assert error <= tolerance * np.linalg.norm(expected) + 1e-12, (i, r)
 
 
-def driven(data, *, on_body):
-    """The same runs with an input at the times of their samples."""
-    runs = []
+def driven(data, *, on_body, even):
+    """The same runs with an input at the times of their samples, or at others."""
+    runs, rng = [], np.random.default_rng(8)
     for number, run in enumerate(data.runs):
-        times = np.arange(run.reading.size * run.block) * (run.interval / run.block)
+        size, interval = run.reading.size * run.block, run.interval / run.block
+        times = (np.arange(size) + (0.0 if even else rng.uniform(-0.4, 0.4, size))) * interval
         values = (0.5 if on_body else 0.1) * np.sin((3.0 + number) * times + times**2)
         runs.append(dataclasses.replace(run, drive=DriveMoment(times, values, on_body=on_body)))
     return data.with_runs(tuple(runs))
 
 
-@pytest.mark.parametrize("on_body", [True, False], ids=["moment", "root"])
-@pytest.mark.parametrize(
-    "name", ["spring_miscalibration", "cubic_stiffness", "coulomb_friction", "second_mode"]
-)
-def test_driven_runs_have_derivatives(data, name, on_body):
-    kind = effect_class(name)
-    problem, point = at_example(driven(data, on_body=on_body), kind)
+DRIVEN = [
+    *((name, body) for name in ("spring_miscalibration", "cubic_stiffness", "coulomb_friction", "second_mode")
+      for body in (True, False)),
+    *((name, True) for name in ("input_delay", "actuator_lag", "actuator_saturation", "actuator_rate_limit")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("even", [True, False], ids=["even", "jittered"])
+@pytest.mark.parametrize(("name", "on_body"), DRIVEN)
+def test_driven_runs_have_derivatives(data, name, on_body, even):
+    """Also by what changes the samples of the input, and where they are not at the starts of steps."""
+    problem, point = at_example(driven(data, on_body=on_body, even=even), effect_class(name))
     points, _ = moves(problem, point)
     found = motion_changes(problem, point, points)
     expected = problem.predict([point, *points])
@@ -123,13 +129,3 @@ def test_driven_runs_have_derivatives(data, name, on_body):
         for change, after, before in zip(found, there, expected[0], strict=True):
             error = np.linalg.norm(change[i] - (after - before))
             assert error <= 2e-2 * np.linalg.norm(after - before) + 1e-12, i
-
-
-def test_other_samples_of_the_input_take_finite_differences(data):
-    """All parameters do where the samples that act are not at the starts of steps."""
-    problem, point = at_example(driven(data, on_body=True), effect_class("input_delay"))
-    point.common[problem.names.index("input_delay.delay")] = 0.0
-    assert without_derivative(problem, point) == {"delay"}
-    problem, point = at_example(driven(data, on_body=True), effect_class("actuator_lag"))
-    every = {name.rpartition(".")[2] for name in (*problem.names, *problem.parameters.own_names)}
-    assert without_derivative(problem, point) == every

@@ -44,12 +44,12 @@ def test_a_sampled_wind_of_one_value_is_a_constant_one():
 
 @pytest.mark.parametrize("drive", DRIVES)
 def test_driven_runs_move_side_by_side_as_alone(drive):
-    """Inputs whose samples are not known to be at the starts of steps keep runs from the others."""
+    """Inputs without slopes keep runs from the others."""
     for name, (values, _) in {**SMOOTH, **KINKED, **JUMPING}.items():
         law, run = driven(*runs(values, count=11), drive)
         run["angle"] += 0.01 * np.arange(11)
         together = integrate(law, run, 400)
-        run["moment_interval"] = 0.0
+        run["moment_slope"] = 0
         alone = integrate(law, run, 400)
         assert together[2] == alone[2] == 0
         np.testing.assert_allclose(together[0], alone[0], rtol=0.0, atol=1e-10, err_msg=name)

@@ -100,6 +100,7 @@ def blown(law, run, wind):
 #: Inputs, sampled at every second step of the runs from two samples before their start on.
 INPUT = 0.1 * np.concatenate([[3.0, -2.0], np.sin(np.arange(250) ** 1.3), np.zeros(90)])
 INPUT_TIME = 0.008 * (np.arange(INPUT.size) - 2.0)  # s
+INPUT_SLOPE = {"held": np.zeros(INPUT.size), "linear": np.append(np.diff(INPUT) / 0.008, 0.0)}
 #: How an input acts: on the body, or on the root of the spring, linear or constant between its samples.
 DRIVES = {
     "linear moment": {"moment_scale": 8.0, "moment_offset": 0.05},
@@ -108,11 +109,15 @@ DRIVES = {
 }
 
 
-def driven(law, run, drive):
-    """The same runs with an input."""
+def driven(law, run, drive, values=INPUT, slopes=None):
+    """The same runs with an input; its slopes follow from its form where they are not given."""
     run = run.copy()
-    given = {"moment": INPUT.ctypes.data, "moment_time": INPUT_TIME.ctypes.data, "moment_count": INPUT.size}
-    for name, value in {**given, "moment_interval": 0.008, **DRIVES[drive]}.items():
+    slopes = INPUT_SLOPE["held" if "moment_held" in DRIVES[drive] else "linear"] if slopes is None else slopes
+    given = {
+        "moment": values.ctypes.data, "moment_slope": slopes.ctypes.data, "moment_time": INPUT_TIME.ctypes.data,
+        "moment_count": INPUT.size, "moment_interval": 0.008,
+    }  # fmt: skip
+    for name, value in {**given, **DRIVES[drive]}.items():
         run[name] = value
     return law, run
 
@@ -202,7 +207,7 @@ def test_derivatives_along_changes_of_the_wind_are_those_of_the_motion(values, f
     law, run = runs(values | {"friction_moment": friction}, **steps, count=2)
     run[1:] = blown(law, run[1:], wind)[1]
     column = [term_places()["angle"]]
-    found = slopes(law, run, SAMPLES, column, winds=[np.zeros((2, 1)), changes])
+    found = slopes(law, run, SAMPLES, column, changes=[np.zeros((2, 1)), changes])
     assert np.isnan(found.by_angle[0, 1:]).all()
     for change, exact in zip(changes, found.by_angle[1, 1:], strict=True):
 
@@ -213,6 +218,31 @@ def test_derivatives_along_changes_of_the_wind_are_those_of_the_motion(values, f
         step, tolerance = (1e-6, 1e-6) if friction else (1e-4, 1e-8)
         expected = difference(motion, step)
         assert np.linalg.norm(exact - expected) < tolerance * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize(
+    "name", ["linear", "cubic, other power", "quadratic", "lag", "free play", "friction"]
+)
+def test_derivatives_along_changes_of_a_drive_are_those_of_the_motion(drive, name):
+    """Beside a free run, which has none."""
+    law, run = runs({**SMOOTH, **KINKED, **JUMPING}[name][0], count=2)
+    rng = np.random.default_rng(5)
+    values, slopes_ = INPUT + 0.1, rng.normal(size=INPUT.size)
+    changes = np.concatenate([rng.normal(size=(2, INPUT.size)), rng.normal(size=(2, INPUT.size))], axis=1)
+    run[1:] = driven(law, run[1:], drive, values, slopes_)[1]
+    found = slopes(law, run, SAMPLES, [term_places()["angle"]], changes=[np.zeros((2, 1)), changes])
+    assert found.status == 0
+    assert np.isnan(found.by_angle[0, 1:]).all()
+    for change, exact in zip(changes, found.by_angle[1, 1:], strict=True):
+
+        def motion(by, change=change):
+            moved = values + by * change[: INPUT.size], slopes_ + by * change[INPUT.size :]
+            return integrate(law[1:], driven(law, run[1:], drive, *moved)[1], SAMPLES)[0][0]
+
+        smooth = name in SMOOTH
+        expected = difference(motion, 1e-4 if smooth else 1e-6)
+        assert np.linalg.norm(exact - expected) < (1e-8 if smooth else 1e-5) * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("name", KINKED)

@@ -1,0 +1,90 @@
+"""Inputs as one line for each step move a body as their samples do, between which the step ends early."""
+
+import numpy as np
+import pytest
+
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
+from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.vocabulary.plan import AeroDerivatives
+
+DURATION = 3.0  # s
+
+
+def settings(drive, step):
+    return RunSettings(
+        spring_stiffness=16.0, derivatives=AeroDerivatives(0.1, -0.1), yaw_inertia=0.1, mechanical_damping=0.02,
+        wind_speed=15.0, air_density=1.2, duration=DURATION, timestep=step, drive=drive,
+        parameters={"stiffness_cubic": 3.0},
+    )  # fmt: skip
+
+
+def by_lines(drive, step):
+    """Angles at the steps' ends, rad."""
+    steps, physics, rig = round(DURATION / step), settings(drive, step), load_rig()
+    run, kept = forward_run(physics)
+    lines = drive.lines(step, steps + 1, sampled=False)
+    for name, part in {
+        "moment": lines.values,
+        "moment_slope": lines.slopes,
+        "moment_time": lines.time_s,
+    }.items():
+        run[name] = part.ctypes.data
+    run["moment_count"], run["moment_interval"], run["moment_delay"] = steps + 1, lines.interval, lines.delay
+    angle, _, status = integrate(parameter_vector(physics.law(rig))[None], run, steps + 1)
+    assert status == 0
+    del kept
+    return angle[0, :-1]
+
+
+def by_samples(drive, step):
+    motion = forward_motion(load_rig(), settings(drive, step), 1.0 / step)
+    return motion.angle
+
+
+def jittered(rng, size=400):
+    times = np.sort(np.arange(size) + rng.uniform(-0.4, 0.4, size)) * (DURATION / size)
+    return times, np.sin(7.0 * times) + 0.3 * rng.normal(size=size)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.0137])
+@pytest.mark.parametrize("held", [False, True], ids=["linear", "held"])
+def test_the_motion_is_that_of_the_samples(held, delay):
+    """The difference falls faster than the square of the step."""
+    drive = DriveMoment(*jittered(np.random.default_rng(2)), delay=delay, held=held)
+    errors = []
+    for step in (0.01, 0.005):
+        exact = by_samples(drive, step)
+        errors.append(np.max(np.abs(by_lines(drive, step) - exact)) / np.max(np.abs(exact)))
+    assert errors[0] < 1e-4
+    assert errors[1] < errors[0] / 4.0
+
+
+def test_a_line_has_the_impulse_of_the_input_and_its_product_with_the_time():
+    drive = DriveMoment(*jittered(np.random.default_rng(4)), delay=0.002)
+    lines = drive.lines(0.02, 100, sampled=False)
+    fine = np.linspace(0.0, 0.02, 20001)
+    for start, value, slope in zip(lines.time_s, lines.values, lines.slopes, strict=True):
+        given = np.interp(start + fine - drive.delay, drive.time_s, drive.values)
+        line = value + slope * fine
+        assert np.trapezoid(line, fine) == pytest.approx(np.trapezoid(given, fine), abs=1e-8)
+        assert np.trapezoid(line * fine, fine) == pytest.approx(np.trapezoid(given * fine, fine), abs=1e-9)
+
+
+def test_equal_samples_have_the_same_lines():
+    times, values = jittered(np.random.default_rng(6))
+    one = DriveMoment(times, values)
+    scaled = DriveMoment(one.time_s, one.values, scale=3.0)
+    assert one.lines(0.01, 300, sampled=False) is scaled.lines(0.01, 300, sampled=False)
+    assert one.lines(0.01, 300, sampled=False) is not DriveMoment(times, values).lines(
+        0.01, 300, sampled=False
+    )
+
+
+def test_samples_at_the_starts_of_steps_are_lines_as_they_are():
+    drive = DriveMoment(np.arange(5) * 0.1, np.array([1.0, 3.0, 2.0, 2.0, 5.0]))
+    lines = drive.lines(0.05, 10, sampled=True)
+    assert lines.values is drive.values
+    assert lines.slopes == pytest.approx([20.0, -10.0, 0.0, 30.0, 0.0])
+    assert lines.interval == pytest.approx(0.1)
