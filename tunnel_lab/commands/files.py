@@ -84,7 +84,8 @@ def import_files(
         _condition(
             "--set",
             metavar="KEY=NUMBER",
-            help="A condition of all runs, or a size; or KEY=NAME of what states it. May be repeated.",
+            help="A condition of all runs, or a size. KEY=NAME names the column or variable that states it. May be "
+            "repeated.",
         ),
     ] = None,
     start: Annotated[

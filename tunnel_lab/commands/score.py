@@ -178,7 +178,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
         what = f"the baseline has {', '.join(gone)}, which no installed package adds"
-        remedy = "name a class of your own again with -e module:Class, or what else to score with --estimator"
+        remedy = "name your own class again with -e module:Class, or another estimator with --estimator"
         raise TunnelError(what, where="--check", remedy=remedy)
     return baseline
 

@@ -139,7 +139,7 @@ class DiagnosisDocument(Document):
         description="the two parameters that the runs separate least: parameters, correlation, remedy",
     )
     found: Table = Field(
-        default_factory=dict, description="what the sentences state beside the numbers, each with its kind"
+        default_factory=dict, description="the facts behind the sentences, each with its kind"
     )
     unpredictive: str = Field(
         default="", description="the answer, where it is probable and does not predict held-out readings"

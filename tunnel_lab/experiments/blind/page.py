@@ -88,9 +88,9 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             "Causes found and false",
             ("group", "sets exact", "true causes found", "named causes false", ""),
             ((one.group, _brief(one.exact), _brief(one.found), _brief(one.false), "") for one in found),
-            "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
-            "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as "
-            "independent.",
+            "Small causes that act beside others need not be named, and naming them is not an error. Fast and slow "
+            "rigs have periods beyond a third and three times the standard rig's. Intervals take the causes of a "
+            "campaign as independent.",
         ),
         *_scatter_sections(score),
         _section(
