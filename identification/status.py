@@ -44,7 +44,7 @@ class Status(Enum):
     )
     FREQUENCY_CHANGES = (
         "the frequency changes so much along the decay, as in a pendulum, that no single omega_n and zeta describe "
-        "it; the intervals span the values of the windows: take these values, record smaller swings, or run the "
+        "it; the intervals span the values of the windows: use the windows, record smaller swings, or run the "
         "diagnosis"
     )
     MODEL_DEPARTS = "the model does not explain the data, so the intervals are widened: run the diagnosis"
