@@ -30,8 +30,6 @@ from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 KINDS = {"none": 1.0, "single": 2.0, "pair": 2.0}
-ALIKE_S = 0.3
-"""Distance within which the instant named is that of the disturbance."""
 
 
 def simulated(count: int, seed: int, variety: float, *, disturbed: bool) -> list[Simulated]:

@@ -84,7 +84,7 @@ def diagnose(
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
-        say("how far it closes")  # the place, and the answer without the remainder
+        say("explained share")  # the place, and the answer without the remainder
         patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
         answer = _assembled(study, chosen, patched, unpatched)
         if chosen.limit_cycles:
@@ -100,7 +100,7 @@ def diagnose(
 def _and_without_outlier(
     answer: Diagnosis, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
 ) -> Diagnosis:
-    """The answer, with that of the other runs beside it; unchanged where those cannot be diagnosed."""
+    """The answer, with the answer for the other runs beside it; unchanged where they cannot be diagnosed."""
     others = replace(chosen, campaign=chosen.campaign.without([runs.outlier]))
     try:
         study = _studied(others, None, settings, rivals)
@@ -168,7 +168,7 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
     """The answer with the explainable part of the remainder, and other possible explanations."""
     decided, way = answer.decision.decided, way_for(study)
     caution = (Fact(way.caution),) if way.caution else ()
-    say("what no effect explains")
+    say("remainder")
     # in an undecided diagnosis the whole gap remains
     significant = not decided or (answer.rest is not None and answer.rest.significant)
     try:

@@ -40,9 +40,8 @@ class Identifiability:
     """
 
     LAW: ClassVar[str] = (
-        "The nominal model does not absorb it, and no other effect has the same influence on the "
+        "The nominal model does not absorb it, and no other effect has the same influence on the motion"
     )
-    "motion"
 
     share: float
     cosines: Mapping[str, float]

@@ -1,7 +1,7 @@
 """Results as headings, paragraphs, tables, lists and figures, and the back ends that show these blocks.
 
 A result is turned into blocks once, for every face: `as_text` serves ``print``, `as_notebook` notebooks, `as_html`
-the report and the bench, and ``tunnel_lab.terminal.outputs.show`` terminals.
+the report and the bench, `as_markdown` pages of text, and ``tunnel_lab.terminal.outputs.show`` terminals.
 """
 
 from __future__ import annotations
@@ -211,6 +211,37 @@ def _text_table(table: Table) -> str:
         )
 
     return "\n".join([table.title, row_lines(table.columns), rule, *map(row_lines, table.rows)])
+
+
+# ---- Markdown
+
+
+def as_markdown(blocks: Iterable[Block]) -> str:
+    """Blocks as Markdown without HTML and links in their texts; the name of a figure is its address."""
+    return "\n\n".join(filter(None, map(_markdown, blocks))) + "\n"
+
+
+def _markdown(block: Block) -> str:
+    match block:
+        case Heading():
+            return f"## {_unmarked(block.text)}"
+        case Figure():
+            return f"![{_unmarked(block.caption)}]({block.name})"
+        case Table():
+            ends = ["---:" if heading in block.right else "---" for heading in block.columns]
+            heads, *rows = ([_cell_text(cell) for cell in row] for row in (block.columns, *block.rows))
+            title = f"**{_unmarked(block.title)}**\n\n" if block.title else ""
+            return title + "\n".join(f"| {' | '.join(row)} |" for row in (heads, ends, *rows))
+        case _:
+            return "\n".join(map(_unmarked, lines(block)))
+
+
+def _unmarked(text: str) -> str:
+    return escape(text.replace("\\", "\\\\"), quote=False).replace("](", "]\\(")
+
+
+def _cell_text(text: str) -> str:
+    return _unmarked(" ".join(text.split())).replace("|", "\\|")
 
 
 # ---- HTML

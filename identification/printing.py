@@ -58,14 +58,9 @@ def coefficient_label(name: str, unit: str) -> str:
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
-def in_degrees(angle: float, digits: int = 2) -> str:
-    """An angle in degrees, such as ``5.2°``.
-
-    Args:
-        angle: rad.
-        digits: significant digits (a count).
-    """
-    return f"{significant(math.degrees(angle), digits)}°"
+def in_degrees(angle: float) -> str:
+    """An angle (rad) in degrees, such as ``5.2°``."""
+    return f"{significant(math.degrees(angle), 2)}°"
 
 
 def significant(value: float, digits: int = 4) -> str:
@@ -337,7 +332,7 @@ def estimate_brief(document: Document) -> str:
     run: Document = document["runs"][0] if document["runs"] else {}
     whole = [(name, document[name]) for name in SYMBOLS if document[name] is not None]
     shown = whole or [(name, run[name]) for name in ("omega_n", "zeta") if run.get(name) is not None]
-    found = [f"{names[name]} = {_with_std(given)} {unit_mark(given['unit'])}" for name, given in shown]
+    found = [f"{names[name]} = {quantity_text(given)} {unit_mark(given['unit'])}" for name, given in shown]
     place = "" if whole or not run else f" of {run['id']}"
     status = document["status"].replace("_", " ")
     count = f"{len(document['runs'])} run{'' if len(document['runs']) == 1 else 's'}"
@@ -352,7 +347,7 @@ def coefficients_table(document: Document) -> Table:
     """The coefficients of the campaign that could be identified; no rows where there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
-        (f"{symbol} {unit(document[name]['unit'])}", _with_std(document[name]))
+        (f"{symbol} {unit(document[name]['unit'])}", quantity_text(document[name]))
         for name, symbol in names.items()
         if document[name] is not None
     )
@@ -454,7 +449,8 @@ def status_lines(document: Document) -> list[str]:
     ]
 
 
-def _with_std(quantity: Document | None) -> str:
+def quantity_text(quantity: Document | None) -> str:
+    """A quantity with its standard deviation, without its unit; a dash where there is none."""
     return "–" if quantity is None else with_std(quantity["value"], quantity["std"])
 
 

@@ -43,9 +43,9 @@ class Status(Enum):
         "a limit cycle, which has no damping ratio: record its growth, or a decay at a lower wind speed"
     )
     FREQUENCY_CHANGES = (
-        "the frequency changes so much along the swing, as that of a pendulum does, that no single omega_n and "
-        "zeta describe it, and the intervals span those of the windows: take the windows' values, record smaller "
-        "swings, or run the diagnosis"
+        "the frequency changes so much along the decay, as in a pendulum, that no single omega_n and zeta describe "
+        "it; the intervals span the values of the windows: use the windows, record smaller swings, or run the "
+        "diagnosis"
     )
     MODEL_DEPARTS = "the model does not explain the data, so the intervals are widened: run the diagnosis"
     NOISE_DISAGREES = (

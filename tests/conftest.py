@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -39,6 +40,12 @@ def pytest_collection() -> Iterator[None]:
 
 
 @pytest.fixture
+def in_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """MuJoCo writes its log into the working directory."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
 def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read models without the process with limits, which takes half a second to start and has tests of its own."""
     from tunnel_sim.engine import joint_model
@@ -58,7 +65,7 @@ def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
+    """Diagnose without a formula for the residual, which takes most of the time where a gap is not explained.
 
     It changes neither causes nor coefficients, and has tests of its own (``test_explain.py``).
     """

@@ -66,21 +66,14 @@ FORMS = {
 """Forms with their lengths, s, by name."""
 
 
-def with_disturbances(
-    draws: Sequence[CampaignDraw],
-    rng: np.random.Generator,
-    forms: Sequence[str] = tuple(FORMS),
-    excess: tuple[float, float] = _EXCESS,
-) -> list[CampaignDraw]:
+def with_disturbances(draws: Sequence[CampaignDraw], rng: np.random.Generator) -> list[CampaignDraw]:
     """Campaigns with a disturbance in one run each.
 
     Args:
         draws: campaigns whose effects have been scaled.
         rng: source of run, instant, form, sign and size.
-        forms: names of forms, all equally likely.
-        excess: of the campaign with the disturbance alone, in noise variances: least and greatest.
     """
-    added = [_draw(rng, draw.conditions, forms, excess) for draw in draws]
+    added = [_draw(rng, draw.conditions) for draw in draws]
     alone = [replace(draw, effects=(one,)) for draw, one in zip(draws, added, strict=True)]
     return [
         replace(draw, effects=(*draw.effects, *sized.effects))
@@ -88,11 +81,9 @@ def with_disturbances(
     ]
 
 
-def _draw(
-    rng: np.random.Generator, c: Conditions, forms: Sequence[str], excess: tuple[float, float]
-) -> EffectDraw:
-    form, length = FORMS[str(rng.choice(np.array(forms)))]
-    target = float(np.exp(rng.uniform(*np.log(excess))))
+def _draw(rng: np.random.Generator, c: Conditions) -> EffectDraw:
+    form, length = FORMS[str(rng.choice(np.array(list(FORMS))))]
+    target = float(np.exp(rng.uniform(*np.log(_EXCESS))))
     run = int(rng.integers(c.runs))
     span = c.duration * float(np.broadcast_to(c.kept, (c.runs,))[run])
     extra = {"run": float(run), "at": float(rng.uniform(*_BETWEEN)) * span, "length": length}

@@ -111,23 +111,23 @@ _SPRING = (
 )  # fmt: skip
 
 
-def _rod_draw(low: float, high: float, hardening: float, held: float, damping: float) -> Draw:
-    """Inertia share of the upper end, damping of the twist, hardening, and the end held until the release."""
+def _rod_draw(low: float, high: float, held: float, damping: float) -> Draw:
+    """Inertia share of the upper end, damping of the twist, and the end held until the release."""
 
     def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
         return {"share": float(g.uniform(low, high)), "damping_ratio": float(g.uniform(0.2, 1.0)) * damping,
-                "hardening": hardening, "held_body": held}  # fmt: skip
+                "hardening": 0.0, "held_body": held}  # fmt: skip
 
     return draw
 
 
 _ROD = (
     Form("rod_flexibility", "two_masses", T, "1/Krod, rad/(N m)", 1e-5, calibration(flexible_rod),
-         draw=_rod_draw(0.02, 0.2, 0.0, 1.0, 0.02), limits=(2e-7, 2e-2)),
+         draw=_rod_draw(0.02, 0.2, 1.0, 0.02), limits=(2e-7, 2e-2)),
     Form("rod_flexibility", "held_at_top", C, "1/Krod, rad/(N m)", 1e-5, calibration(flexible_rod),
-         draw=_rod_draw(0.02, 0.2, 0.0, 0.0, 0.02), limits=(2e-7, 2e-2)),
+         draw=_rod_draw(0.02, 0.2, 0.0, 0.02), limits=(2e-7, 2e-2)),
     Form("rod_flexibility", "heavy_top", R, "1/Krod, rad/(N m)", 1e-5, calibration(flexible_rod),
-         draw=_rod_draw(0.2, 0.4, 0.0, 1.0, 0.08), limits=(2e-7, 2e-2)),
+         draw=_rod_draw(0.2, 0.4, 1.0, 0.08), limits=(2e-7, 2e-2)),
     Form("spring_miscalibration", "one_spring", T, "x", 1e-3, calibration(one_spring), _BOTH,
          draw=lambda g, _c: {"spring": float(g.integers(0, 12))}),
 )  # fmt: skip

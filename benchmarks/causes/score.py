@@ -16,9 +16,10 @@ import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
+from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
-from tunnel_lab.experiments.blind.cases import SCATTERING, Case, case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.cases import Case, case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter import scatter_score
 from tunnel_lab.experiments.blind.score import calibration, smooth_calibration
 from tunnel_sim.files.reading import as_described
@@ -55,11 +56,11 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 def _check(answer: Mapping[str, Any]) -> None:
     """Check the rules of the schema that affect a score, without a validator package."""
-    labels = {*NAMES, UNKNOWN, *SCATTERING}
+    labels = {*NAMES, UNKNOWN, *SCATTERS}
     named = answer["causes"] or []
     if not labels >= set(named) or not labels >= set(answer["probability"]):
         raise ValueError("names a cause outside the vocabulary")
-    if UNKNOWN in named and set(named) - {UNKNOWN, *SCATTERING}:
+    if UNKNOWN in named and set(named) - {UNKNOWN, *SCATTERS}:
         raise ValueError("'unknown' stands alone")
     values = [*answer["probability"].values(), *(s["probability"] for s in answer.get("sets", ()))]
     if not all(0.0 <= float(p) <= 1.0 for p in values):
@@ -122,7 +123,7 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
 
 def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
     """An entry's scatter between runs, in the form of a diagnosis."""
-    effects = {number: name for name, number in SCATTERING.items()}
+    effects = {number: name for name, number in SCATTERS.items()}
     return [
         {
             "effect": effects[number],

@@ -227,13 +227,13 @@ def readings(asked: Asked) -> list[Array]:
 
 
 def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], motions: Motions, data: Data) -> None:
-    """Run some work on parts of a campaign's runs, in several threads where the settings allow and the parts are long.
+    """Run some work on parts of a campaign's runs, in as many threads as the settings allow.
 
-    The integrator alone runs beside another thread: short parts would wait for the interpreter.
+    Only the integrator works beside another thread. Short parts would wait for the interpreter: one does them all.
     """
-    threads, steps = data.settings.work.threads, motions.blocks * motions.rows["steps"] / motions.rows["stride"]
-    longest = float(np.max(steps, initial=0.0)) * len(steps) / max(len(parts), 1)
-    apart = threads > 1 and len(parts) > 1 and longest > _STEPS_OF_A_THREAD
+    threads = data.settings.work.threads
+    steps = float(np.max(motions.blocks * motions.rows["steps"] / motions.rows["stride"], initial=0.0))
+    apart = threads > 1 and len(parts) > 1 and steps * len(motions.blocks) / len(parts) > _STEPS_OF_A_THREAD
     list(_pool(threads).map(work, parts) if apart else map(work, parts))
 
 

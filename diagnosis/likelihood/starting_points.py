@@ -91,7 +91,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 def _may_show(data: Data, kind: type[Effect]) -> bool:
     """Whether the runs have the wind or the input that an effect needs."""
-    return (kind.condition != "wind_on" or data.wind_on) and (not kind.driven or data.driven)
+    return kind.acts(wind_on=data.wind_on) and (not kind.driven or data.driven)
 
 
 def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint:
@@ -106,7 +106,7 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     release = np.column_stack([base.point.release, one.numbers])
     point = Point(np.concatenate([base.point.common, values]), release)
     predicted = misfit(base).excess
-    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
+    predicted[CHANNELS.index(kind.gains_in())] -= one.drop
     cost = gap_left(base).scatter_cost
     return StartingPoint(problem, point, one.drop, predicted, base.point.common.size, scatter_cost=cost)
 
@@ -265,9 +265,9 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
     Empty for other effects, and where the runs cannot show it.
     """
-    data, found = base.problem.data, []
-    if kind.condition == "wind_on" and not data.wind_on:
-        return []
+    found: list[StartingPoint] = []
+    if not kind.acts(wind_on=base.problem.data.wind_on):
+        return found
     for trial in kind.trials(_circumstances(base)):
         if trial.second_order and trial.scaled is not None:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
@@ -379,9 +379,8 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
         The scaled change of all runs, shape (n,), and its norm as a share of the whole change; None where the
         runs cannot show the effect.
     """
-    data = base.problem.data
     trial = next(iter(kind.trials(_circumstances(base))), None)
-    if trial is None or (kind.condition == "wind_on" and not data.wind_on):
+    if trial is None or not kind.acts(wind_on=base.problem.data.wind_on):
         return None
     effects = (*base.problem.effects, kind)
     form = next(iter(kind.forms()), ())

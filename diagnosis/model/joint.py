@@ -76,7 +76,7 @@ class _OfLaw(NominalModel):
         return replace(self, law=similar)
 
     def inertial(self, data: Data) -> tuple[Parameter, ...]:
-        """The rig's, and a stiffness beside that of the law."""
+        """The parameters of a rig, and a stiffness beside the law's stiffness."""
         return *super().inertial(data), Parameter("added_stiffness", "N m/rad")
 
     @property
@@ -223,7 +223,7 @@ class Joint(_OfLaw, Rig):
         return "a scale of the input moment as opposed to a scale of the inertia and all moments of the model"
 
     def planned_springs(self, data: Data) -> tuple[float, ...]:
-        """That of the law, which cannot be chosen."""
+        """The stiffness of the law, which cannot be chosen."""
         return data.springs
 
 
@@ -314,11 +314,11 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
 def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]:
     """The campaign with a joint's law in place of a spring, and its nominal model.
 
-    The runs state the stiffness at rest, and the gain of a control is that of the model's actuator.
+    The runs state the stiffness at rest, and a control has the gain of the model's actuator.
 
     Raises:
         TunnelError: when the runs state more than one spring, the wind blows and a reference size is missing, or an
-            input cannot be that of the joint.
+            input cannot belong to the joint.
     """
     springs = {run.spring_stiffness for run in campaign.runs} - {None}
     if len(springs) > 1:

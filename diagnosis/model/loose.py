@@ -110,7 +110,7 @@ class LooseBody(NominalModel):
         yield Start({"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}, own)
 
     def frequency(self, inertia: float, stiffness: float) -> float:
-        """That of the reference rig, Hz."""
+        """The frequency of the reference rig, Hz."""
         del inertia, stiffness
         return REFERENCE_FREQUENCY
 

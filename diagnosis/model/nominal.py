@@ -313,7 +313,7 @@ class NominalModel:
     # ---- what it says of a motion ----
 
     def frequency(self, inertia: KgM2, stiffness: float) -> float:
-        """Frequency of the free motion, Hz; of a body that nothing restores that of the reference rig.
+        """Frequency of the free motion, Hz; the frequency of the reference rig where nothing restores the body.
 
         Args:
             stiffness: of the restoring moment, N m/rad.

@@ -125,12 +125,6 @@ class ParameterSet:
         """How many of a run's own parameters are those of effects; they come last."""
         return sum(bool(one.effect) for one in self.own)
 
-    @cached_property
-    def of_physics(self) -> list[int]:
-        """Places of a run's own parameters that change its physics, among its own; those of effects apart."""
-        apart = ("release_angle", "release_rate", "zero")
-        return [i for i, one in enumerate(self.own) if one.name not in apart and not one.effect]
-
     def places(self, scatter: Sequence[Named]) -> list[int]:
         """Places of a run's deviations among its own parameters.
 

@@ -176,7 +176,7 @@ class PerInertia(Rig):
         return not info.beside_spring
 
     def identified_unit(self, unit: str) -> str:
-        """The unit over that of the inertia."""
+        """The unit of a quantity per unit of inertia."""
         of = dimension(unit)
         by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
         return _PER_INERTIA.get(unit, by_mass)

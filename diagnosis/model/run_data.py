@@ -178,9 +178,9 @@ class RunData:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
-            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; where none does it
-                does not matter.
-            offset: a constant moment beside the input, N m; 0 where that of the input is 0 throughout.
+            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; ignored where no
+                parameter does.
+            offset: a constant moment beside the input, N m; 0 where the moment of the input is 0 throughout.
         """
         if self._seen_drive is None:
             return None

@@ -86,11 +86,11 @@ class WhiteNoise(RunNoise):
     coloured = white
 
     def response(self, cycles: Array) -> np.ndarray:
-        """1 throughout."""
+        """1 at every frequency."""
         return np.ones(np.shape(cycles), np.complex128)
 
     def taps(self, count: int) -> Array:
-        """One value, 1."""
+        """The filter that changes nothing: the value 1."""
         del count
         return np.ones(1)
 
@@ -130,7 +130,7 @@ class AutoregressiveNoise(RunNoise):
         return np.concatenate([first, lfilter([1.0], self.whitening, values[len(start) :], zi=memory)[0]])
 
     def response(self, cycles: Array) -> np.ndarray:
-        """That of the filter."""
+        """The response of the filter."""
         return _response(self.whitening, cycles)
 
     def taps(self, count: int) -> Array:
@@ -156,7 +156,7 @@ class NoiseWithMoment(RunNoise):
 
     @property
     def over_white(self) -> float:
-        """That of the sensor's noise alone."""
+        """The ratio for the sensor's noise alone."""
         return self.sensor.over_white
 
     def white(self, values: Array) -> Array:

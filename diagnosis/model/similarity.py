@@ -95,9 +95,10 @@ def free_frequency(run: Run, derivative: int = 0) -> float:
         derivative: of the angle that the readings are.
 
     Returns:
-        That of its decay, Hz; of a driven run, whose motion may follow its input, that of the resonance between
-        them, or of the peak of the motion where they show none. A body that nothing holds does not swing: the mean
-        frequency of the power of its rate, or the one from which on inertia exceeds damping if that is higher.
+        The frequency of the decay, Hz. For a driven run, whose motion may follow its input, it is the frequency of
+        the resonance between them, or of the peak of the motion where they show none. A body that nothing holds
+        does not swing: it is the mean frequency of the power of the rate, or the frequency above which inertia
+        exceeds damping if that is higher.
     """
     found = response_to_input(run, derivative)
     if run.unrestrained:

@@ -50,8 +50,8 @@ class Shown:
         """The quantities shown by the runs of a campaign.
 
         Args:
-            squares: of the runs, where they are known, 1/s²; else they are those of their spectra, or of a driven
-                run that of the resonance between input and motion.
+            squares: squared frequencies of the runs, 1/s²; None: from their spectra, and for driven runs from the
+                resonance between input and motion.
         """
         driven = responses(data)
         if squares is None:

@@ -67,9 +67,9 @@ def powers(fit: Fit, residuals: Sequence[Array]) -> tuple[Array, Array, list[Arr
     """Power of residuals by `TESTS`, all runs together.
 
     Returns:
-        Sums of the periodograms' ordinates, in variances of white noise, and half that of the squared means; the
-        expectation under white noise: the number of ordinates, and half that of the runs, shape (tests,) each; and
-        the frequencies of the ordinates, Hz.
+        Sums of the periodograms' ordinates, in variances of white noise, and half the sum of the squared means;
+        their expectations under white noise, the number of ordinates and half the number of runs, shape (tests,)
+        each; and the frequencies of the ordinates, Hz.
     """
     runs = fit.problem.data.runs
     bands, ordinates, frequencies = [], [], []

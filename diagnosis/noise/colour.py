@@ -40,10 +40,10 @@ class Colour:
 
     Args:
         frequency: centres of bands, Hz, ascending, shape (n,).
-        level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
+        level: natural logarithm of the power over the power of the white noise assumed before, shape (n,).
         std: of the levels, shape (n,).
-        slope: of the level against the logarithm of frequency in the lowest bands, between 0 and that of a random
-            walk, −2; dimensionless.
+        slope: of the level against the logarithm of frequency in the lowest bands, between 0 and −2, the slope
+            of a random walk; dimensionless.
         slope_std: its standard deviation, dimensionless.
         steep: slope assumed below the first band: ``slope``, made steeper by the uncertainty; dimensionless.
     """

@@ -21,7 +21,8 @@ from diagnosis.search.study import Study
 
 _OF_RATE = ("abs(r)*r", "r^3", "sign(r)")
 _OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
-"""The rise of friction at low rates (Stribeck), and friction that is smooth about rest."""
+"""The rise of friction at low rates (Stribeck), and friction that is smooth about rest. Both are general forms of
+dry friction too, but an answer has one form, and friction that rises may also grow with the load."""
 _OF_ANGLE = ("b^2", "b^3", "abs(b)*b")
 _OF_BOTH = ("b^2*r", "b*sign(r)", "abs(b)*sign(r)")
 _WIDTHS = (0.05, 0.2)  # of the greatest rate; a fit reaches the values between

@@ -315,7 +315,7 @@ def away_from_motion(order: Array) -> NDArray[np.bool_]:
     """Where a line does not belong to the motion, its drift or its harmonics.
 
     Args:
-        order: frequency over that of the run's motion, any shape.
+        order: frequency over the frequency of the run's motion, any shape.
     """
     harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
     harmonic |= np.abs(order - 1.0) < _MOTION

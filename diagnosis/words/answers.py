@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnosis.words.numbers import Document
+from identification.printing import Document
 
 
 def ranked(document: Document) -> list[Mapping[str, Any]]:

@@ -8,7 +8,6 @@ from itertools import pairwise
 from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
 from diagnosis.words.numbers import (
-    Document,
     acts_on,
     beside_noise,
     left_over,
@@ -31,6 +30,7 @@ from diagnosis.words.scatter import (
 )
 from diagnosis.words.verdict import size_words
 from identification.blocks import Card, Heading, Paragraph
+from identification.printing import Document
 from tunnel_sim.effects import known_effects
 
 WITHIN_THE_NOISE = "within the noise"

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnosis.settings import settings_of
-from diagnosis.words.numbers import Document, for_people, listed, plain, probability
+from diagnosis.words.numbers import for_people, listed, plain, probability
 from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
-from identification.printing import COEFFICIENTS, significant, unit_mark
+from identification.printing import COEFFICIENTS, Document, significant, unit_mark
 from tunnel_sim.effects import known_effects
 
 

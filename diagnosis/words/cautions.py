@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.words.numbers import Document, part, plain, reading_shown, share
+from diagnosis.words.numbers import part, plain, reading_shown, share
+from identification.printing import Document
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from diagnosis.settings import settings_of
 from diagnosis.words.answers import set_out
 from diagnosis.words.numbers import (
-    Document,
     explained,
     held_out_excess,
     listed,
@@ -20,7 +19,7 @@ from diagnosis.words.numbers import (
 )
 from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
-from identification.printing import COEFFICIENTS, significant, unit_mark
+from identification.printing import COEFFICIENTS, Document, significant, unit_mark
 from tunnel_sim.vocabulary.units import beside
 
 _MOST = 0.5  # of a variance: more than all its other sources together

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from diagnosis.facts.closure import Misfit
-from identification.printing import significant, unit_mark, with_std
+from identification.printing import Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.quantities import Share
 from tunnel_sim.vocabulary.units import beside
@@ -150,14 +150,9 @@ def of_swing(misfit: Misfit, excess: float) -> str:
     return f"{significant(share, 2) if share else '0'} % of the swing"
 
 
-def times_noise(value: float, decimals: int = 2) -> str:
-    """A gap in words, such as ``2.75 times the noise variance``.
-
-    Args:
-        value: the gap as an excess, in noise variances, a ratio.
-        decimals: of a gap below ten (a count).
-    """
-    return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise variance"
+def times_noise(value: float) -> str:
+    """A gap in words, such as ``2.75 times the noise variance``, from its excess, a ratio."""
+    return f"{significant(value, 4) if value >= 10.0 else f'{value:.2f}'} times the noise variance"
 
 
 def left_over(excess: float) -> str:
@@ -227,7 +222,6 @@ def excess_std(document: Document) -> float | None:
     return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 
 
-Document = Mapping[str, Any]
 """A diagnosis in JSON's types (`Diagnosis.to_json_dict`)."""
 
 CHANNELS = {

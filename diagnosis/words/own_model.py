@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnosis.settings import settings_of
-from diagnosis.words.numbers import Document
-from identification.printing import significant, unit_mark, with_std
+from identification.printing import Document, significant, unit_mark, with_std
 
 #: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
 _FREE = {

@@ -9,7 +9,6 @@ from diagnosis.facts.remainder import Ceiling
 from diagnosis.settings import settings_of
 from diagnosis.words.numbers import (
     KINDS,
-    Document,
     change_up_to,
     left_over,
     listed,
@@ -21,7 +20,7 @@ from diagnosis.words.numbers import (
     unit_shown,
 )
 from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
+from identification.printing import COEFFICIENTS, Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.units import beside
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import Document, listed, plain, probability
+from diagnosis.words.numbers import listed, plain, probability
 from identification.blocks import Table
-from identification.printing import concise, significant, with_std
+from identification.printing import Document, concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.quantities import Share
 
@@ -167,7 +167,7 @@ def stated_words(document: Document) -> str:
     if not stated or document["causes"] == ["unknown"]:
         return ""
     sizes = listed([f"{NUMBERS[SCATTERS[one['effect']]]} {_stated(one)}" for one in stated])
-    return f"The runs differ from each other within what is stated ({sizes}); the intervals allow for it."
+    return f"The runs differ no more than stated ({sizes}); the intervals allow for it."
 
 
 def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> list[str]:

@@ -22,7 +22,6 @@ from diagnosis.words.lines import (
 from diagnosis.words.numbers import (
     CHANNELS,
     CONDITIONS,
-    Document,
     unit_shown,
     windy,
 )
@@ -59,7 +58,7 @@ from identification.blocks import (
     Table,
     brief,
 )
-from identification.printing import COEFFICIENTS, significant, trade_off_line
+from identification.printing import COEFFICIENTS, Document, significant, trade_off_line
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 

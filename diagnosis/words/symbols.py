@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from diagnosis.words.numbers import Document
-from identification.printing import COEFFICIENTS, unit_mark
+from identification.printing import COEFFICIENTS, Document, unit_mark
 from tunnel_sim.effects import known_effects
 
 MEANINGS: Mapping[str, str] = {

@@ -8,7 +8,6 @@ from diagnosis.settings import settings_of
 from diagnosis.words.answers import ranked, set_out
 from diagnosis.words.numbers import (
     KINDS,
-    Document,
     explained,
     held_out_excess,
     misfit_text,
@@ -24,6 +23,7 @@ from diagnosis.words.remainder import ceiling
 from diagnosis.words.scatter import answer_name, spread_estimate
 from identification.blocks import Table
 from identification.printing import (
+    Document,
     coefficient_label,
     estimated,
     p_text,
@@ -292,7 +292,7 @@ TESTS = {
     "noise in bursts": "whether the noise comes in bursts",
     "noise level": "whether the noise is above the level that the campaign states",
 }
-"""What each test of a gap looks at."""
+"""The tested properties, by the names of the tests."""
 
 
 def tests_table(document: Document) -> Table:

@@ -18,7 +18,6 @@ from diagnosis.words.numbers import (
     CHANNELS,
     CONDITIONS,
     MISFITS,
-    Document,
     beside_noise,
     for_people,
     listed,
@@ -45,7 +44,7 @@ from diagnosis.words.scatter import (
     scattering,
     without_scatter,
 )
-from identification.printing import COEFFICIENTS, significant
+from identification.printing import COEFFICIENTS, Document, significant
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 
 _UNKNOWN = ["unknown"]

@@ -7,9 +7,9 @@ from math import degrees
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, Document, part, plain
+from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
 from diagnosis.words.scatter import scattering
-from identification.printing import p_text
+from identification.printing import Document, p_text
 from tunnel_sim.effects import effect_class
 
 _WIND = "whether it needs wind cannot be determined"
@@ -158,4 +158,4 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     if not there:
         return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."
     acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
-    return f"Of the causes {acts_there}, and {' and '.join(acting)}."
+    return f"{acts_there[0].upper()}{acts_there[1:]}; {' and '.join(acting)}."

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
-from diagnosis.words.numbers import Document, unit_of
+from diagnosis.words.numbers import unit_of
 from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words
+from identification.printing import Document
 from identification.status import Remark
 
 

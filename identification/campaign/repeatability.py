@@ -247,17 +247,15 @@ def scatter_between(
     measured: MeasuredRuns,
     start: Array,
     repeatability: Repeatability | None,
-    usual: UsualWidths | None = None,
 ) -> Scatter | None:
     """The scatter between runs; None where none is stated and the runs show none beyond their noise.
 
     Args:
         start: φ of generalised least squares without scatter, shape (p,).
         repeatability: as the campaign states it; used unchanged.
-        usual: prior of the widths that are not stated.
     """
     stated = {} if repeatability is None else repeatability.stated
-    usual = usual or UsualWidths()
+    usual = UsualWidths()
     measured = measured.floored(usual.prior(SCATTERED, {}).least)
     pairs = list(zip(measured.moves, measured.weights, strict=True))
     power = np.sum([np.einsum("mk,mn,nk->k", move, weight, move) for move, weight in pairs], axis=0)

@@ -54,7 +54,7 @@ SUMMARIES: Mapping[str, str] = {
     "hilbert": "envelope and phase, run by run; its windows are damping and frequency against amplitude",
     "filter_error": "maximum likelihood with a random moment on the model: for runs with buffeting",
     "bayesian": "posterior means and 95 % intervals that are valid for records of one to three cycles",
-    "neural_posterior": "posterior by a trained network: robust to unnamed effects; refuses what is unlike "
+    "neural_posterior": "posterior by a trained network: robust to unnamed effects; refuses records unlike "
     "its training",
     "frequency_response": "response over input, line by line where both are coherent: for driven runs only",
 }

@@ -284,7 +284,7 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     else:
         share = f"{100.0 * policy.LINEAR_SHARE:.0f} %"
         outcome = Outcome.CUT
-        remedy = f"frequency and damping are those of its growth up to {share} of the limit cycle"
+        remedy = f"frequency and damping describe its growth up to {share} of the limit cycle"
     return Remark(
         outcome,
         (run.id,),

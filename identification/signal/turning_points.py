@@ -44,8 +44,6 @@ class TurningPointFit:
         decrement: logarithmic, of a whole period.
         zero: angle at rest, rad.
         first_swing: excursion from ``zero`` at the first turning point, rad.
-        time_scatter: standard deviation of the times about the line, s.
-        angle_scatter: of the angles about the decay, rad.
         said: sentences on the uncertainties, and on departures from the model.
     """
 
@@ -55,8 +53,6 @@ class TurningPointFit:
     decrement: Fitted
     zero: Fitted
     first_swing: Fitted
-    time_scatter: float
-    angle_scatter: float
     said: tuple[str, ...]
 
 
@@ -90,8 +86,6 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
         decrement=Fitted(2.0 * delta, 2.0 * stds[2]),
         zero=Fitted(zero, stds[0]),
         first_swing=Fitted(swing, stds[1]),
-        time_scatter=times.scatter,
-        angle_scatter=step.scatter,
         said=tuple(remarks),
     )
 
@@ -102,7 +96,6 @@ class _Linear:
 
     solution: Array
     covariance: Array
-    scatter: float
     std: Array
     residual: Array
 
@@ -127,13 +120,11 @@ class _Linear:
             said.append(f"the {name} scatter by {scatter:.2g} {unit}, {more}")
         else:
             scale = 1.0
-            said.append(f"the {name} scatter within what is stated, from which the errors follow")
+            said.append(f"the {name} scatter as stated, so the errors follow from the stated ones")
         std = np.asarray(std * scale, np.float64)
         white = columns / std[:, None]
         covariance = np.asarray(np.linalg.inv(white.T @ white), np.float64)
-        return cls(
-            np.asarray(solution, np.float64), covariance, scatter, std, np.asarray(residual, np.float64)
-        )
+        return cls(np.asarray(solution, np.float64), covariance, std, np.asarray(residual, np.float64))
 
     def drop(self, columns: Array, further: Array) -> tuple[float, float]:
         """The value of a further column's coefficient, and the fall of χ² with it."""

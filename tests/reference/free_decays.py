@@ -27,6 +27,8 @@ class Setting:
     rate: float = 0.0
 
 
+# Two springs, wind-off and two speeds.
+SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 # Three springs, wind-off and two speeds, and three more of other releases: twelve runs.
 TWELVE = (
     *(Setting(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 12.0, 24.0)),

@@ -17,7 +17,6 @@ from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH
 from tunnel_reference.draw import KINDS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions
 
-SCATTERING = Mixture(textbook=0.0, scatter=1.0)
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35, 0.2, 0.35, 0.14), duration=2.0)
 
 

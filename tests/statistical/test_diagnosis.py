@@ -17,11 +17,11 @@ from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
+from tests.support.plans import planned
 from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_reference import draw
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import EffectSetting
 
 NOISE = 5e-4
@@ -89,8 +89,7 @@ truth = { cn_beta = 0.45, cn_r = -0.12 }
     ],
 )
 def test_an_effect_planted_in_mujoco_is_found(tmp_path, name, parameters):
-    (tmp_path / "plan.toml").write_text(PLAN, encoding="utf-8")
-    plan = load_plan(tmp_path / "plan.toml")
+    plan = planned(tmp_path, PLAN)
     from dataclasses import replace
 
     data = simulate_campaign(replace(plan, effects=(EffectSetting(name, parameters),)))

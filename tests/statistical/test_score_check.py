@@ -10,7 +10,7 @@ import pytest
 
 from identification import identify
 from identification.uncertainty.budget import InputUncertainties, make_budget
-from tests.reference.free_decays import RESOLUTION, Setting, campaign
+from tests.reference.free_decays import RESOLUTION, SIX, campaign
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import Cell, Grid
@@ -42,7 +42,6 @@ def test_unchanged_estimators_pass_with_another_seed_at_the_stated_rate():
     assert sum(alarms) <= 9
 
 
-SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 INPUTS = InputUncertainties(
     common={"spring_stiffness": 0.005, "wind_speed": 0.01, "air_density": 0.01, "frontal_area": 0.004},
     individual={"spring_stiffness": 0.001, "wind_speed": 0.004},

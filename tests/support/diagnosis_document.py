@@ -25,6 +25,11 @@ def campaign() -> Campaign:
     )
 
 
+def rms(excess: Any) -> Any:
+    """A misfit in degrees, by the noise of the document."""
+    return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
+
+
 def document() -> dict[str, Any]:
     """The answer, in JSON's types."""
     return {

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import tomli_w
 from nicegui import background_tasks, ui
@@ -15,7 +14,7 @@ from nicegui import background_tasks, ui
 from identification.blocks import Block, Paragraph, Table
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import SYMBOLS, budget_blocks, notes, unit, with_std
+from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text, unit
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
 from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command
@@ -35,7 +34,6 @@ _INPUTS = {
 }
 _BUDGET = "budget"
 _POLL_S = 0.5
-Document = Mapping[str, Any]
 _MOST_RUNS = 50
 
 
@@ -62,7 +60,7 @@ class IdentifyPage:
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
         with ui.expansion("Uncertainty budget"):
-            words = "Standard uncertainties of what is stated, in per cent; an empty field is exact."
+            words = "Standard uncertainties of the stated values, in per cent; an empty field means exact."
             ui.label(words).classes("soft")
             self._percents: dict[str, float | None] = {}
             if session.uncertainties.is_file():
@@ -160,7 +158,7 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
     rows = tuple(
-        (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(_cell(document[name]) for document in documents))
+        (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(quantity_text(document[name]) for document in documents))
         for name in given
     )
     estimators: dict[str, list[str]] = {}  # by their notes
@@ -178,9 +176,5 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
 def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> Table:
     by_run = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
     ids = list(dict.fromkeys(name for runs in by_run for name in runs))[:_MOST_RUNS]
-    rows = tuple((name, *(_cell(runs.get(name)) for runs in by_run)) for name in ids)
+    rows = tuple((name, *(quantity_text(runs.get(name)) for runs in by_run)) for name in ids)
     return Table(title, ("run", *names), rows)
-
-
-def _cell(quantity: Document | None) -> str:
-    return "–" if quantity is None else with_std(quantity["value"], quantity["std"])

@@ -157,7 +157,7 @@ class RecordsPage:
         try:
             imported, faults = await asyncio.to_thread(preview.read, self._session)
             said: TunnelError | str = "; ".join(map(str, faults))
-            said = f"{said}; state what is asked for, or leave out the file" if faults else ""
+            said = f"{said}; give the missing information, or leave out the file" if faults else ""
         except TunnelError as refused:
             said = refused
         if self._is_past(mine):
@@ -278,7 +278,7 @@ class RecordsPage:
     async def _write(self) -> None:
         with self._written.around():
             if self._imported is None:
-                raise TunnelError("the files cannot be read yet", remedy="state what is asked for above")
+                raise TunnelError("the files cannot be read yet", remedy="give the missing information above")
             await asyncio.to_thread(write, self._session, self._imported)
             ui.navigate.to(address(self._session, "conditions"))
 

@@ -140,7 +140,7 @@ class Guard:
         """HTTP status and text of a refused request; 0 for any other."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
-            return 421, "This is the bench of another address; use the one that tunnel bench printed."
+            return 421, "The bench is not at this address; use the address that tunnel bench printed."
         if origin is not None and origin != f"http://{host}":
             return 403, "The request comes from another page; use the bench itself."
         pairs = (part.strip().partition("=") for part in headers.get("cookie", "").split(";"))

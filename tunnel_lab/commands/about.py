@@ -19,7 +19,7 @@ from typer import Argument, Option
 
 from identification.blocks import Table
 from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import ending
+from tunnel_lab.terminal.inputs import output_file
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
@@ -197,13 +197,7 @@ SCHEMAS = {
 def schema(
     document: Annotated[str, Argument(help="campaign, plan, estimate or diagnosis.")],
     out: Annotated[
-        Path | None,
-        Option(
-            "--out",
-            callback=ending(".json"),
-            metavar="FILE.json",
-            help="Write to a file instead of standard output.",
-        ),
+        Path | None, output_file("--out", ".json", help="Write to a file instead of standard output.")
     ] = None,
 ) -> None:
     """Print the JSON schema of a document.

@@ -14,7 +14,7 @@ from typer import Argument, Option
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
     SchedulerOption,
-    ending,
+    output_file,
     refuse_unwritable_files,
     split_names,
     with_format,
@@ -211,25 +211,15 @@ def score(
     exclude: Excluded = None,
     key: KeyFile = None,
     markdown: Annotated[
-        Path | None,
-        Option("--markdown", callback=ending(".md"), metavar="FILE", help="Also write the score as a page."),
+        Path | None, output_file("--markdown", ".md", help="Also write the score as a page.")
     ] = None,
     json: Annotated[
-        Path | None,
-        Option(
-            "--json",
-            callback=ending(".json"),
-            metavar="FILE",
-            help="Also write all figures and cases as JSON.",
-        ),
+        Path | None, output_file("--json", ".json", help="Also write all figures and cases as JSON.")
     ] = None,
     figure: Annotated[
         Path | None,
-        Option(
-            "--figure",
-            callback=ending(".png"),
-            metavar="FILE.png",
-            help="Also draw the calibration, and the confusion beside it; PDF too.",
+        output_file(
+            "--figure", ".png", help="Also draw the calibration, and the confusion beside it; PDF too."
         ),
     ] = None,
     effects_file: EffectsFileOption = None,

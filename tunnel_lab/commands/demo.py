@@ -11,12 +11,13 @@ from dataclasses import replace
 from importlib import resources
 from math import isclose
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Option
 
 from identification.blocks import Table
+from identification.printing import Document
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
 from tunnel_sim.vocabulary.units import beside
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.plan import CampaignPlan
 
-Document = Mapping[str, Any]
 SHOWN = ("output_error", "conventional", "neural_network")
 """Estimators of the comparison: the default and the two of the paper. `tunnel score` compares them all."""
 CHECKED_ESTIMATOR = "output_error"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -13,15 +13,15 @@ import typer
 from typer import Argument, Option
 
 from identification.blocks import Table
-from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.printing import Document, coefficient_label, estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
     LeaveOutOption,
-    ending,
     file_hashes,
     given_campaign,
+    output_file,
     refuse_unwritable_files,
     split_names,
 )
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.vocabulary.campaign import Campaign
 
-Document = Mapping[str, Any]
 _NONE = "–"
 _output = partial(Option, rich_help_panel="Output")
+_written = partial(output_file, panel="Output")
 _causes = partial(Option, rich_help_panel="Effects")
 _model = partial(Option, rich_help_panel="A model of your own")
 
@@ -47,31 +47,14 @@ def diagnose(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
     leave_out: LeaveOutOption = None,
     json: Annotated[
-        Path | None,
-        _output(
-            "--json",
-            callback=ending(".json"),
-            metavar="FILE",
-            help="Write the answer as JSON; - for standard output.",
-        ),
+        Path | None, _written("--json", ".json", help="Write the answer as JSON; - for standard output.")
     ] = None,
     report: Annotated[
-        Path | None,
-        _output(
-            "--report",
-            callback=ending(".html", ".htm"),
-            metavar="FILE.html",
-            help="Write a report, one HTML page.",
-        ),
+        Path | None, _written("--report", ".html", ".htm", help="Write a report, one HTML page.")
     ] = None,
     summary: Annotated[
         Path | None,
-        _output(
-            "--summary",
-            callback=ending(".pdf"),
-            metavar="FILE.pdf",
-            help="Write the report's summary, one printed page; needs Chromium.",
-        ),
+        _written("--summary", ".pdf", help="Write the report's summary, one printed page; needs Chromium."),
     ] = None,
     author: Annotated[
         str, _output("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
@@ -123,21 +106,16 @@ def diagnose(
     ] = None,
     patch: Annotated[
         Path | None,
-        _model(
+        _written(
             "--patch",
-            callback=ending(".xml"),
-            metavar="OUT.xml",
+            ".xml",
             help="Write the model with the causes in it; for --model.",
+            panel="A model of your own",
         ),
     ] = None,
     propose: Annotated[
         Path | None,
-        _output(
-            "--propose",
-            callback=ending(".toml"),
-            metavar="LAW.toml",
-            help="Write the formula proposed for the residual gap.",
-        ),
+        output_file("--propose", ".toml", help="Write the formula proposed for the residual gap."),
     ] = None,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer import Argument, Option
+from typer import Argument
 
 from identification.blocks import Table
 from identification.printing import unit_mark
-from tunnel_lab.terminal.inputs import EffectsFileOption, ending, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import EffectsFileOption, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -69,18 +69,9 @@ def run(
         ),
     ] = None,
     checked: Annotated[str | None, Argument(hidden=True)] = None,
-    json: Annotated[
-        Path | None,
-        Option("--json", callback=ending(".json"), metavar="FILE", help="Write the effects as JSON."),
-    ] = None,
+    json: Annotated[Path | None, output_file("--json", ".json", help="Write the effects as JSON.")] = None,
     markdown: Annotated[
-        Path | None,
-        Option(
-            "--markdown",
-            callback=ending(".md"),
-            metavar="FILE",
-            help="Write the effects as a reference page.",
-        ),
+        Path | None, output_file("--markdown", ".md", help="Write the effects as a reference page.")
     ] = None,
     effects_file: EffectsFileOption = None,
 ) -> None:

@@ -12,7 +12,7 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.report.import_table import parts_table
-from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
+from tunnel_lab.terminal.inputs import LeaveOutOption, ending, output_file, split_names
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
@@ -84,7 +84,8 @@ def import_files(
         _condition(
             "--set",
             metavar="KEY=NUMBER",
-            help="A condition of all runs, or a size; or KEY=NAME of what states it. May be repeated.",
+            help="A condition of all runs, or a size. KEY=NAME names the column or variable that states it. May be "
+            "repeated.",
         ),
     ] = None,
     start: Annotated[
@@ -112,12 +113,7 @@ def import_files(
     ] = None,
     preview: Annotated[
         Path | None,
-        _output(
-            "--preview",
-            callback=ending(".png"),
-            metavar="FILE.png",
-            help="Draw what was read; write no campaign.",
-        ),
+        output_file("--preview", ".png", help="Draw the records; write no campaign.", panel="Output"),
     ] = None,
     yes: Annotated[bool, _output("--yes", "-y", help="Write without asking.")] = False,
     overwrite: Annotated[

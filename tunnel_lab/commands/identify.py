@@ -24,9 +24,9 @@ from tunnel_lab.terminal.inputs import (
     LeaveOutOption,
     chosen_estimator,
     chosen_estimators,
-    ending,
     estimator_option,
     given_campaign,
+    output_file,
     own_code,
     refuse_unwritable_files,
     split_names,
@@ -57,13 +57,7 @@ def run(
         str, estimator_option("One of the estimators listed above or of an installed package")
     ] = "output_error",
     json: Annotated[
-        Path | None,
-        Option(
-            "--json",
-            callback=ending(".json"),
-            metavar="FILE",
-            help="Write the estimate as JSON; - for standard output.",
-        ),
+        Path | None, output_file("--json", ".json", help="Write the estimate as JSON; - for standard output.")
     ] = None,
     weights: Annotated[
         Path | None,

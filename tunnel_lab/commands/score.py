@@ -13,8 +13,8 @@ from typer import Argument, Option
 from tunnel_lab.terminal.inputs import (
     SchedulerOption,
     chosen_estimators,
-    ending,
     estimator_option,
+    output_file,
     refuse_unwritable_files,
 )
 from tunnel_lab.terminal.outputs import console, say, say_written, show
@@ -76,13 +76,7 @@ def score(
         ),
     ] = None,
     write_baseline: Annotated[
-        Path | None,
-        Option(
-            "--write-baseline",
-            callback=ending(".parquet"),
-            metavar="FILE",
-            help="Write the trials as a baseline.",
-        ),
+        Path | None, output_file("--write-baseline", ".parquet", help="Write the trials as a baseline.")
     ] = None,
     breakdown: Annotated[
         bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")
@@ -184,7 +178,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
         what = f"the baseline has {', '.join(gone)}, which no installed package adds"
-        remedy = "name a class of your own again with -e module:Class, or what else to score with --estimator"
+        remedy = "name your own class again with -e module:Class, or another estimator with --estimator"
         raise TunnelError(what, where="--check", remedy=remedy)
     return baseline
 

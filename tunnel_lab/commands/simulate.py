@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from identification.blocks import Table
-from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import (
+    EffectsFileOption,
+    ending,
+    output_file,
+    parse_effect,
+    refuse_unwritable_files,
+)
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
@@ -60,10 +66,9 @@ def simulate(
     ] = False,
     picture: Annotated[
         Path | None,
-        Option(
+        output_file(
             "--picture",
-            callback=ending(".png"),
-            metavar="FILE.png",
+            ".png",
             help="Draw the runs, input and response; more than twelve go on further pages, FILE-2.png and so on.",
         ),
     ] = None,

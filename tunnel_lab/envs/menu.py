@@ -44,7 +44,7 @@ class Choice:
 
     @property
     def words(self) -> str:
-        """Such as ``spring 3, 10 m/s, 10°, 20 s``."""
+        """The run in words, such as ``spring 3, 10 m/s, 10°, 20 s``."""
         wind = f"{self.wind_speed:g} m/s" if self.wind_speed > 0.0 else "wind off"
         return f"spring {self.spring}, {wind}, {degrees(self.release_angle):.3g}°, {self.duration:g} s"
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 REFUSED, RAISED, WRONG = "refused", "raised", "wrong_return"
 """The campaign was refused, the estimator raised an exception, or it returned something else than an estimate."""
 VERBS = {REFUSED: "refused", RAISED: "raised an exception", WRONG: "returned no valid estimate"}
-"""What an estimator did, by status."""
+"""Statuses of failures in words."""
 
 NOT_ASKED = (
     "ok",
@@ -128,7 +128,7 @@ QUANTITY_COLUMNS: Mapping[str, Any] = {
     **dict.fromkeys(("truth", "value", "std", "bound"), pl.Float64),
     "status": pl.String,
 }
-"""What a table says of a quantity; truth, value, std and bound in its unit."""
+"""Columns of a quantity; truth, value, std and bound are in its unit."""
 
 
 def quantity_rows(

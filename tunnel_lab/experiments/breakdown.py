@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 NOTHING_ADDED = "no effect"
 SEVERITIES = (1.0, 10.0)
-"""Mean squared residual of the nominal refit over the noise power, minus one."""
+"""Mean squared residual of the nominal refit over the noise variance, minus one."""
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
 REALISATIONS = 3
@@ -63,8 +63,8 @@ _RUNS = (
 )  # N m/rad, m/s, degrees
 SHOWN = ("cn_beta", "cn_r")
 ABOUT = (
-    "Bias in % of the truth; in brackets in reported standard deviations. Severity: excess residual power after "
-    "the nominal refit, in noise powers."
+    "Bias in % of the truth; in brackets in reported standard deviations. Severity: excess mean squared residual "
+    "after the nominal refit, in noise variances."
 )
 _SIDE_BY_SIDE = 3  # estimators in a table for 80 columns
 _DECADES = 2.0  # decades of standard deviations above one, at the ends of the colours
@@ -347,7 +347,7 @@ def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
     axes.tick_params(length=0)
     each = ", ".join(f"{severity:g}" for severity in severities)
     axes.set_title(
-        f"Bias of {NAMES[quantity]} in % where it exceeds one σ; from left to right: {each} × noise power"
+        f"Bias of {NAMES[quantity]} in % where it exceeds one σ; from left to right: {each} × noise variance"
     )
     bar = fig.colorbar(colours, ax=axes, location="bottom", aspect=60, shrink=0.6)
     bar.set_ticks([-2, -1, 0, 1, 2], labels=["≤ −100", "−10", "±1", "10", "≥ 100"])

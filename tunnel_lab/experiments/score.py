@@ -228,7 +228,7 @@ def read_trials(path: Path) -> Results:
         for name in names:  # each estimator must have all cells, and each cell all quantities
             mine = table.filter(pl.col("estimator") == name).select("cell", "quantity").unique()
             if set(mine.iter_rows()) != wanted:
-                raise ValueError("cells that are not those of the grid")
+                raise ValueError("cells outside the grid")
     return Results(grid, tuple(names), table)
 
 

@@ -26,7 +26,7 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, shown
+from tunnel_sim.files.toml_input import OneLine, Positive, SampleRate, StrictModel, read_document, shown
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest, whole_steps
@@ -40,7 +40,6 @@ from tunnel_sim.vocabulary.rig import Rig
 DECAY_QUANTITIES = ("zeta", "omega_n")
 CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 
-Positive = Annotated[float, Field(gt=0.0)]
 _LEAST_TRIALS = 2
 _ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
 _ZERO_STD = 0.004  # rad

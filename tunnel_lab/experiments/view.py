@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class View:
-    """What an experiment has found.
+    """The results of an experiment.
 
     Args:
         figures: by name of their files, without suffix; drawn when they are written.

@@ -214,21 +214,21 @@ def figures_4_to_6(folder: Path) -> Section:
         title="Figs 4 to 6",
         about="the measured response, and those generated from both methods' estimates",
         theirs="the network's response is closer to the record",
-        ours=f"so it is on a rig that softens: the misfit is {network:.1f} % of the release angle for "
-        f"{conventional:.1f} %; on a linear rig it is not (Table IV)",
+        ours=f"true on a softening rig: the misfit is {network:.1f} % of the release angle for "
+        f"{conventional:.1f} %; false on a linear rig (Table IV)",
         outcome="in part",
         words=(
             "The paper's record is not published. This one is of the virtual rig, with a spring that "
             "softens and a damping that grows with the amplitude, as Table III suggests.",
             "The paper compares each response with the record to which it was fitted. That shows which "
             "fits better, and not which coefficients are right, because the record has no known truth.",
-            "The claim is false on a linear rig and true on one that softens. The reason is likely the "
+            "The claim is false on a linear rig and true on a softening rig. The reason is likely the "
             "mean over windows, which follow the decay to small amplitudes, and not the network itself.",
         ),
         pictures=(
             Picture(
                 file="responses.png",
-                caption="The record; a magnified part with the responses; and what is left of the record.",
+                caption="The record; a magnified part with the responses; and the residuals.",
             ),
         ),
     )

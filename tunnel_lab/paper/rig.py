@@ -155,7 +155,7 @@ def equations(_: Path) -> Section:
         outcome="corrected",
         words=(
             f"The truth of this example is {truth} 1/rad, of spring 5 at 10 m/s (an inference). The last "
-            "column is what each equation gives as it is printed. N̂β and N̂r lead to Cnβ and Cnr by eqs "
+            "column applies each equation as printed. N̂β and N̂r lead to Cnβ and Cnr by eqs "
             "17 and 18.",
             "Eq. 8 as printed gives even the wrong sign. The paper's Cnr is negative in both columns of "
             "Table IV, so it cannot have been computed so.",

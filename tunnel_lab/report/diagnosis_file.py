@@ -122,7 +122,7 @@ class DiagnosisDocument(Document):
     waterfall_on: str = Field(description="its held-out readings")
     without: dict[str, float] = Field(description="by cause, the excess when it alone is taken out")
     sizes: list[Table] = Field(description="what each fitted cause does to a swing of a stated amplitude")
-    rest: Table | None = Field(description="what remains after the causes")
+    rest: Table | None = Field(description="the residual with the causes")
     closable: Table | None = Field(
         description="the part of the residual gap that could be explained, and by which kind of law"
     )
@@ -139,7 +139,7 @@ class DiagnosisDocument(Document):
         description="the two parameters that the runs separate least: parameters, correlation, remedy",
     )
     found: Table = Field(
-        default_factory=dict, description="what the sentences state beside the numbers, each with its kind"
+        default_factory=dict, description="the facts behind the sentences, each with its kind"
     )
     unpredictive: str = Field(
         default="", description="the answer, where it is probable and does not predict held-out readings"

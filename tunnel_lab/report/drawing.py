@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from html import unescape
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.facts.closure import Misfit
 from diagnosis.words.numbers import misfit_of, unit_shown
+from identification.printing import Document
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Document = Mapping[str, Any]
 BEFORE, AFTER, ACCENT, QUIET = "#d55e00", "#0072b2", "#009e73", "#77808a"
 INK, SOFT, LINE, NOISE, MARK, PAPER = "#1b1f24", "#59636e", "#d9dee3", "#e6e9ec", "#f0e442", "#ffffff"
 THEMED = {

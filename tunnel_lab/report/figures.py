@@ -15,7 +15,7 @@ from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
 from diagnosis.words.numbers import excess_std, plain, probability, unit_shown
 from diagnosis.words.scatter import answer_name
-from identification.printing import coefficient_label, significant
+from identification.printing import Document, coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,
@@ -39,7 +39,6 @@ from tunnel_lab.report.drawing import (
     PAPER,
     QUIET,
     SIGMAS,
-    Document,
     array,
     colour_bar,
     faded,

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.printing import unit_mark
+from identification.printing import Document, unit_mark
 from tunnel_lab.plotting.style import INTERVAL, figure, grid, log_axis, styled
-from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER, Document
+from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from diagnosis.words.captions import captioned
 from diagnosis.words.cards import key_figures
-from diagnosis.words.numbers import Document
 from diagnosis.words.sections import sections
 from diagnosis.words.verdict import headline
 from identification.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
+from identification.printing import Document
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.words.scatter import percent_of, repeats
+from identification.printing import Document
 from tunnel_lab.plotting.style import INTERVAL, figure, figure_text, grid, styled
-from tunnel_lab.report.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER, Document
+from tunnel_lab.report.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

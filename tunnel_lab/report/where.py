@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.words.numbers import unit_shown
+from identification.printing import Document
 from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_lab.report.drawing import (
     AFTER,
@@ -18,7 +19,6 @@ from tunnel_lab.report.drawing import (
     NOISE,
     QUIET,
     SIGMAS,
-    Document,
     array,
     colour_bar,
     faded,

@@ -257,6 +257,12 @@ def ending(*known: str) -> Callable[[Path | None], Path | None]:
     return checked
 
 
+def output_file(flag: str, *endings: str, help: str, panel: str | None = None) -> Any:
+    """An option for a file to write, with one of these endings, such as ``.html``."""
+    path = f"FILE{endings[0]}"
+    return Option(flag, callback=ending(*endings), metavar=path, help=help, rich_help_panel=panel)
+
+
 class TableFormat(StrEnum):
     """Format of printed tables."""
 

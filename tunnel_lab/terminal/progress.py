@@ -97,8 +97,8 @@ STEPS = {
     "random moments": "fitting random moments",
     "pruning": "fitting the answer without each effect",
     "polishing": "fitting the answer to convergence",
-    "how far it closes": "predicting held-out runs",
-    "what no effect explains": "estimating what no effect explains",
+    "explained share": "predicting held-out runs",
+    "remainder": "estimating the explainable share of the residual",
 }
 """Steps of the study in words; any other progress message is a set of effects."""
 _sets_every: float | None = None

@@ -6,7 +6,6 @@ import csv
 import io
 import re
 from collections.abc import Iterator
-from html import escape
 from itertools import pairwise
 from textwrap import wrap
 
@@ -15,7 +14,7 @@ from rich.cells import cell_len
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from identification.blocks import Table
+from identification.blocks import Table, as_markdown
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import TableFormat
 from tunnel_sim.vocabulary.text_cells import as_text_cell
@@ -28,6 +27,8 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 def rendered(table: Table, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
+    if kind is TableFormat.MD:
+        return as_markdown([table])
     title = _on_one_line(table.title)
     heads, *rows = [list(map(_on_one_line, row)) for row in (table.columns, *table.rows)]
     if kind is TableFormat.JSON:
@@ -41,21 +42,11 @@ def rendered(table: Table, kind: TableFormat) -> str:
             for row in rows
         ]
         return printable_json(json_line({"table": title, "rows": records})) + "\n"
-    if kind is TableFormat.MD:
-        cells = (" | ".join(map(_as_markdown, line)) for line in (heads, ["---"] * len(heads), *rows))
-        body = "\n".join(f"| {line} |" for line in cells)
-        return f"**{_as_markdown(title)}**\n\n{body}\n"
     stream = io.StringIO()
     stream.write(f"# {title}\n")
     texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
     csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
-
-
-def _as_markdown(text: str) -> str:
-    """Text of a cell without HTML, links and ends of cells."""
-    marked = escape(text.replace("\\", "\\\\"), quote=False)
-    return marked.replace("|", "\\|").replace("](", "]\\(")
 
 
 def _on_one_line(text: str) -> str:
@@ -93,7 +84,7 @@ def is_too_wide(table: Table, width: int) -> bool:
 
 
 def _least_widths(table: Table) -> list[int]:
-    """Of each column: the longest word of its heading, line of a cell or word of a sentence."""
+    """Least width of each column: the longest word of its heading, line of a cell or word of a sentence."""
     return [
         max(
             (

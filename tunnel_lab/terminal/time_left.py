@@ -17,8 +17,8 @@ LEFT = {
     "random moments": (0.32, 2.2),
     "pruning": (0.12, 1.2),
     "polishing": (0.14, 1.1),
-    "how far it closes": (0.12, 1.3),
-    "what no effect explains": (0.04, 0.54),
+    "explained share": (0.12, 1.3),
+    "remainder": (0.04, 0.54),
 }
 """Remaining over elapsed time at the start of each stage: the 10th and the 90th percentile of the 248 diagnoses
 of the blind check that found a gap, by the times in their documents and of their files. At other instants the range

@@ -23,7 +23,7 @@ _SLOW = 0.03
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.3)
 """Greatest moments that are tried, over the greatest one asked for."""
 _SOFT_LIMITS, _SOFT = (3.0, 1.5, 0.75), 0.45
-"""The same with a soft limit, and its softness: about that of a hyperbolic tangent."""
+"""Soft limits over the greatest moment asked for, and their softness, which is close to a hyperbolic tangent."""
 _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
 """Greatest rates that are tried, over the greatest one asked for: of a smooth input, and of one that jumps."""
 

@@ -386,11 +386,6 @@ class StructuralDamping(Effect):
             run, one = effects[place].on_run, (runs.row(place), stated.row(place), drawn[place])
             runs.put(place, run(*one))
 
-    @property
-    def depends_on_release(self) -> bool:
-        """Whether there is an after-effect."""
-        return self.after_effect != 0.0
-
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show which frequency determines the loss: the motion's, or the rig's in still air.
 

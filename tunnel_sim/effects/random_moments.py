@@ -57,7 +57,7 @@ class RandomMoment(Effect):
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Add the random moment as a sampled input."""
-        if self.is_null or (self.condition == "wind_on" and stated.wind_speed <= 0.0):
+        if self.is_null or not self.acts(wind_on=stated.wind_speed > 0.0):
             return run
         white = self.drawn_numbers(drawn)
         from scipy.signal import lfilter  # here, because it is slow to load

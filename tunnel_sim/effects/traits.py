@@ -22,7 +22,7 @@ Text: TypeAlias = Callable[[float, float | None, str], str]
 
 @dataclass(frozen=True)
 class Traits:
-    """What an effect states of itself; the first parameter is the severity.
+    """The properties that an effect states; the first parameter is the severity.
 
     Every effect states ``example``, values of its parameters in their order at which it is visible. A built-in one
     also states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect takes the
@@ -186,11 +186,6 @@ class Traits:
     def is_null(self) -> bool:
         """Whether the effect does nothing."""
         return self.severity == 0.0
-
-    @property
-    def depends_on_release(self) -> bool:
-        """Whether its moment or its reading depends on more than angle and rate: on time, or on the release."""
-        return not self.autonomous
 
     @classmethod
     def chosen_spring(cls) -> str | None:

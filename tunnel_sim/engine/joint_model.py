@@ -220,7 +220,9 @@ def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
         raise TunnelError(what, remedy=did_you_mean(recorded.actuator, list(names)))
     if len(names) > 1 and recorded.actuator is None:
         what = f"it has several actuators: {one_line(', '.join(names), 200)}"
-        raise TunnelError(what, remedy="name the one that the column drive is the control of with --actuator")
+        raise TunnelError(
+            what, remedy="name the actuator whose control is in the column drive with --actuator"
+        )
     if not names:
         return None
     name = recorded.actuator or next(iter(names))

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import polars as pl
 
-from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY
+from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY, RIG_KEYS, RUN_KEYS
 from tunnel_sim.files.run_files import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
@@ -19,8 +19,6 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
-_CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
-_RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")
 _SHEET_ROWS = 1_048_576
 
 
@@ -42,7 +40,7 @@ def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
 def _of_campaign(campaign: Campaign) -> dict[str, float]:
     """The stated sizes of the rig, and the stated scatter between runs."""
     spread = {} if campaign.repeatability is None else campaign.repeatability.stated
-    return _stated(campaign.rig, _RIG) | {
+    return _stated(campaign.rig, RIG_KEYS) | {
         f"{OF_REPEATABILITY}{name}": value for name, value in spread.items()
     }
 
@@ -84,7 +82,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
-    return (*_CONDITIONS, *DRIVE_KEYS) if _input_columns(campaign) else _CONDITIONS
+    return (*RUN_KEYS, *DRIVE_KEYS) if _input_columns(campaign) else RUN_KEYS
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
@@ -100,7 +98,7 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
 
 def _conditions(run: Run) -> dict[str, float | str]:
     """The stated conditions of a run by key; for a driven run also those of its input."""
-    stated: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
+    stated: dict[str, float | str | None] = {key: getattr(run, key) for key in RUN_KEYS}
     if run.drive is not None:
         stated |= run.drive.stated
     return {key: value for key, value in stated.items() if value is not None}

@@ -10,14 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from tunnel_sim.files.run_files import read_input
-from tunnel_sim.files.toml_input import OneLine, StrictModel
+from tunnel_sim.files.toml_input import OneLine, Positive, StrictModel
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
 from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.quantities import Times
 
-Positive = Annotated[float, Field(gt=0.0)]
 Kind = Literal["sine", "stepped_sine", "chirp", "multisine", "random", "square", "file"]
 
 _COLUMNS = one_of([kind.column for kind in KINDS if kind.amplitudes])

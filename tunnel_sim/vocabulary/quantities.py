@@ -2,7 +2,7 @@
 
 In shapes, n counts samples or other values, p shared parameters and m unknowns.
 
-A signature with these types needs no ``Args:`` for unit and shape: ``time: Times, stiffness: NmPerRad``.
+A signature with these types needs no ``Args:`` for unit and shape: ``time: Times, angle: Angles``.
 """
 
 from __future__ import annotations
@@ -15,13 +15,7 @@ Rad: TypeAlias = Annotated[float, "rad"]
 RadPerS: TypeAlias = Annotated[float, "rad/s"]
 Seconds: TypeAlias = Annotated[float, "s"]
 Hertz: TypeAlias = Annotated[float, "Hz"]
-Metres: TypeAlias = Annotated[float, "m"]
-MPerS: TypeAlias = Annotated[float, "m/s"]
-KgPerM3: TypeAlias = Annotated[float, "kg/m3"]
 KgM2: TypeAlias = Annotated[float, "kg m2"]
-Nm: TypeAlias = Annotated[float, "N m"]
-NmPerRad: TypeAlias = Annotated[float, "N m/rad"]
-NmSPerRad: TypeAlias = Annotated[float, "N m s/rad"]
 Gain: TypeAlias = Annotated[float, "rad/s2 per unit of the input"]
 Number: TypeAlias = Annotated[float, "dimensionless"]
 Share: TypeAlias = Annotated[float, "a fraction from 0 to 1"]
@@ -33,9 +27,7 @@ Times: TypeAlias = Annotated[Array, "shape (n,), s"]
 Angles: TypeAlias = Annotated[Array, "shape (n,), rad"]
 Rates: TypeAlias = Annotated[Array, "shape (n,), rad/s"]
 Frequencies: TypeAlias = Annotated[Array, "shape (n,), Hz"]
-Accelerations: TypeAlias = Annotated[Array, "shape (n,), rad/s2"]
 Moments: TypeAlias = Annotated[Array, "shape (n,), N m"]
-Speeds: TypeAlias = Annotated[Array, "shape (n,), m/s"]
 Readings: TypeAlias = Annotated[Array, "shape (n,), rad, or rad/s or rad/s2 where the sensor measures those"]
 Rows: TypeAlias = Annotated[Array, "shape (n,), in the unit of the file; NaN where there is no number"]
 """A column of a table of a file."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.causes.entry import KINDS, About, answer_of, main
-from tunnel_lab.experiments.blind.cases import SCATTERING
+from diagnosis.words.scatter import SCATTERS
 
 ABOUT = About("tunnel diagnose", "as delivered, no option")
 
@@ -30,7 +30,7 @@ def answer(folder: Path) -> dict[str, Any]:
     answered = answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
     spreads = (found.get("repeatability") or {}).get("spreads", ())
     scatter = {
-        SCATTERING[one["effect"]]: {
+        SCATTERS[one["effect"]]: {
             "value": one["width"],
             "interval_90": one["interval"],
             "named": one["shown"],

@@ -292,7 +292,7 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     shown = sorted(best.values(), key=lambda trial: len(trial.places))[:_MOST_SAID]
     said = ", or with ".join(trial.said for trial in shown)
     ids = tuple(dict.fromkeys(statements.runs[i].id for trial in shown for i in trial.places))
-    what = f"what is stated contradicts the frequencies of the other runs, which agree with {said}"
+    what = f"the stated values contradict the frequencies of the other runs, which agree with {said}"
     names = " or ".join(dict.fromkeys(name for trial in shown for name in trial.names))
     return (Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out"),)
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.support.command import Outcome, Tunnel
 from tunnel_lab.cli import main
 
 PROGRESS = re.compile(r"\d+\.\d s: \w")
 """A step of a command on standard error where no terminal shows it."""
 
-Outcome = tuple[int, str, str]
-Tunnel = Callable[..., Outcome]
 
 TRUTH = {"cn_beta": 0.5, "cn_r": -0.12, "yaw_inertia": 0.1, "mechanical_damping": 0.02}
 DENSITY, AREA, LENGTH = 1.2, 0.036, 0.625
@@ -35,6 +34,15 @@ def tunnel(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
         return status, captured.out, captured.err
 
     return run
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, for the tests of a file."""
+    from tests.support.browser import chromium
+
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture

@@ -7,17 +7,14 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from tests.support.command import Outcome, Tunnel
 from tunnel_lab import cli
 from tunnel_sim.vocabulary.errors import TunnelError
-
-Outcome = tuple[int, str, str]
-Tunnel = Callable[..., Outcome]
 
 COMMANDS = tuple(cli.COMMANDS)
 

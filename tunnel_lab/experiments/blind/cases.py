@@ -11,8 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from diagnosis.facts.decision import Decision, decision
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
+from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.files.toml_input import NotNegative
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 _KINDS = ("none", "single", "pair", "three", "four")
@@ -22,7 +23,6 @@ MODERATE = (1.0, 10.0)
 
 
 _Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-_Width = Annotated[float, Field(ge=0.0)]
 
 
 class _Read(BaseModel):
@@ -37,10 +37,10 @@ class _Scale(_Read):
 
 class _Truth(_Read):
     effects: list[str]
-    scatter: dict[str, _Width] = {}
+    scatter: dict[str, NotNegative] = {}
     scatter_level: str = ""
     scatter_form: str = "normal"
-    repeatability: dict[str, _Width] = {}
+    repeatability: dict[str, NotNegative] = {}
     small: list[str] = []
     scale: _Scale = _Scale()
     few_runs: bool = False
@@ -72,8 +72,8 @@ class _Gap(_Read):
 
 class _Spread(_Read):
     effect: str
-    width: _Width
-    interval: tuple[_Width, _Width] = Field(strict=False)
+    width: NotNegative
+    interval: tuple[NotNegative, NotNegative] = Field(strict=False)
     shown: bool
 
 
@@ -93,14 +93,10 @@ class _Answer(_Read):
 
     @model_validator(mode="after")
     def _closed_where_named(self) -> _Answer:
-        causes = [name for name in self.causes or () if name not in SCATTERING]
+        causes = [name for name in self.causes or () if name not in SCATTERS]
         if causes and causes != ["unknown"] and (self.gap is None or self.gap.closed is None):
             raise ValueError("causes without the share of the gap that they close")
         return self
-
-
-SCATTERING = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
-"""The quantity that each effect scatters between runs. It is not a cause, and is scored separately."""
 
 
 @dataclass(frozen=True)
@@ -156,13 +152,13 @@ class Case:
     def causes(self) -> tuple[str, ...] | None:
         """The causes answered, without scatter between runs; None where there is no answer."""
         found = self.answer["causes"]
-        return None if found is None else tuple(name for name in found if name not in SCATTERING)
+        return None if found is None else tuple(name for name in found if name not in SCATTERS)
 
     @property
     def named_scatter(self) -> frozenset[str]:
         """The quantities said to scatter between the runs."""
         return frozenset(
-            {SCATTERING[name] for name in self.answer["causes"] or () if name in SCATTERING}
+            {SCATTERS[name] for name in self.answer["causes"] or () if name in SCATTERS}
             | {number for number, spread in self.spreads.items() if spread["shown"]}
         )
 
@@ -170,7 +166,7 @@ class Case:
     def spreads(self) -> dict[str, Mapping[str, Any]]:
         """The answer on the scatter of each quantity: its ``width``, ``interval`` and whether it is ``shown``."""
         said = (self.answer.get("repeatability") or {}).get("spreads", ())
-        return {SCATTERING[one["effect"]]: one for one in said if one["effect"] in SCATTERING}
+        return {SCATTERS[one["effect"]]: one for one in said if one["effect"] in SCATTERS}
 
     @property
     def right(self) -> bool:
@@ -239,7 +235,7 @@ class Case:
         found = self.decision
         if found is None:
             return None
-        likely = [set(effect.split(" + ")) - {"none", *SCATTERING} for effect, _ in found.credible]
+        likely = [set(effect.split(" + ")) - {"none", *SCATTERS} for effect, _ in found.credible]
         return any(names - set(self.small) == set(self.truth) for names in likely)
 
     @property
@@ -396,7 +392,7 @@ def inclusions(cases: Sequence[Case]) -> list[tuple[list[float], list[bool]]]:
     """
     result = []
     for c in cases:
-        beside = {*c.small, *SCATTERING}
+        beside = {*c.small, *SCATTERS}
         stated = {name: p for name, p in c.answer.get("inclusion", {}).items() if name not in beside}
         if stated:
             result.append((list(stated.values()), [name in c.truth for name in stated]))

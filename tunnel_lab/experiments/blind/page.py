@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import date
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Figure, Heading, Paragraph, Table, as_markdown
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 from tunnel_sim.vocabulary.errors import counted
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
     from numpy.typing import NDArray
 
     from identification.statistics import Proportion
@@ -27,9 +28,9 @@ CALIBRATION = "Calibration"
 NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
     "single": "one effect",
-    "single, below 1": "· below 1 × noise power",
-    "single, 1 to 10": "· 1 to 10 × noise power",
-    "single, above 10": "· above 10 × noise power",
+    "single, below 1": "· below 1 × noise variance",
+    "single, 1 to 10": "· 1 to 10 × noise variance",
+    "single, above 10": "· above 10 × noise variance",
     "pair": "two effects",
     "three": "three effects",
     "four": "four effects",
@@ -87,9 +88,9 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             "Causes found and false",
             ("group", "sets exact", "true causes found", "named causes false", ""),
             ((one.group, _brief(one.exact), _brief(one.found), _brief(one.false), "") for one in found),
-            "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
-            "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as "
-            "independent.",
+            "Small causes that act beside others need not be named, and naming them is not an error. Fast and slow "
+            "rigs have periods beyond a third and three times the standard rig's. Intervals take the causes of a "
+            "campaign as independent.",
         ),
         *_scatter_sections(score),
         _section(
@@ -117,8 +118,8 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             "Calibration of inclusion",
             ("smooth calibration error", "95 %", "statements", "campaigns"),
             smooth,
-            "Of the probability of every effect that it is among the causes. The kernel is as wide as the error "
-            "that it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
+            "Calibration of the probability that each effect is among the causes. The kernel is as wide as the "
+            "resulting error (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
         ),
     ]
 
@@ -202,10 +203,10 @@ def _other_sections(score: Score) -> list[ScoreSection]:
         )
     return [
         _section(
-            "Closure on held-out runs, where the causes are right",
+            "Share of the gap explained on held-out runs, where the causes are right",
             ("", "number", "of", "share", "95 %"),
-            [("at least 0.95 of the gap closed", *_share(closed))] if closed.total else (),
-            f"Closed: median {median:.4f}, 5th percentile {low:.4f}",
+            [("at least 0.95 of the gap explained", *_share(closed))] if closed.total else (),
+            f"Median {median:.4f}, 5th percentile {low:.4f}",
         ),
         _section(
             "Coefficients before and after the causes are added",
@@ -273,58 +274,50 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
                 else ""
             )
         ]
-    lines = [
-        "# Blind check",
-        "",
-        "The campaigns are drawn and simulated by the reference simulator (`tunnel_reference`). It has another",
-        "integrator, another friction law, and more forms of every effect than the fitted one. The campaigns",
-        "are diagnosed without their truth, and the answers are scored against the sealed key. Half of all",
-        "effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Up to four",
-        "effects act, each of them well above the noise by itself and beside the others. Some campaigns are of",
-        "rigs of another scale of time and moments, of few runs, with coloured noise, with rounded or jittered",
-        "time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page",
-        "is written by the commands below; nothing in it is typed by hand.",
-        *_ABOUT_SCATTER[: 2 * bool(score.scatter())],
-        "",
-        "```bash",
+    about_scatter = _ABOUT_SCATTER if score.scatter() else ""
+    commands = [
         *making,
         f"tunnel blind diagnose {folder}{withheld}",
         f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md{drawn}",
-        "```",
-        "",
-        *(f"    {line}" for line in origin_lines(score)),
     ]
+    origin = [f"    {line}" for line in origin_lines(score)]
+    head = [_HEAD.format(day=date.today()) + about_scatter, "```bash", *commands, "```", "", *origin]
+    blocks: list[Block] = []
     for section in sections(score):
-        lines += ["", f"## {section.title}", "", *_rows(section.columns, section.rows)]
-        if section.note:
-            lines += ["", section.note]
+        blocks += [Heading(section.title), replace(section, title=""), Paragraph(section.note)]
         if figures[0] and section.title == CALIBRATION:
-            lines += ["", f"![Share that is right against the probability stated]({figures[0]})"]
+            blocks.append(Figure(figures[0], "Share that is right against the probability stated"))
     rows, columns, counts = confusion(score)
     numbers = {name: str(index) for index, name in enumerate(columns, 1)}
-    cells = [
-        [name, numbers.get(name, ""), *(str(count or "·") for count in numbers_of)]
+    cells = tuple(
+        (name, numbers.get(name, ""), *(str(count or "·") for count in numbers_of))
         for name, numbers_of in zip(rows, counts.tolist(), strict=True)
+    )
+    blocks += [
+        Heading("Confusion matrix"),
+        Paragraph("True causes in rows, answers in columns; `two or more` counts any set of effects."),
+        *([Figure(figures[1], "Answers in columns by true causes in rows")] if figures[1] else []),
+        Table("", ("truth", "", *numbers.values()), cells, ("", *numbers.values())),
+        Paragraph(f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}."),
     ]
-    lines += [
-        "", "## Confusion matrix", "",
-        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
-        *([f"![Answers in columns by true causes in rows]({figures[1]})", ""] if figures[1] else []),
-        *_rows(["truth", "", *numbers.values()], cells), "",
-        f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.", "",
-    ]  # fmt: skip
-    return "\n".join(lines)
+    return "\n".join(head) + "\n\n" + as_markdown(blocks)
 
 
-_ABOUT_SCATTER = (
-    "In some campaigns the wind speed, the springs or the damping differ from run to run by chance. Causes are",
-    "counted without that, and what is found of it has a table of its own.",
-)
+_HEAD = """# Blind check
 
-
-def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    aligned = ["---", *["---:"] * (len(headings) - 2), "---"][: len(headings)]
-    return [f"| {' | '.join(cells)} |" for cells in (headings, aligned, *rows)]
+The numbers are those of the version of {day:%d %B %Y}.
+The campaigns are drawn and simulated by the reference simulator (`tunnel_reference`). It has another
+integrator, another friction law, and more forms of every effect than the fitted one. The campaigns
+are diagnosed without their truth, and the answers are scored against the sealed key. Half of all
+effects have the textbook form; `outside` campaigns have an effect that belongs to no family. Up to four
+effects act, each of them well above the noise by itself and beside the others. Some campaigns are of
+rigs of another scale of time and moments, of few runs, with coloured noise, with rounded or jittered
+time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page
+is written by the commands below; nothing in it is typed by hand.
+"""
+_ABOUT_SCATTER = """In some campaigns the wind speed, the springs or the damping differ from run to run by chance.
+Causes are counted without that scatter, which has a table of its own.
+"""
 
 
 def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
@@ -359,7 +352,7 @@ def _share(share: Proportion) -> tuple[str, str, str, str]:
 
 
 @styled
-def calibration_figure(score: Score) -> Figure:
+def calibration_figure(score: Score) -> Drawing:
     """The share of correct statements against their stated probability.
 
     One panel shows the answers, in bins with Wilson's intervals of 95 %. Another shows the probabilities of each
@@ -403,7 +396,7 @@ def calibration_figure(score: Score) -> Figure:
 
 
 @styled
-def confusion_figure(score: Score) -> Figure:
+def confusion_figure(score: Score) -> Drawing:
     """The answers by true causes: truths in rows and answers in columns, numbered alike.
 
     The colour is the share of the row and the number a count. Correct answers are on the diagonal, in blue.

@@ -408,7 +408,7 @@ def score_set(
             raise TunnelError(
                 "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
             )
-        with as_described("is no key", shown(source), "name the key with --key"):
+        with as_described("is not a key", shown(source), "name the key with --key"):
             truths, made_with = dict(document["truths"]), document["made_with"] or {}
             if made_with:
                 made_with = {

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tunnel_lab.experiments.runner import Progress
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_reference.severity import ATTEMPTS, Simulated
@@ -83,8 +84,6 @@ def campaign_folders(folder: Path) -> list[Path]:
 CHUNK = 100
 """Campaigns simulated together: their runs advance in one array, so fewer at a time would cost as much."""
 
-MakeProgress = Callable[[int, int], None]
-
 
 def make_blind(
     out: Path,
@@ -94,7 +93,7 @@ def make_blind(
     shares: Mapping[str, float] = DEFAULT_SHARES,
     mixture: Mixture | None = None,
     key: Path | None = None,
-    progress: MakeProgress | None = None,
+    progress: Progress | None = None,
     show_steps: bool = False,
 ) -> Path:
     """Draw, simulate and write campaigns whose truth is only in the key, and return the key's file.

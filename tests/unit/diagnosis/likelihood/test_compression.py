@@ -18,13 +18,12 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.settings import SelectionSettings, Settings
 from tests.reference import free_decays
-from tests.reference.free_decays import Setting
+from tests.reference.free_decays import SIX
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Array
 
 NOISE = 4e-4
 CHOSEN = SelectionSettings()
-SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 
 
 def prepared(noise: float = NOISE, seed: int = 1) -> Data:

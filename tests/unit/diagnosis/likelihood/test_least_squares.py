@@ -24,12 +24,11 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference import free_decays
-from tests.reference.free_decays import Setting, Truth
+from tests.reference.free_decays import SIX, Setting, Truth
 from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
 NOISE = 4e-4
-SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 
 
 def prepared(seed=1, *, noise=NOISE, settings=SIX, **options):

@@ -14,14 +14,13 @@ from diagnosis.model.joint import Joint
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_noise import WhiteNoise
 from tests.reference import free_decays
-from tests.reference.free_decays import Setting, Truth
+from tests.reference.free_decays import SIX, Setting, Truth
 from tests.support.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.effects.parameters import Trial
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
 NOISE = 4e-4
-SIX = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 
 
 def prepared(settings=SIX, duration=6.0):

@@ -110,7 +110,7 @@ TWO = MOTOR + '<motor name="second" joint="elbow"/>'
 @pytest.mark.parametrize(
     ("xml", "rest", "said"),
     [
-        (robot(actuators=TWO), {}, "several actuators: motor, second; name the one"),
+        (robot(actuators=TWO), {}, "several actuators: motor, second; name the actuator whose"),
         (robot(actuators=TWO), {"actuator": "motors"}, "no actuator 'motors'; did you mean 'motor'"),
         (robot(actuators=""), {}, "the model has no actuator of the joint"),
         (robot(actuators=MOTOR.replace("/>", ' ctrlrange="-0.1 0.1"/>')), {}, "outside -0.1 to 0.1 of its ctrl"),

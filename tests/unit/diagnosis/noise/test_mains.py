@@ -13,7 +13,7 @@ from diagnosis.settings import Settings
 from diagnosis.words.cautions import remark
 from tests.marks import slow
 from tests.reference import free_decays
-from tests.reference.free_decays import Setting, angle_of, with_records
+from tests.reference.free_decays import SIX, Setting, angle_of, with_records
 from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.files.writing import as_json
@@ -22,12 +22,11 @@ from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4
-SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 
 
 def decays(seed=1, rate=1000.0, duration=6.0):
     return free_decays.campaign(
-        SETTINGS, noise=NOISE, rate=rate, duration=duration, rng=np.random.default_rng(seed)
+        SIX, noise=NOISE, rate=rate, duration=duration, rng=np.random.default_rng(seed)
     )
 
 
@@ -233,7 +232,7 @@ def test_slow_sampling_cannot_see_the_mains():
 def reread(change):
     """The motions in closed form, read through a sensor of another kind."""
     rng = np.random.default_rng(9)
-    settings = iter(SETTINGS)
+    settings = iter(SIX)
     truth = free_decays.Truth()
 
     def read(t, _y):

@@ -1,4 +1,4 @@
-"""The formula for what no effect explains of driven runs. Truth: the friction that was simulated."""
+"""The formula for the residual of driven runs. Truth: the friction that was simulated."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ RATE, STEP, SECONDS = 100.0, 5e-4, 20.0
 INERTIA, DAMPING, STIFFNESS = 0.12, 0.1, 3.0
 SLIDING, RISE, WIDTH = 0.06, 0.06, 0.15  # N m, N m and rad/s
 BY_ANGLE = 0.1  # N m/rad
+LOAD = 0.05  # friction over the moment of the input
 
 
 def multisine(seed: int, peak: float) -> Callable[[Array], Array]:
@@ -32,8 +33,8 @@ def multisine(seed: int, peak: float) -> Callable[[Array], Array]:
     return moment
 
 
-def campaign(rise: float, by_angle: float = 0.0) -> Campaign:
-    """Three runs of a body on a spring, with friction that rises at low rates, or with the angle."""
+def campaign(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Campaign:
+    """Three runs of a body on a spring, with friction that rises at low rates, with the angle or with the input."""
     runs = []
     clock = np.arange(round(SECONDS / STEP)) * STEP
     every = round(1.0 / (RATE * STEP))
@@ -44,6 +45,7 @@ def campaign(rise: float, by_angle: float = 0.0) -> Campaign:
             found[i] = angle
             rate += STEP / INERTIA * (given - STIFFNESS * angle - DAMPING * rate)
             friction = SLIDING + rise * np.exp(-((rate / WIDTH) ** 2)) + by_angle * abs(angle)
+            friction += load * abs(given)
             rate = float(np.sign(rate)) * max(abs(rate) - STEP * friction / INERTIA, 0.0)
             angle += STEP * rate
         reading = found[::every] + 2e-4 * np.random.default_rng([seed, 1]).standard_normal(
@@ -54,8 +56,8 @@ def campaign(rise: float, by_angle: float = 0.0) -> Campaign:
     return Campaign("driven", RigProperties(), SensorProperties(RATE), tuple(runs))
 
 
-def answer(rise: float, by_angle: float = 0.0) -> Diagnosis:
-    return diagnose(campaign(rise, by_angle), kinds=vocabulary(include=["coulomb_friction"]))
+def answer(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Diagnosis:
+    return diagnose(campaign(rise, by_angle, load), kinds=vocabulary(include=["coulomb_friction"]))
 
 
 def test_the_rise_of_friction_at_low_rates_is_a_form_of_dry_friction() -> None:
@@ -82,6 +84,19 @@ def test_the_rise_of_friction_with_the_angle_is_proposed(tmp_path: Path) -> None
     assert path is not None
     assert tomllib.loads(path.read_text())["effects"][0]["name"].startswith("proposed_")
     assert next(kind.name for kind in read_effects(path)).startswith("proposed_")
+
+
+@pytest.mark.slow
+def test_the_rise_at_low_rates_is_proposed_beside_friction_with_load() -> None:
+    found = answer(RISE, load=LOAD)
+    assert found.causes == ("coulomb_friction",)
+    assert found.candidates[0].parameters["load"].value == pytest.approx(LOAD, rel=0.05)
+    assert found.closable is not None
+    law = found.closable.law
+    assert law is not None
+    assert law.effect["moment"] == "k*exp(-(r/v1)^2)*sign(r)"
+    assert law.parameters["k"][0] == pytest.approx(-RISE, rel=0.05)
+    assert law.parameters["v1"][0] == pytest.approx(WIDTH, rel=0.05)
 
 
 @pytest.mark.slow

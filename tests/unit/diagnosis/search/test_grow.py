@@ -12,6 +12,7 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
+from diagnosis.search import hypothesis as module
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.sets import exchange, prune
@@ -253,6 +254,29 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
     assert freed.fit.problem.free_forms == ("asymmetric_stiffness.exponent",)
     assert freed.textbook is kept.fit
     assert within_noise(freed.fit)
+
+
+def hypotheses(base: Fit, *names: str) -> list[Hypothesis]:
+    """Single effects with their textbook forms, fitted."""
+    leads = ((name, starting_points(base, effect_class(name))[0]) for name in names)
+    return [Hypothesis((name,), fit(lead.problem, lead.point, base=base)) for name, lead in leads]
+
+
+def test_forms_are_tried_only_where_they_could_win_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not beside an effect that explains the runs, nor again where they added no weight."""
+    base, tried = nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.02}))), []
+    freeing = module._free_forms
+    monkeypatch.setattr(
+        module, "_free_forms", lambda fitted, *rest: tried.append(fitted) or freeing(fitted, *rest)
+    )
+    with_forms(hypotheses(base, "coulomb_friction", "nonlinear_yaw_moment"), misfit(base), 0.0)
+    assert not tried
+    once = with_forms(hypotheses(base, "nonlinear_yaw_moment"), misfit(base), 0.0)
+    assert tried
+    assert once[0].plain is once[0].fit
+    tried.clear()
+    assert with_forms(once, misfit(base), 0.0) == once
+    assert not tried
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_what_is_stated_is_compared(given: Document) -> None:
     given["causes"] = []
     text = verdict(given, "")
     assert text.startswith("No gap: ")
-    assert "differ from each other within what is stated (the wind speed 0.3 %, the spring 0.3 %" in text
+    assert "differ no more than stated (the wind speed 0.3 %, the spring 0.3 %" in text
 
 
 def test_numbers_told_apart_poorly_are_said_to_be(given: Document) -> None:

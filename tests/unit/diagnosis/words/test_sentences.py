@@ -67,8 +67,7 @@ def test_only_what_locates_the_gap_is_said(given: Document) -> None:
 def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document) -> None:
     text = placed(given, compared=["coulomb_friction", "gravity_stiffness", "quadratic_damping"], agrees=True)
     assert text.endswith(
-        "Of the causes coulomb friction and quadratic damping act there, and gravity stiffness acts on the "
-        "restoring moment."
+        "Coulomb friction and quadratic damping act there; gravity stiffness acts on the restoring moment."
     )
     assert "does not agree" not in text
     text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)

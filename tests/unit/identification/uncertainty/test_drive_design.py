@@ -43,7 +43,6 @@ sensor.sample_rate = 100.0
 RIG = load_rig()
 LIMITS = (Limits(0.02, 1.0), Limits(5.0, 0.2))  # the moment limits, and the angle
 BUFFETED = [EffectTable(name="buffeting", parameters={"intensity": 0.02})]
-GOALS: tuple[Goal, ...] = ("d", "cn_r")
 
 
 @pytest.fixture

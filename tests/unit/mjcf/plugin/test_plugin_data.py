@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,13 +13,10 @@ from mujoco import rollout as mujoco_rollout
 
 from tests.support.small_model import small_model
 
+pytestmark = pytest.mark.usefixtures("in_a_folder_of_its_own")
+
 LAW = {"aero_lag": "2", "friction_moment": "0.01", "presliding": "0.002", "moment_cubic": "1"}
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-
-
-@pytest.fixture(autouse=True)
-def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
 
 
 def _model(numerics: Mapping[str, str] = LAW) -> mujoco.MjModel:

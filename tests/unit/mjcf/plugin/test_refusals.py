@@ -14,17 +14,14 @@ from tests.skips import PLATFORM
 from tests.support.small_model import NUMERICS, small_model
 from tunnel_sim.physics.moment_law import parameter_names
 
+pytestmark = pytest.mark.usefixtures("in_a_folder_of_its_own")
+
 PLUGIN_SOURCE = Path(__file__).parents[4] / "mjcf" / "plugin"
 NOT_NEGATIVE = ("air_density", "frontal_area", "reference_length", "width", "strouhal_number")
 NOT_NEGATIVE += ("friction_moment", "presliding", "free_play")
 NOT_NEGATIVE += ("friction_exponent", "friction_saturation", "friction_peak", "friction_peak_rate")
 OWNED = ("spring_stiffness", "mechanical_damping", "yaw_inertia")
 SERIES = {"wind_speed": "20 21 22", "wind_speed_interval": "0.5"}
-
-
-@pytest.fixture(autouse=True)
-def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
 
 
 def _refused(message: str, *arguments: object, flags: str = "") -> None:

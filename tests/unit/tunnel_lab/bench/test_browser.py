@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
+from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document
 from tests.support.import_files import decay
 from tests.support.served import SETTLED, Bench, bench, tab
@@ -35,12 +35,6 @@ TWO_CHANNELS = Path(__file__).parents[4] / "docs" / "how-to" / "data" / "Measure
 def log_text(seed: int = 1) -> str:
     rows = [f"{t:.3f},{y:.6f}" for t, y in zip(*decay(seed), strict=True)]
     return "time_s,yaw_rad\n" + "\n".join(rows)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -48,7 +48,7 @@ def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
     assert (found.reached, found.seconds) == (Reached("effects", 2.5), 4.0)
     lines += ["9.0 s: predicting held-out runs"]
     assert diagnosis.progress_of(lines).tried == ""
-    assert diagnosis.progress_of(lines).reached == Reached("how far it closes", 9.0)
+    assert diagnosis.progress_of(lines).reached == Reached("explained share", 9.0)
     assert diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"]) == diagnosis.Progress()
 
 

@@ -12,13 +12,12 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.browser import IN_A_BROWSER, chromium, screenshot
+from tests.support.browser import IN_A_BROWSER, screenshot
 from tests.support.served import Tab, bench, tab
 from tunnel_lab.bench import work
 
@@ -38,12 +37,6 @@ truth.cn_beta = 0.495
 truth.cn_r = -0.114
 """
 LONG_MS = 600_000
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
 
 
 def picture(one: Tab, name: str) -> None:
@@ -69,11 +62,11 @@ def film(pictures: list[bytes], path: str) -> None:
             writer.append_data(imageio.imread(one, format="jpg"))
 
 
-def to_the_report(one: Tab, name: str) -> Path:
-    """From the page Conditions to the downloaded report."""
+def to_the_report(one: Tab, of: str = "") -> Path:
+    """From the page Conditions to the downloaded report; ``of`` ends the names of the pictures."""
     page = one.page
     one.wait(".ag-row")
-    picture(one, "conditions")
+    picture(one, f"conditions{of}")
     one.click("Continue: Identify")
     page.wait_for_url("**/identify")
     one.click("Identify")
@@ -84,7 +77,7 @@ def to_the_report(one: Tab, name: str) -> Path:
     one.wait("a:has-text('Continue: Next run')")
     one.wait(".figures svg")
     one.wait(".by-hand .value")
-    picture(one, name)
+    picture(one, f"diagnose{of}")
     page.mouse.wheel(0, 3000)
     one.click("To the report")
     page.wait_for_url("**/report")
@@ -103,9 +96,10 @@ def test_a_real_file_becomes_a_report_in_seven_clicks(browser: Any, tmp_path: Pa
         one.page.get_by_role("option", name="data[1]").click()
         one.page.keyboard.press("Escape")
         one.wait(".mark.start")
+        one.page.locator(".mark.start").first.evaluate("mark => mark.scrollIntoView({block: 'center'})")
         picture(one, "records")
         one.click("Write the campaign")
-        report = to_the_report(one, "diagnose").read_text("utf-8")
+        report = to_the_report(one).read_text("utf-8")
         assert "Diagnosis of Measured_data2" in report
         assert one.clicks <= 7  # the download among them
         one.shoot()
@@ -124,7 +118,7 @@ def test_a_simulated_campaign_is_diagnosed_as_by_the_command(browser: Any, tmp_p
     tunnel("simulate", str(tmp_path / "plan.toml"), "--out", str(folder / "dry"), *effect)
     with bench(folder) as served, tab(browser, served) as one:
         one.open("/dry/conditions")
-        to_the_report(one, "diagnose-dry")
+        to_the_report(one, "-dry")
         one.open("/dry/diagnose")
         one.page.wait_for_selector(".by-hand .value", timeout=LONG_MS)
         assert one.page.locator(".by-hand .value").first.inner_text().startswith(("100", "> 99.9", "99"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import jsonschema
@@ -13,6 +12,7 @@ import pytest
 
 from diagnosis import diagnose
 from identification import identify
+from tests.support.command import Tunnel
 from tests.support.small_sweep import SMALL
 from tunnel_lab.commands import about
 from tunnel_lab.commands.about import SCHEMAS, schema_of
@@ -20,7 +20,6 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, installing, library
 
-Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[4]
 
 

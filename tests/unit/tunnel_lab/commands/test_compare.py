@@ -6,15 +6,14 @@ Truth: documents written by hand, and differences worked out by hand.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.support.command import Tunnel
 from tests.support.diagnosis_document import document, scattering_document
 
-Tunnel = Callable[..., tuple[int, str, str]]
 Document = dict[str, Any]
 
 

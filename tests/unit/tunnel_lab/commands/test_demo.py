@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 
 from diagnosis.words.causes import consequence
 from identification.estimate import Estimate, Quantity, Status
+from tests.support.command import Tunnel
 from tunnel_lab.bench.workspace import open_session
 from tunnel_lab.commands.demo import (
     PLAN,
@@ -28,7 +28,6 @@ from tunnel_lab.commands.demo import (
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 TINY = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 TWO_SCREENS = 60
 """Lines: two terminals of the usual 30 lines or so."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,13 @@ import pytest
 
 from diagnosis.words.verdict import next_steps
 from tests.reference.free_decays import Setting, campaign
+from tests.support.command import Tunnel
+from tests.support.plans import planned
 from tests.unit.tunnel_lab.conftest import PROGRESS
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_folder import write_campaign
-from tunnel_sim.files.plan_file import load_plan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 CAUSE = "coulomb_friction"
 PLAN = """
 name = "dry"
@@ -42,8 +41,7 @@ parameters = { friction_moment = 0.01 }
 def dry(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Eight short runs with dry friction."""
     folder = tmp_path_factory.mktemp("diagnose")
-    (folder / "plan.toml").write_text(PLAN, encoding="utf-8")
-    return write_campaign(simulate_campaign(load_plan(folder / "plan.toml")), folder / "dry")
+    return write_campaign(simulate_campaign(planned(folder, PLAN)), folder / "dry")
 
 
 @pytest.fixture
@@ -159,8 +157,7 @@ def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_predictio
     tunnel: Tunnel, tmp_path: Path
 ) -> None:
     calm = PLAN.replace("[0.0, 15.0]", "[0.0]").replace("[20.0, 8.0]", "[20.0]")
-    (tmp_path / "plan.toml").write_text(calm, encoding="utf-8")
-    folder = write_campaign(simulate_campaign(load_plan(tmp_path / "plan.toml")), tmp_path / "calm")
+    folder = write_campaign(simulate_campaign(planned(tmp_path, calm)), tmp_path / "calm")
     answer, page = tmp_path / "answer.json", tmp_path / "report.html"
     status, out, _ = tunnel("diagnose", folder, "--effects", CAUSE, "--json", answer, "--report", page)
     assert status == 0

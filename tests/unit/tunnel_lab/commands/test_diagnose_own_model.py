@@ -6,7 +6,6 @@ Truth: a linear decay in closed form, where no test says otherwise.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,13 +17,13 @@ from diagnosis.words.cautions import UNPATCHED
 from tests.reference import robot_joints
 from tests.reference.free_decays import Setting, campaign
 from tests.reference.robot_joints import LEVEL, MOTOR, robot, robot_campaign
+from tests.support.command import Tunnel
 from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 pytestmark = pytest.mark.usefixtures("models_in_this_process")
 
-Tunnel = Callable[..., tuple[int, str, str]]
 SPRING = 16.12
 MODEL = f"""<mujoco><option gravity="0 0 0" timestep="0.001" integrator="RK4"/><worldbody><body>
 <joint name="yaw" axis="0 0 1" stiffness="{SPRING}"/><geom type="box" size="0.3 0.1 0.1" mass="4"/>
@@ -143,7 +142,7 @@ def test_the_control_of_a_robots_joint_from_its_folder(
     given = ("diagnose", folder, "--effects", "coulomb_friction", "--model", tmp_path / "arm.xml")
     status, _, err = tunnel(*given, "--joint", "elbow")
     assert (status, err.count("\n")) == (2, 1)
-    assert "name the one that the column drive is the control of with --actuator" in err
+    assert "name the actuator whose control is in the column drive with --actuator" in err
     answer, report, out = (tmp_path / name for name in ("answer.json", "report.html", "out.xml"))
     options = (
         "--joint",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Tunnel = Callable[..., tuple[int, str, str]]
+from tests.support.command import Tunnel
 
 
 @pytest.fixture

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.reference.effect_cases import VOCABULARY
+from tests.support.command import Tunnel
 from tunnel_lab.commands.effects import example, reference_page
 from tunnel_lab.terminal.inputs import parse_effect
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import EffectSetting
 
-Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[4]
 PLAN = ROOT / "tests" / "data" / "tiny-plan.toml"
 FRICTION = "coulomb_friction:friction_moment=0.02"

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from tests.support.command import Tunnel
 from tests.support.own_effects import EFFECTS_FILE
 from tunnel_lab.experiments.blind import answers as answer
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 
 

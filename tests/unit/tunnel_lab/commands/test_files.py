@@ -6,17 +6,16 @@ import csv
 import io
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
+from tests.support.command import Tunnel
 from tests.support.import_files import csv as record
 from tests.support.import_files import decay, written
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PNG = b"\x89PNG\r\n\x1a\n"
 
 

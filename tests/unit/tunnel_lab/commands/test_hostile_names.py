@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +9,13 @@ import numpy as np
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
+from tests.support.command import Tunnel
 from tests.unit.tunnel_lab.conftest import PROGRESS
 from tunnel_lab.plotting.runs import run_label, spectrum_figure
 from tunnel_lab.plotting.style import figure_text
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
-Tunnel = Callable[..., tuple[int, str, str]]
 NAMES = (r"$\foo$", "[/x]", "_hidden", "[bold]:smile:", r"a\$b$", 'id="x"<svg>&amp;')
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tests.support.command import Tunnel
 from tests.support.diagnosis_document import document, scattering_document
 from tunnel_sim.files import writing
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PNG = b"\x89PNG\r\n\x1a\n"
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Outcome = tuple[int, str, str]
-Tunnel = Callable[..., Outcome]
+from tests.support.command import Tunnel
 
 KNOWN = """
 schema_version = 1

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support.command import Tunnel
 from tests.unit.identification.signal.test_turning_points import OMEGA, ZETA, points
-
-Tunnel = Callable[..., tuple[int, str, str]]
 
 
 def table(folder: Path, head: str, delimiter: str = "\t") -> Path:
@@ -40,8 +38,8 @@ def test_identify_gives_frequency_and_damping(
     status, out, err = tunnel("identify", path, "--json", tmp_path / "out.json")
     assert status == 0
     assert "peaks: 60 turning points" in out
-    assert "the times scatter within what is stated" in out
-    assert "the angles scatter within what is stated" in out
+    assert "the times scatter as stated" in out
+    assert "the angles scatter as stated" in out
     assert "need the angle between them too" in out
     assert "peaks: text" in err
     document = json.loads((tmp_path / "out.json").read_text())

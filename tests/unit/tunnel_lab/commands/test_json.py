@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 
@@ -13,11 +12,10 @@ import pytest
 from identification.signal.noise import Residual, noise_level
 from tests.marks import slow
 from tests.reference.free_decays import Setting, campaign
+from tests.support.command import Tunnel
 from tests.unit.tunnel_lab.conftest import PROGRESS
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import SensorProperties
-
-Tunnel = Callable[..., tuple[int, str, str]]
 
 SENSORS = {
     "noise free": {"noise": 0.0, "stated_noise": None},

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer.main
 
+from tests.support.command import Tunnel
 from tunnel_lab.cli import app
 
-Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[4]
 PACKAGES = ("tunnel_lab", "tunnel_sim", "identification", "diagnosis")
 BRACKETS = re.compile(r"\[[^\[\]\n]*\]")

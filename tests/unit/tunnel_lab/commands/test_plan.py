@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tests.support.command import Tunnel
 from tunnel_lab.commands.simulate import rig_time
 from tunnel_sim.files.plan_file import load_plan, read_plan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = """
 name = "free"
 seed = 3

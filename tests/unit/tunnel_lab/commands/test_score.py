@@ -17,10 +17,8 @@ import polars as pl
 import pytest
 
 from identification.estimators.matrix_pencil import MatrixPencil
+from tests.support.command import Tunnel
 from tunnel_lab.cli import main
-
-Outcome = tuple[int, str, str]
-Tunnel = Callable[..., Outcome]
 
 GRID = """
 schema_version = 1

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tests.support.command import Tunnel
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 
 

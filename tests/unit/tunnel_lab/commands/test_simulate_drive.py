@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from tests.support.command import Tunnel
 from tunnel_lab.plotting.runs import trace_pages
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = """
 name = "driven"
 seed = 3

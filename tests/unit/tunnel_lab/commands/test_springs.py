@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Tunnel = Callable[..., tuple[int, str, str]]
+from tests.support.command import Tunnel
 
 
 def test_springs_of_the_paper(tunnel: Tunnel) -> None:

@@ -19,7 +19,8 @@ def test_trains_writes_both_files_and_says_what_came_of_it(tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["w.json", "w.safetensors"]
 
 
-def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, capsys):
+def interrupted_at_the_fifth(monkeypatch):
+    """Make the fifth step of a training interrupt it; a list with an entry for each step."""
     from identification.neural import train as module
 
     step, taken = module.advance_training, []
@@ -30,9 +31,14 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
             raise KeyboardInterrupt
         return step(progress, problem)
 
+    monkeypatch.setattr(module, "advance_training", interrupted)
+    return taken
+
+
+def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, capsys):
     whole, out = tmp_path / "whole.safetensors", tmp_path / "w.safetensors"
     assert main(["train", str(whole), *QUICK]) == 0
-    monkeypatch.setattr(module, "advance_training", interrupted)
+    taken = interrupted_at_the_fifth(monkeypatch)
     assert main(["train", str(out), *QUICK]) == 130
     assert not out.exists()
     assert "the same command continues" in capsys.readouterr().err
@@ -45,21 +51,11 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
 
 
 def test_a_restart_gives_the_same_bits_and_takes_nothing_from_an_interrupted_training(tmp_path, monkeypatch):
-    from identification.neural import train as module
-
-    step, taken = module.advance_training, []
-
-    def interrupted(progress, problem):
-        taken.append(1)
-        if len(taken) == 5:
-            raise KeyboardInterrupt
-        return step(progress, problem)
-
     out = tmp_path / "w.safetensors"
     assert main(["train", str(out), *QUICK]) == 0
     whole, record = out.read_bytes(), out.with_suffix(".json").read_bytes()
     out.unlink()
-    monkeypatch.setattr(module, "advance_training", interrupted)
+    taken = interrupted_at_the_fifth(monkeypatch)
     assert main(["train", str(out), *QUICK]) == 130
     taken.clear()
     taken += [1] * 5

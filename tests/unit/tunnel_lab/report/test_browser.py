@@ -5,7 +5,6 @@ Truth: a document written by hand, and what the style sheet and WCAG 2 ask for.
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
@@ -17,7 +16,7 @@ import numpy as np
 import pytest
 
 from tests.marks import slow
-from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
+from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
 
@@ -31,12 +30,6 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     given["provenance"] = {"versions": {"numpy": "2"}, "sha256": {"runs/alpha.csv": "ab" * 32}}
     path = tmp_path_factory.mktemp("report") / "report.html"
     return write_report(given, campaign(), path, Byline("2026-05-31", "A. Smith"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
 
 
 class Opened:
@@ -244,7 +237,7 @@ def middles(points: Line, logarithmic: bool) -> Line:
 
 def holed() -> dict[str, Any]:
     """A document whose spectrum has empty bins, other ones for every run; and a gap in the first run."""
-    given = copy.deepcopy(document())
+    given = document()
     excess = [8.0, 7.0, 15.0, None, 5.0, 3.0, 50.0, 2.0, 6.0, 0.2, -0.6, 0.4]
     given["maps"]["frequency"] |= {
         "edges_hz": [0.0, *np.geomspace(0.05, 20.0, 12).tolist()],

@@ -5,22 +5,16 @@ Truth: a document written by hand.
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.support.diagnosis_document import IDS, document
+from tests.support.diagnosis_document import IDS
 from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.where import charts
 
 Document = dict[str, Any]
-
-
-@pytest.fixture
-def given() -> Document:
-    return copy.deepcopy(document())
 
 
 def test_the_spectrum_of_all_runs_and_of_each(given: Document) -> None:

@@ -5,7 +5,6 @@ Truth: a document written by hand.
 
 from __future__ import annotations
 
-import copy
 import math
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tests.support.diagnosis_document import CONDITIONS, IDS, document, scattering_document
+from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
 from tests.support.shown_numbers import numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
@@ -23,11 +22,6 @@ from tunnel_lab.report.figures import backbone_figure, law_figure
 from tunnel_lab.report.friction import friction_figure
 
 Document = dict[str, Any]
-
-
-@pytest.fixture
-def given() -> Document:
-    return copy.deepcopy(document())
 
 
 def curve(line: Any) -> list[tuple[float, float]]:
@@ -72,11 +66,6 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     fig = answer.candidates_figure(given)
     assert fig is not None
     assert fig.axes[0].texts[0].get_text() == "> 99 %"
-
-
-def rms(excess: Any) -> Any:
-    """A misfit in degrees, by the noise of the document."""
-    return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
 
 
 def test_points_of_the_closure(given: Document) -> None:

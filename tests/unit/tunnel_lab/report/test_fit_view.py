@@ -5,7 +5,6 @@ Truth: a document written by hand, and the records of a simulated campaign.
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from diagnosis.answer.assemble import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report.where import fit_charts, fit_figure, fit_pages
 from tunnel_sim.effects import effect_class, effect_from
@@ -22,11 +20,6 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 Document = dict[str, Any]
 CAUSE = "quadratic_damping"
-
-
-@pytest.fixture
-def given() -> Document:
-    return copy.deepcopy(document())
 
 
 def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 
 import pytest
@@ -30,7 +29,7 @@ def test_symbols_of_coefficients_and_causes_are_explained(monkeypatch: pytest.Mo
 
 
 def test_of_runs_without_a_stated_spring_frequency_and_damping_are_explained() -> None:
-    given = copy.deepcopy(document())
+    given = document()
     for when in ("before", "after"):
         values = given["coefficients"][when]
         given["coefficients"][when] = {"omega_n": values["cn_beta"], "zeta": values["cn_r"]}
@@ -41,7 +40,7 @@ def test_of_runs_without_a_stated_spring_frequency_and_damping_are_explained() -
 
 @pytest.mark.parametrize("of_two", [False, True])
 def test_a_colour_bar_has_the_colours_of_the_theme(of_two: bool) -> None:
-    given = copy.deepcopy(document())
+    given = document()
     if of_two:
         given["closable"] = {
             "curve": {

@@ -5,7 +5,6 @@ Truth: a document written by hand.
 
 from __future__ import annotations
 
-import copy
 from itertools import combinations
 from typing import Any
 
@@ -14,16 +13,11 @@ import pytest
 from matplotlib.transforms import Bbox
 
 from tests.marks import slow
-from tests.support.diagnosis_document import CAUSE, RIVAL, document
+from tests.support.diagnosis_document import CAUSE, RIVAL, rms
 from tests.support.shown_numbers import assert_shows
 from tunnel_lab.report.figures import waterfall_figure
 
 Document = dict[str, Any]
-
-
-@pytest.fixture
-def given() -> Document:
-    return copy.deepcopy(document())
 
 
 def axes_of(given: Document) -> Any:
@@ -31,11 +25,6 @@ def axes_of(given: Document) -> Any:
     assert fig is not None
     (axes,) = fig.axes
     return axes
-
-
-def rms(excess: Any) -> Any:
-    """A misfit in degrees, by the noise of the document."""
-    return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
 
 
 def dots(axes: Any) -> list[tuple[float, float]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.skips import PLATFORM
+from tests.support.command import Tunnel
 from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
 from tunnel_lab.show.live import Controls, History, LiveRun, missing_display, window_loop
 from tunnel_sim.engine.model import build_model
@@ -20,7 +20,6 @@ from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
-Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 SMALL = ("--size", "240x160", "--duration", "0.6")
 

@@ -6,16 +6,15 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
 from tests.skips import PLATFORM
+from tests.support.command import Tunnel
 from tests.support.gone_reader import unheard
 
-Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[4]
 
 

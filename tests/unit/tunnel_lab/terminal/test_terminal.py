@@ -6,18 +6,16 @@ import io
 import json
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from identification.blocks import Table
+from tests.support.command import Tunnel
 from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.tables import is_too_wide, stacked
 from tunnel_sim.files.reading import inside, nearest
-
-Tunnel = Callable[..., tuple[int, str, str]]
 
 
 def two_columns():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +10,9 @@ import pytest
 
 from diagnosis import diagnose
 from identification import identify
+from tests.support.plans import planned
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign
-from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
 
@@ -35,15 +34,6 @@ MULTISINE = f'{PLAN.replace("12.0", "8.0")}kind = "multisine"\n{BAND}amplitudes_
 KINDS = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "cubic_stiffness")]
 
 
-@pytest.fixture
-def load(tmp_path: Path) -> Callable[[str], CampaignPlan]:
-    def loaded(text: str) -> CampaignPlan:
-        (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
-        return load_plan(tmp_path / "plan.toml")
-
-    return loaded
-
-
 def with_effect(plan: CampaignPlan, name: str, **parameters: float) -> CampaignPlan:
     return replace(plan, effects=(EffectSetting(name, parameters),))
 
@@ -60,8 +50,8 @@ def with_effect(plan: CampaignPlan, name: str, **parameters: float) -> CampaignP
         f'kind = "square"\nfrequency_hz = 0.7\nhold = "zero"\n{MOMENT}',
     ],
 )
-def test_the_chosen_coefficients_are_found(load: Callable[[str], CampaignPlan], drive: str) -> None:
-    plan = load(PLAN + drive)
+def test_the_chosen_coefficients_are_found(tmp_path: Path, drive: str) -> None:
+    plan = planned(tmp_path, PLAN + drive)
     found = identify(simulate_campaign(plan))
     for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping"):
         quantity = getattr(found, name)
@@ -69,8 +59,8 @@ def test_the_chosen_coefficients_are_found(load: Callable[[str], CampaignPlan], 
         assert abs(quantity.value - getattr(plan.truth, name)) < 4.5 * quantity.std, name
 
 
-def test_a_wrong_hold_is_seen(load: Callable[[str], CampaignPlan]) -> None:
-    campaign = simulate_campaign(load(f'{PLAN}kind = "random"\n{BAND}{MOMENT}\nhold = "zero"'))
+def test_a_wrong_hold_is_seen(tmp_path: Path) -> None:
+    campaign = simulate_campaign(planned(tmp_path, f'{PLAN}kind = "random"\n{BAND}{MOMENT}\nhold = "zero"'))
     linear = tuple(replace(r, drive=replace(r.drive, hold="linear")) for r in campaign.runs if r.drive)
     found, wrong = identify(campaign), identify(replace(campaign, runs=linear))
     assert found.noise is not None
@@ -78,21 +68,23 @@ def test_a_wrong_hold_is_seen(load: Callable[[str], CampaignPlan]) -> None:
     assert (found.noise.departs, wrong.noise.departs) == (False, True)
 
 
-def test_no_cause_is_named_where_there_is_none(load: Callable[[str], CampaignPlan]) -> None:
-    assert diagnose(simulate_campaign(load(MULTISINE)), kinds=KINDS).causes == ()
+def test_no_cause_is_named_where_there_is_none(tmp_path: Path) -> None:
+    assert diagnose(simulate_campaign(planned(tmp_path, MULTISINE)), kinds=KINDS).causes == ()
 
 
-def test_dry_friction_is_named(load: Callable[[str], CampaignPlan]) -> None:
-    plan = with_effect(load(MULTISINE), "coulomb_friction", friction_moment=0.004)
+def test_dry_friction_is_named(tmp_path: Path) -> None:
+    plan = with_effect(planned(tmp_path, MULTISINE), "coulomb_friction", friction_moment=0.004)
     found = diagnose(simulate_campaign(plan), kinds=KINDS)
     assert found.causes == ("coulomb_friction",)
     assert found.gap.closed > 0.99
 
 
 def test_the_bits_do_not_depend_on_threads_and_the_noise_only_on_the_seed(
-    load: Callable[[str], CampaignPlan],
+    tmp_path: Path,
 ) -> None:
-    plan = load("release_angles_deg = [20.0]" + MULTISINE.replace("duration = 8.0", "duration = 4.0"))
+    plan = planned(
+        tmp_path, "release_angles_deg = [20.0]" + MULTISINE.replace("duration = 8.0", "duration = 4.0")
+    )
     one, three, other = (
         simulate_campaign(plan, nthread=1),
         simulate_campaign(plan, nthread=3),
@@ -106,8 +98,8 @@ def test_the_bits_do_not_depend_on_threads_and_the_noise_only_on_the_seed(
             assert np.array_equal(a.drive.values, c.drive.values)
 
 
-def test_the_root_pulls_with_the_true_spring(load: Callable[[str], CampaignPlan]) -> None:
-    plan = load(f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
+def test_the_root_pulls_with_the_true_spring(tmp_path: Path) -> None:
+    plan = planned(tmp_path, f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
     stated = replace(plan, conditions=plan.conditions[:1])
     spring = stated.conditions[0].spring_stiffness
     wrong = with_effect(stated, "spring_miscalibration", error=0.2, spring_stiffness=spring)
@@ -116,8 +108,8 @@ def test_the_root_pulls_with_the_true_spring(load: Callable[[str], CampaignPlan]
     assert np.max(np.abs(found - expected)) <= 1.01 * plan.sensor.resolution
 
 
-def test_effects_without_a_meaning_for_the_drive_are_refused(load: Callable[[str], CampaignPlan]) -> None:
-    rooted = load(f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
+def test_effects_without_a_meaning_for_the_drive_are_refused(tmp_path: Path) -> None:
+    rooted = planned(tmp_path, f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
     with pytest.raises(TunnelError, match=r"a loss in the spring.*drive the body by amplitudes_nm"):
         plan_effects(with_effect(rooted, "structural_damping", loss_factor=0.01))
-    assert plan_effects(with_effect(load(MULTISINE), "structural_damping", loss_factor=0.01))
+    assert plan_effects(with_effect(planned(tmp_path, MULTISINE), "structural_damping", loss_factor=0.01))

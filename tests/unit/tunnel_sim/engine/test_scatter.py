@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.plans import planned
 from tunnel_sim.engine.simulate import simulate_motions
 from tunnel_sim.engine.virtual_campaign import run_settings, simulate_campaign, truth_document
-from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.between_runs import SCATTERED, WIDEST_SCATTER, Repeatability, Scatter, along
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -44,15 +44,9 @@ mechanical_damping = 0.01
 """
 
 
-def read(tmp_path, *texts: str) -> CampaignPlan:
-    path = tmp_path / "plan.toml"
-    path.write_text("".join(texts), encoding="utf-8")
-    return load_plan(path)
-
-
 @pytest.fixture
 def plan(tmp_path) -> CampaignPlan:
-    return read(tmp_path, PLAN)
+    return planned(tmp_path, PLAN)
 
 
 def readings(plan: CampaignPlan) -> np.ndarray:
@@ -61,7 +55,7 @@ def readings(plan: CampaignPlan) -> np.ndarray:
 
 @pytest.mark.parametrize("drive", ["", DRIVE], ids=["free", "driven"])
 def test_every_run_moves_as_the_rig_with_its_own_numbers(tmp_path, drive: str) -> None:
-    plan = replace(read(tmp_path, PLAN, drive), scatter=WIDE, sensor=QUIET)
+    plan = replace(planned(tmp_path, PLAN, drive), scatter=WIDE, sensor=QUIET)
     true = []
     truth = truth_document(plan)
     for condition in plan.conditions:
@@ -174,7 +168,7 @@ def test_deviations_are_normal_and_drift_along_the_runs() -> None:
 
 
 def test_a_plan_states_both_tables(tmp_path) -> None:
-    plan = read(tmp_path, PLAN, TABLES)
+    plan = planned(tmp_path, PLAN, TABLES)
     assert plan.scatter == Scatter(wind_speed=0.003, zero=0.002, wind_speed_drift_between_runs=-0.01)
     assert plan.repeatability == Repeatability(wind_speed=0.003, mechanical_damping=0.01)
     assert simulate_campaign(plan, nthread=1).repeatability == plan.repeatability
@@ -195,7 +189,7 @@ def test_a_plan_states_both_tables(tmp_path) -> None:
 )
 def test_a_bad_table_is_refused_in_one_line(tmp_path, line: str, said: str) -> None:
     with pytest.raises(TunnelError) as refusal:
-        read(tmp_path, PLAN, f"[scatter]\n{line}\n")
+        planned(tmp_path, PLAN, f"[scatter]\n{line}\n")
     assert said in str(refusal.value)
     assert "plan.toml, [scatter]: " in str(refusal.value)
     assert "\n" not in str(refusal.value)

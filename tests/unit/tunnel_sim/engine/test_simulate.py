@@ -20,6 +20,8 @@ from tunnel_sim.physics.run_settings import Motion, RodTwist, RunSettings, Serie
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 
+pytestmark = pytest.mark.usefixtures("in_a_folder_of_its_own")
+
 NOT_TERMS = {"air_density", "frontal_area", "reference_length", "width", "cn_beta", "cn_r"}
 NOT_TERMS |= {"spring_stiffness", "mechanical_damping", "yaw_inertia"}
 TERMS = [name for name in parameter_names() if name not in NOT_TERMS]
@@ -48,11 +50,6 @@ MIXED = [
     ),
     replace(PLAIN, parameters={"friction_moment": 0.02, "friction_peak": 0.5, "friction_peak_rate": 0.1}),
 ]
-
-
-@pytest.fixture(autouse=True)
-def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
 
 
 @cache

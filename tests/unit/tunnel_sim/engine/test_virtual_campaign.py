@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.plans import planned
 from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -39,8 +39,7 @@ parameters = { friction_moment = 0.05 }
 
 @pytest.fixture
 def plan(tmp_path: Path) -> CampaignPlan:
-    (tmp_path / "plan.toml").write_text(PLAN, encoding="utf-8")
-    return load_plan(tmp_path / "plan.toml")
+    return planned(tmp_path, PLAN)
 
 
 def same(one: Campaign, other: Campaign) -> bool:

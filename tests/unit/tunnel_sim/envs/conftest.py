@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from tunnel_sim.envs import EnvError
@@ -12,8 +10,8 @@ from tunnel_sim.files.rig_file import load_rig
 
 
 @pytest.fixture(autouse=True)
-def _log_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
+def _log_elsewhere(in_a_folder_of_its_own: None) -> None:
+    """MuJoCo's log of every test here."""
 
 
 @pytest.fixture(scope="session")

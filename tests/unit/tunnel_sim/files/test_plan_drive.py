@@ -9,10 +9,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from tests.support.plans import planned
 from tunnel_sim.files.plan_drive import DriveTable
-from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, TruthTable, load_plan
+from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, TruthTable
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan, square
+from tunnel_sim.vocabulary.plan import square
 
 HEAD = """
 name = "driven"
@@ -28,14 +29,8 @@ BAND = '[drive]\nkind = "multisine"\nfrom_hz = 0.5\nto_hz = 5.0\namplitudes_rad 
 TIME = np.arange(1000) / 100.0
 
 
-def load(tmp_path: Path, text: str) -> CampaignPlan:
-    path = tmp_path / "plan.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_plan(path)
-
-
 def test_every_amplitude_is_run_at_every_spring_and_speed_beside_the_decays(tmp_path: Path) -> None:
-    plan = load(tmp_path, "release_angles_deg = [20]\nrepeats = 2\n" + HEAD + SINE)
+    plan = planned(tmp_path, "release_angles_deg = [20]\nrepeats = 2\n" + HEAD + SINE)
     kinds = ("a20-1", "a20-2", "d0.1-1", "d0.1-2", "d0.4-1", "d0.4-2")
     assert [c.id for c in plan.conditions] == [f"s5-v{v}-{kind}" for v in (0, 10) for kind in kinds]
     for condition in plan.conditions:
@@ -43,19 +38,21 @@ def test_every_amplitude_is_run_at_every_spring_and_speed_beside_the_decays(tmp_
 
 
 def test_an_amplitude_is_the_peak_in_the_unit_of_its_column(tmp_path: Path) -> None:
-    small, large = (c.drive for c in load(tmp_path, HEAD + SINE).conditions[:2])
+    small, large = (c.drive for c in planned(tmp_path, HEAD + SINE).conditions[:2])
     assert small is not None
     assert large is not None
     assert (small.column, small.hold) == ("moment_nm", "linear")
     assert np.allclose(small.values, 0.1 * np.sin(4.0 * np.pi * TIME))
     assert np.allclose(large.values, 4.0 * small.values)
-    (root,) = {c.drive.column for c in load(tmp_path, HEAD + BAND).conditions if c.drive}
+    (root,) = {c.drive.column for c in planned(tmp_path, HEAD + BAND).conditions if c.drive}
     assert root == "base_rad"
 
 
 def test_drawn_inputs_differ_from_run_to_run_and_are_those_of_the_seed(tmp_path: Path) -> None:
     def inputs(text: str) -> list[np.ndarray]:
-        return [c.drive.values for c in load(tmp_path, "repeats = 2\n" + HEAD + text).conditions if c.drive]
+        return [
+            c.drive.values for c in planned(tmp_path, "repeats = 2\n" + HEAD + text).conditions if c.drive
+        ]
 
     drawn = inputs(BAND + "seed = 4")
     assert all(not np.array_equal(drawn[0], other) for other in drawn[1:])
@@ -71,7 +68,7 @@ def test_drawn_inputs_differ_from_run_to_run_and_are_those_of_the_seed(tmp_path:
 def test_a_file_is_read_at_the_times_of_the_samples(tmp_path: Path, hold: str) -> None:
     rows = "time_s,moment_nm\n" + "".join(f"{5 + 0.25 * i},{(-1) ** (i // 2) * (1 + i)}\n" for i in range(41))
     (tmp_path / "input.csv").write_text(rows, encoding="utf-8")
-    plan = load(tmp_path, HEAD + f'[drive]\nkind = "file"\nfile = "input.csv"\nhold = "{hold}"')
+    plan = planned(tmp_path, HEAD + f'[drive]\nkind = "file"\nfile = "input.csv"\nhold = "{hold}"')
     (first, second) = (c.drive for c in plan.conditions)
     assert [c.id for c in plan.conditions] == ["s5-v0-file", "s5-v10-file"]
     assert first is not None
@@ -84,7 +81,7 @@ def test_a_file_is_read_at_the_times_of_the_samples(tmp_path: Path, hold: str) -
 
 
 def test_a_square_wave_is_one_of_the_kinds(tmp_path: Path) -> None:
-    drive = load(tmp_path, HEAD + SINE.replace('"sine"', '"square"')).conditions[0].drive
+    drive = planned(tmp_path, HEAD + SINE.replace('"sine"', '"square"')).conditions[0].drive
     assert drive is not None
     assert np.array_equal(drive.values, 0.1 * square(TIME, 2.0))
 
@@ -153,7 +150,7 @@ def test_a_bad_drive_is_refused_in_one_line(tmp_path: Path, case: str) -> None:
     for name, content in FILES.items():
         (tmp_path / f"{name}.csv").write_text(content, encoding="utf-8")
     with pytest.raises(TunnelError, match=message) as caught:
-        load(tmp_path, text)
+        planned(tmp_path, text)
     assert str(tmp_path / "plan.toml") in str(caught.value)
     assert caught.value.remedy
     assert str(caught.value).isprintable()

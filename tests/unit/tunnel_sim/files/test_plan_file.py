@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.plans import planned
 from tunnel_sim.files.plan_file import load_plan, paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -20,14 +21,8 @@ truth.cn_r = -0.1033
 """
 
 
-def load(tmp_path: Path, text: str):
-    path = tmp_path / "plan.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_plan(path)
-
-
 def test_every_combination_once_in_the_stated_order(tmp_path: Path) -> None:
-    plan = load(tmp_path, SMALL)
+    plan = planned(tmp_path, SMALL)
     assert [c.id for c in plan.conditions] == [
         f"s{s}-v{v}-a{a}" for s in (5, 8) for v in (0, 10) for a in ("20", "-8.5")
     ]
@@ -41,21 +36,21 @@ def test_every_combination_once_in_the_stated_order(tmp_path: Path) -> None:
 
 
 def test_repeats_get_ids_of_their_own(tmp_path: Path) -> None:
-    plan = load(tmp_path, "repeats = 3\n" + SMALL)
+    plan = planned(tmp_path, "repeats = 3\n" + SMALL)
     assert len(plan.conditions) == 24
     assert len({c.id for c in plan.conditions}) == 24
     assert [c.id for c in plan.conditions[:3]] == ["s5-v0-a20-1", "s5-v0-a20-2", "s5-v0-a20-3"]
 
 
 def test_stiffnesses_stand_beside_or_instead_of_numbers(tmp_path: Path) -> None:
-    both = load(tmp_path, "spring_stiffness = [30.5]\n" + SMALL)
+    both = planned(tmp_path, "spring_stiffness = [30.5]\n" + SMALL)
     assert [c.spring_stiffness for c in both.conditions[::4]] == [16.12, 44.84, 30.5]
-    alone = load(tmp_path, "spring_stiffness = [30.5]\n" + SMALL.replace("springs = [5, 8]\n", ""))
+    alone = planned(tmp_path, "spring_stiffness = [30.5]\n" + SMALL.replace("springs = [5, 8]\n", ""))
     assert {c.id.split("-")[0] for c in alone.conditions} == {"k30.5"}
 
 
 def test_what_is_not_stated_comes_from_the_rig(tmp_path: Path) -> None:
-    plan, rig = load(tmp_path, SMALL), load_rig()
+    plan, rig = planned(tmp_path, SMALL), load_rig()
     assert plan.truth.yaw_inertia == rig.dynamics.yaw_inertia
     assert plan.truth.mechanical_damping == rig.dynamics.mechanical_damping
     assert {c.air_density for c in plan.conditions} == {rig.air.density}
@@ -70,7 +65,7 @@ def test_what_is_stated_is_taken(tmp_path: Path) -> None:
         "sensor.resolution = 0\nsensor.zero = -0.01\n"
         '[[effects]]\nname = "b"\nparameters = { y = 2, x = 0.1 }\n[[effects]]\nname = "a"\n'
     )
-    plan = load(tmp_path, text)
+    plan = planned(tmp_path, text)
     assert (plan.truth.yaw_inertia, plan.truth.mechanical_damping) == (0.2, 0.0)
     assert plan.sensor == SensorModel(resolution=0.0, zero=-0.01)
     assert plan.effects == (EffectSetting("b", {"y": 2.0, "x": 0.1}), EffectSetting("a"))
@@ -137,7 +132,7 @@ BAD = {
 def test_a_bad_plan_is_refused_in_one_line(tmp_path: Path, case: str) -> None:
     text, message = BAD[case]
     with pytest.raises(TunnelError, match=message) as caught:
-        load(tmp_path, text)
+        planned(tmp_path, text)
     assert str(tmp_path / "plan.toml") in str(caught.value)
     assert caught.value.remedy
     assert str(caught.value).isprintable()

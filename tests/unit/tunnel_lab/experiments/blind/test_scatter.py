@@ -6,10 +6,11 @@ import json
 
 import pytest
 
+from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
 from tests.unit.tunnel_lab.experiments.blind.test_score import TRUTH, document
 from tunnel_lab.experiments.blind import page as blind
-from tunnel_lab.experiments.blind.cases import SCATTERING, case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter import scatter_score
 from tunnel_lab.experiments.blind.score import Score
 
@@ -23,7 +24,7 @@ def width(value, low, high, *, shown=True):
 
 def spreads(said):
     """What an answer says of the scatter, by number."""
-    effects = {number: name for name, number in SCATTERING.items()}
+    effects = {number: name for name, number in SCATTERS.items()}
     return {"spreads": [{"effect": effects[number], **one} for number, one in said.items()]}
 
 

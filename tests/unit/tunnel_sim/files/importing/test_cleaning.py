@@ -5,6 +5,7 @@ Truth: closed-form decays, and what a hand or a logger was made to do to them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts
 from tunnel_sim.files.importing.column_numbers import without_overflow
 from tunnel_sim.files.importing.records import read_records
-from tunnel_sim.files.importing.releases import find_runs, find_runs_of_rate
+from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.vocabulary.record import Array
 
 
 def held(angle: float, seconds: float) -> np.ndarray:
@@ -32,29 +34,20 @@ def uniform(reading: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_free_decay_is_not_cut(seed: int) -> None:
-    rng = np.random.default_rng([7, seed])
+@pytest.mark.parametrize(("find", "stream", "logarithm"), [(find_runs, 7, 5.0), (find_runs_of_rate, 8, 4.0)])
+def test_a_free_decay_of_angles_or_rates_is_not_cut(
+    seed: int, find: Callable[[Array, Array], list[RecordPiece]], stream: int, logarithm: float
+) -> None:
+    """It may end where the motion has fallen to e to the minus ``logarithm``."""
+    rng = np.random.default_rng([stream, seed])
     time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
     phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
     omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
-    angle = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
-    angle += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
-    (piece,) = find_runs(time, angle)
+    values = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
+    values += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
+    (piece,) = find(time, values)
     assert piece.first == 0
-    assert piece.last == time.size or zeta * omega * time[-1] > 5.0
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_free_decay_of_rates_is_not_cut(seed: int) -> None:
-    rng = np.random.default_rng([8, seed])
-    time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
-    phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
-    omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
-    rate = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
-    rate += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
-    (piece,) = find_runs_of_rate(time, rate)
-    assert piece.first == 0
-    assert piece.last == time.size or zeta * omega * time[-1] > 4.0
+    assert piece.last == time.size or zeta * omega * time[-1] > logarithm
 
 
 @pytest.mark.parametrize("hold", [0.0, 2.0])
