@@ -17,7 +17,7 @@ from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth

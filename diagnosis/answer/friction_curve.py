@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
-from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.quantities import Angles, Rates
 from tunnel_sim.vocabulary.record import Array
 

@@ -17,9 +17,10 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment, Lines
 from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import run_dtype
-from tunnel_sim.physics.run_settings import DriveMoment, Lines, Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives

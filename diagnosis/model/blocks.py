@@ -12,7 +12,7 @@ from diagnosis.model.run_data import Data, RunData, Samples
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
-from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.

@@ -18,8 +18,9 @@ from diagnosis.model.parameters import GAIN, Parameter, released
 from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive

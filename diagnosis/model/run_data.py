@@ -14,7 +14,8 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.run_noise import RunNoise
 from diagnosis.model.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.settings import Settings
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record

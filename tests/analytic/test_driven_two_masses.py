@@ -15,8 +15,9 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment, RodTwist, RunSettings
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 

@@ -20,8 +20,8 @@ from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment
 
 RIG = load_rig()
 FREE = dataclasses.replace(

@@ -37,8 +37,8 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.plan import SensorModel
 
 RIG = load_rig()

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.effects.traits import Text
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"

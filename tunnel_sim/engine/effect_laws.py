@@ -17,8 +17,9 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment, Motion, RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.plan import (

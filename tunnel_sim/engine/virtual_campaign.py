@@ -17,7 +17,8 @@ from tunnel_sim.effects.between_runs import BetweenRuns
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.moment_law import parameter_names
-from tunnel_sim.physics.run_settings import DriveMoment, RodTwist, RunSettings, Series
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.quantities import Laws, PerRun, SpeedPerRun, StiffnessPerRun
 from tunnel_sim.vocabulary.record import Array

@@ -19,7 +19,8 @@ from math import ceil, inf, isfinite, log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness

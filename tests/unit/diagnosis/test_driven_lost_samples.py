@@ -14,8 +14,9 @@ from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel

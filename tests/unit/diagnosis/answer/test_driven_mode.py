@@ -12,7 +12,8 @@ from scipy.signal import lfilter
 
 from diagnosis.search.investigate import nominal_study
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError

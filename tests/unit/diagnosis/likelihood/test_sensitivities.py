@@ -10,7 +10,7 @@ from diagnosis.likelihood.sensitivities import motion_changes, moves
 from diagnosis.model.parameters import Point
 from tests.unit.diagnosis.likelihood.test_least_squares import SIX, prepared
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
-from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment
 
 NOMINAL = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, "cn_r": -0.11, "zero": 0.004}
 #: Parameters that take finite differences: a law, or samples of the wind, that exist on one side only.

@@ -29,7 +29,7 @@ from tests.reference.robot_joints import (
     robot_campaign,
 )
 from tests.support.robots import KINDS, RUBS, TRUE, inertia, near, own_model
-from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError

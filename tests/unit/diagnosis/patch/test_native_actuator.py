@@ -28,7 +28,8 @@ from tunnel_sim.engine.joint_patch import (
     simulate_joint,
 )
 from tunnel_sim.physics.actuator import Actuator
-from tunnel_sim.physics.run_settings import DriveMoment, Motion
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign
 
 pytestmark = pytest.mark.usefixtures("models_in_this_process")

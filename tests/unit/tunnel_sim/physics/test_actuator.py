@@ -27,8 +27,8 @@ from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.actuator import Actuator, Samples
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError

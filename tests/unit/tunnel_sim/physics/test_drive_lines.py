@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 DURATION = 3.0  # s
