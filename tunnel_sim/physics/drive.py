@@ -188,9 +188,9 @@ def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
     within = np.searchsorted(ends, starts, side="right") - 1
     impulse = length * (level + slope * length / 2.0)
     product = (starts - ends[within]) * impulse + length**2 * (level / 2.0 + slope * length / 3.0)
-    integral: Array = np.bincount(within, impulse, last)
-    of_product: Array = np.bincount(within, product, last)
-    return integral, of_product
+    integrals = (np.bincount(within, values, last) for values in (impulse, product))
+    first, second = (np.asarray(values, np.float64) for values in integrals)
+    return first, second
 
 
 class _Same:
@@ -218,7 +218,7 @@ def _lines_of_samples(time_s: _Same, values: _Same, held: bool, delay: float) ->
 def _lines_of_steps(
     time_s: _Same, values: _Same, held: bool, delay: float, step: Seconds, steps: int
 ) -> Lines:
-    ends = step * np.arange(steps + 1)
+    ends = np.asarray(step * np.arange(steps + 1), np.float64)
     impulse, product = _impulses(DriveMoment(time_s.array, values.array, delay=delay, held=held), ends)
     slopes = 12.0 * (product - impulse * step / 2.0) / step**3
     return Lines(

@@ -188,14 +188,13 @@ class InStretches(View):
     def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
         """The sets with one effect more, from the better of two starts where there are two."""
         data, chosen = self.prepared.nominal.problem.data, self.base.settings.search
-        following = [h for h in level if h.effects and not misses_motion(h.fit)]
-        lost = [h.short for h in level if h.short is not None and h not in following]
-        tried = sets_with_one_more(lost, self.able, progress)
+        tried = sets_with_one_more([h.short for h in level if h.short is not None], self.able, progress)
         grown: dict[tuple[str, ...], Hypothesis] = {}
         for h in sorted(tried, key=lambda h: h.fit.total)[: chosen.fitted_longer]:
             with suppress(FitError, np.linalg.LinAlgError):
                 longer, _ = fit_longer(h.fit, self.short, data, long_stretch(self.short))
                 grown[h.names] = replace(h, fit=longer, short=h)
+        following = [h for h in level if h.effects and not misses_motion(h.fit)]
         for child in sets_with_one_more(following, self.able, progress):
             other = grown.get(child.names)
             if other is None or child.fit.total < other.fit.total:
