@@ -233,7 +233,7 @@ def test_an_exception_fails_the_check(tunnel) -> None:
     status, _, err = tunnel("score", "--jobs", "0", "--check", "base.parquet")
     assert (status, err.count("\n")) == (2, 1)
     assert (
-        "the baseline has mine, which no installed package adds; name a class of your own again with -e"
+        "the baseline has mine, which no installed package adds; name your own class again with -e"
         in err
     )
     status, out, err = tunnel("score", "--jobs", "0", "--check", "base.parquet", "-e", "own_method:Mine")
