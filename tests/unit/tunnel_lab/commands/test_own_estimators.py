@@ -232,10 +232,7 @@ def test_an_exception_fails_the_check(tunnel) -> None:
     assert tunnel("score", *here, "-e", "own_method:Mine", "--write-baseline", "base.parquet")[0] == 0
     status, _, err = tunnel("score", "--jobs", "0", "--check", "base.parquet")
     assert (status, err.count("\n")) == (2, 1)
-    assert (
-        "the baseline has mine, which no installed package adds; name your own class again with -e"
-        in err
-    )
+    assert "the baseline has mine, which no installed package adds; name your own class again with -e" in err
     status, out, err = tunnel("score", "--jobs", "0", "--check", "base.parquet", "-e", "own_method:Mine")
     assert (status, err) == (0, "")
     assert "to the last bit" in out
