@@ -194,12 +194,14 @@ static void check_forward(void) {
 }
 
 static void check_slopes(void) {
-  enum { kSamples = 200, kRuns = 5, kTerms = VWT_TERM_COUNT, kColumns = kTerms + VWT_MOST_WINDS, kWinds = 3 };
+  enum { kSamples = 200, kRuns = 5, kTerms = VWT_TERM_COUNT, kColumns = kTerms + VWT_MOST_CHANGES, kWinds = 3,
+         kDrives = 4 };
   static double angle[kRuns][kSamples], rate[kRuns][kSamples];
   static double by_angle[kRuns][kColumns * kSamples], by_rate[kRuns][kColumns * kSamples];
   double *angles[kRuns], *rates[kRuns], *by_angles[kRuns], *by_rates[kRuns], values[kRuns * VWT_TERM_COUNT];
   const double wind[kWinds] = {18, 16, 19}, sums[] = {0.5, 0.5, 0.01, -0.01}, *weights[kRuns], *winds[kRuns];
-  static const double changes[VWT_MOST_WINDS * kWinds];
+  const double drive[kDrives] = {1, -1, 2, 0}, drive_time[kDrives] = {0, 0.1, 0.2, 0.3}, drive_slope[kDrives] = {-20, 30};
+  static const double changes[VWT_MOST_CHANGES * 2 * kDrives];
   vwt_parameters p[kRuns];
   vwt_run runs[kRuns];
   int columns[kColumns];
@@ -220,6 +222,14 @@ static void check_slopes(void) {
       runs[i] = (vwt_run){.wind = wind, .wind_count = sampled ? kWinds : 1, .wind_interval = 0.1,
                           .angle = 0.3 + 0.01 * i, .lagged = 0.3, .step = 0.002,
                           .steps = features & 1 ? 2 : 1, .stride = 3, .samples = kSamples};
+      if (i == 4) {
+        runs[i].moment = drive;
+        runs[i].moment_time = drive_time;
+        runs[i].moment_slope = drive_slope;
+        runs[i].moment_count = kDrives;
+        runs[i].moment_interval = 0.1;
+        runs[i].moment_scale = 0.5;
+      }
       angles[i] = angle[i];
       rates[i] = rate[i];
       by_angles[i] = by_angle[i];
