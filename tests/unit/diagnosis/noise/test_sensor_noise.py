@@ -9,6 +9,7 @@ from scipy.stats import binom, chi2
 from diagnosis.facts.found import Fact
 from diagnosis.noise.sensor_noise import (
     LEAST_SAMPLES,
+    SmoothCurve,
     accuracy,
     campaign_noise,
     driven_variance,
@@ -264,3 +265,16 @@ def test_the_noise_of_the_shortest_record_is_that_which_was_added() -> None:
         found.append((variance / level**2 - 1.0) / relative)
     # the mean of 40 values of unit variance: beyond this once in ten thousand
     assert abs(np.mean(found)) < 3.9 / np.sqrt(40.0)
+
+
+@pytest.mark.parametrize("burst", [1.0, 0.3, 1e-5], ids=["even", "uneven", "bursts"])
+def test_residuals_from_a_smooth_curve_do_not_depend_on_the_clock(burst):
+    """A logger may write samples in bursts, a few microseconds apart, with pauses between them."""
+    rng = np.random.default_rng(9)
+    time = np.cumsum(np.where(rng.random(600) < 0.1, 1.0, burst))
+    curve = SmoothCurve(time, 5)
+    polynomial = ((time - time[0]) / (time[-1] - time[0]) - 0.4) ** 5
+    inside = curve.left(rng.normal(size=time.size)[:, None] + 1e3 * polynomial[:, None] * [0.0, 1.0])
+    np.testing.assert_allclose(inside[:, 0], inside[:, 1], atol=1e-6)  # a quintic is a curve too
+    again = curve.left(inside[:, 0])  # and nothing of a curve is left in residuals
+    np.testing.assert_allclose(again, inside[:, 0], atol=1e-6)
