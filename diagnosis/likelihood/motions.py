@@ -75,7 +75,8 @@ class Motions:
     Args:
         law: shape (n, parameters), in the law's order.
         rows: of `run_dtype`, shape (n,).
-        kept: arrays that the rows point to, beside ``winds``, by run.
+        kept: arrays that the rows point to, beside ``winds``, by run: first the samples of its wind, or the values
+            and slopes of its input.
         winds: wind speeds that the rows point to, m/s, shape (n,).
         blocks: duration of each motion in block means, shape (n,).
         ringing: of a rod, to be added, by run.

@@ -439,8 +439,8 @@ class SecondMode(Effect):
 class InputDelay(Effect):
     """An input that acts later than its time stamps.
 
-    It serves both holds and any delay: a step that contains a kink has the input's impulse. Beyond its samples
-    the input keeps its first and its last value.
+    Both holds and any delay are exact in a single motion. In a fit, a step that contains a kink keeps the impulse
+    and the first moment of the input. Beyond its samples the input keeps its first and its last value.
     """
 
     name = "input_delay"

@@ -26,7 +26,7 @@ _EVEN = 1e-6  # of an interval: a smaller departure from even samples is roundin
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """An input as a line from each of its samples to the next, as the integrator takes it side by side.
+    """An input as straight lines, in the form in which runs are integrated side by side.
 
     Args:
         time_s: of the samples, even, each at the start of a step.
@@ -145,8 +145,8 @@ class DriveMoment:
             step: of the integration.
             steps: number of steps.
             sampled: whether a line runs from sample to sample, which are at the starts of steps; else there is
-                one for each step, with the impulse of the input and its product with the time. The motion of
-                a body then differs by less than the order of step².
+                one for each step, with the impulse and the first moment of the input there. The motion of a body
+                then differs by less than the order of step².
         """
         of = _Same(self.time_s), _Same(self.values), self.held, self.delay
         return _lines_of_samples(*of) if sampled else _lines_of_steps(*of, step, steps)
@@ -179,7 +179,7 @@ def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
 
 
 def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
-    """Integrals of an input's delayed samples between times, and of their products with the time since the last."""
+    """Impulses of an input's delayed samples between times, and their first moments about the earlier time."""
     kinks = drive.time_s + drive.delay
     inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
     starts = np.sort(np.concatenate([ends[:-1], inside]), kind="stable")  # of two sorted parts: fast

@@ -62,7 +62,7 @@ def test_the_motion_is_that_of_the_samples(held, delay):
     assert errors[1] < errors[0] / 4.0
 
 
-def test_a_line_has_the_impulse_of_the_input_and_its_product_with_the_time():
+def test_a_line_has_the_impulse_and_the_first_moment_of_the_input():
     drive = DriveMoment(*jittered(np.random.default_rng(4)), delay=0.002)
     lines = drive.lines(0.02, 100, sampled=False)
     fine = np.linspace(0.0, 0.02, 20001)
