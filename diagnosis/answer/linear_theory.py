@@ -10,7 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
 from identification.statistics import scatter_of_runs

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, project_release
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.normal_equations import project_release
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.quantities import Seconds

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, damped_step, try_fit
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.normal_equations import damped_step
 from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 

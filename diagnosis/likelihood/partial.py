@@ -7,7 +7,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.likelihood.least_squares import Fit, clip, damped_step, scaled_residuals
+from diagnosis.likelihood.least_squares import Fit, clip, scaled_residuals
+from diagnosis.likelihood.normal_equations import damped_step
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array

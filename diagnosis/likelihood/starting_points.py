@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.between_runs import Between, width_prior
-from diagnosis.likelihood.least_squares import Fit, Products, clip, damped_step, normal_equations
+from diagnosis.likelihood.least_squares import Fit, clip
+from diagnosis.likelihood.normal_equations import Products, damped_step, normal_equations
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit

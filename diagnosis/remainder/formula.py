@@ -16,9 +16,10 @@ import numpy as np
 from scipy.special import chdtri
 
 from diagnosis.likelihood.ceiling import Normal, Ridge, Unexplained, held_out, total
-from diagnosis.likelihood.least_squares import Fit, FitError, fit, normal_equations
+from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.paths import Ranges
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
@@ -294,24 +295,10 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
 
 
 def predicted_drop(base: Fit, formula: Formula, kind: str) -> float:
-    """Drop of χ² that linear theory predicts for a formula beside a fit's effects; 0 where it has no motion."""
+    """Drop of χ² that linear theory predicts for a formula beside a fit's effects; 0 where none is predicted."""
     stated = _stated(base, formula, kind)
-    if stated is None:
-        return 0.0
-    _, problem, start = stated
-    runs = zip(problem.data.runs, problem.predict([start])[0], base.residuals, base.jacobian, strict=True)
-    changed, zero = [], base.problem.predict([base.point])[0]
-    for (run, moved, _, (common, release)), still in zip(runs, zero, strict=True):
-        changed.append((np.column_stack([common, run.scaled(moved - still)]), release))
-    if not all(np.isfinite(common).all() for common, _ in changed):
-        return 0.0
-    matrix, gradient, _ = normal_equations(changed, base.residuals)
-    width = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inner = matrix / np.outer(width, width)
-    solved = np.linalg.pinv(inner[:-1, :-1], rcond=1e-11, hermitian=True) @ inner[:-1, -1]
-    left = 1.0 - inner[-1, :-1] @ solved
-    along = (gradient[-1] - solved @ (gradient[:-1] * width[-1] / width[:-1])) / width[-1]
-    return float(along**2 / left) if left > 1e-6 else 0.0
+    starts = [] if stated is None else starting_points(base, stated[1].effects[-1])
+    return max((start.predicted_drop for start in starts), default=0.0)
 
 
 def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Problem, Point] | None:

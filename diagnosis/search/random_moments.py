@@ -16,7 +16,8 @@ import numpy as np
 from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
-from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, fit_at, try_fit
+from diagnosis.likelihood.normal_equations import by_run
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import starting_points

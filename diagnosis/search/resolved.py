@@ -11,7 +11,8 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.likelihood.least_squares import Fit, Products, fit_at, normal_equations
+from diagnosis.likelihood.least_squares import Fit, fit_at
+from diagnosis.likelihood.normal_equations import Products, normal_equations
 from diagnosis.likelihood.partial import fit_seen
 from tunnel_sim.vocabulary.record import Array
 

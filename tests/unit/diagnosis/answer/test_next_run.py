@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.next_run import planned_run, separating_run, separation
-from diagnosis.likelihood.least_squares import fit, normal_equations
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points

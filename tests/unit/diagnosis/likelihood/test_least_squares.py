@@ -7,16 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import lsq_linear
 
-from diagnosis.likelihood.least_squares import (
-    FitError,
-    bounded_step,
-    clip,
-    fit,
-    normal_equations,
-    project_release,
-    scaled_residuals,
-)
+from diagnosis.likelihood.least_squares import FitError, clip, fit, scaled_residuals
 from diagnosis.likelihood.motions import condensed
+from diagnosis.likelihood.normal_equations import bounded_step, normal_equations, project_release
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import nominal_start

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.least_squares import by_run
+from diagnosis.likelihood.normal_equations import by_run
 from identification import identify
 from identification.estimators import SUMMARIES
 from tests.reference.free_decays import Setting, campaign
