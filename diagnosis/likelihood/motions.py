@@ -18,8 +18,9 @@ from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.drive import DriveMoment, Lines
-from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
+from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import run_dtype
+from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
@@ -107,8 +108,7 @@ class Motions:
         slow = {
             place: found
             for place, twist in enumerate(physics.rod_twist)
-            if twist is not None
-            and (found := _apart(physics, place, asked, rig, whole=asked.rod_followed or bool(driven[place])))
+            if twist is not None and (found := _apart(physics, place, asked, rig))
         }
         rows, winds = np.zeros(count, run_dtype()), physics.wind_speed.copy()
         rows["angle"] = rows["lagged"] = physics["release_angle"]
@@ -331,22 +331,21 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
 
 
 def _apart(
-    physics: SettingsTable, place: int, asked: Asked, rig: Rig, *, whole: bool
+    physics: SettingsTable, place: int, asked: Asked, rig: Rig
 ) -> tuple[float, float, float, Ringing] | None:
-    """Replace a run with a flexible rod by its slow motion.
-
-    Args:
-        whole: whether the rod is followed, unless it is too stiff to ring.
+    """Replace a run with a flexible rod by its slow motion; one that is followed, by a rod that it can follow.
 
     Returns:
         The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing to be
         added, where it was separated.
     """
     run = physics.row(place)
-    run = released_by_spring_end(condensed(run, asked.data) if whole else run)
-    slow = None if whole else slow_motion(run, rig)
-    physics.put(place, run if slow is None else slow.run)
-    return None if slow is None else (slow.lead, slow.rod_stiffness, slow.body_release, slow.ringing)
+    slow = None if asked.rod_followed else slow_motion(released_by_spring_end(run), rig)
+    if slow is None:
+        physics.put(place, released_by_spring_end(condensed(run, asked.data)))
+        return None
+    physics.put(place, slow.run)
+    return slow.lead, slow.rod_stiffness, slow.body_release, slow.ringing
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects.chain import reads_plainly
+from tunnel_sim.physics.rod_modes import Ringing
 from tunnel_sim.physics.slopes import most_changes, slopes, terms
 from tunnel_sim.vocabulary.record import Array
 
@@ -36,14 +38,15 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod twists, or it is read at times of its own.
+        no derivative, its rod is followed, or it is read at times of its own.
     """
-    acting = {type(effect) for effects in asked.effects for effect in effects}
-    if any(effect.skips for effect in acting) or any(asked.physics.rod_twist):
-        points = len(asked.runs) // count - 1
-        return [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
-    motions = Motions.of(asked, like=count)
     points = len(asked.runs) // count - 1
+    unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
+    if any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects}):
+        return unknown
+    motions = Motions.of(asked, like=count)
+    if motions.rows["twist_stiffness"].any():
+        return unknown
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
     moved = np.swapaxes(values[1:] - values[0], 0, 1)
     sampled = [_samples(motions, place, count) for place in range(count)]
@@ -116,12 +119,19 @@ def _part(
     lost |= resampled & ~np.isin(np.arange(points), along)
     found.by_angle[unknown] = 0.0
     result = list(steps @ found.by_angle)
+    ringing = {}
+    for number, (place, run) in enumerate(zip(part, runs, strict=True)):
+        if any(motions.ringing[place::count]):
+            ringing[number] = _ringing(motions.ringing[place::count], run, blocks)
+            result[number] += ringing[number][1:] - ringing[number][0]
     if reads_plainly(effects):
         zeros = asked.zero.reshape(points + 1, count)[:, part]
         for change, beside in zip(result, (zeros[1:] - zeros[0]).T, strict=True):
             change += beside[:, None]
     else:
         means = block_means(runs, found.angle, found.rate)
+        for number, added in ringing.items():
+            means[number] += added[0]
         result = [
             _read(asked, range(place, len(asked.runs), count), mean, change)
             for place, mean, change in zip(part, means, result, strict=True)
@@ -129,6 +139,13 @@ def _part(
     for change, without in zip(result, lost, strict=True):
         change[without] = np.nan
     return result
+
+
+def _ringing(ringing: Sequence[Ringing | None], run: RunData, blocks: int) -> Array:
+    """Block means of what a rod adds to the slow motion of a run at each point, rad, shape (points, blocks)."""
+    none = np.zeros(blocks + 1)
+    added = [(none, none) if one is None else one.added(none, none, run.interval) for one in ringing]
+    return block_means([run] * len(added), np.stack([a for a, _ in added]), np.stack([r for _, r in added]))
 
 
 def _read(asked: Asked, places: Sequence[int], mean: Array, moved: Array) -> Array:

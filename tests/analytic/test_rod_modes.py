@@ -9,8 +9,10 @@ import pytest
 
 from tests.analytic.law_cases import RIG
 from tests.marks import slow
-from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
+from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
+from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.physics.steps import compensated, fit_stride
@@ -73,6 +75,18 @@ def test_a_linear_rig_is_separated_exactly(compliance, share, speed):
 )
 def test_nonlinear_terms_err_far_less_than_the_rod_does(terms, tolerance):
     settings = run(**terms)
+    error = np.max(np.abs(separated(settings) - followed(settings)))
+    rigid = replace(settings, rod_twist=None, release_angle=spring_end_angle(settings))
+    assert error < tolerance < 0.02 * np.max(np.abs(followed(rigid) - followed(settings)))
+
+
+@pytest.mark.parametrize("on_body", [True, False])
+@pytest.mark.parametrize(("terms", "tolerance"), [({}, 2e-6), ({"stiffness_cubic": -0.1}, 4e-4)])
+def test_the_input_of_a_driven_run_excites_both_oscillations(terms, tolerance, on_body):
+    time = INTERVAL * np.arange(SAMPLES)
+    values = np.repeat(np.random.default_rng(3).standard_normal(SAMPLES // 25 + 1), 25)[:SAMPLES]
+    drive = DriveMoment(time, values, on_body=on_body, held=True)
+    settings = replace(run(speed=0.0, **terms), drive=drive)
     error = np.max(np.abs(separated(settings) - followed(settings)))
     rigid = replace(settings, rod_twist=None, release_angle=spring_end_angle(settings))
     assert error < tolerance < 0.02 * np.max(np.abs(followed(rigid) - followed(settings)))

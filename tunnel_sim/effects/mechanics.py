@@ -232,6 +232,17 @@ class RodFlexibility(Effect):
             dataclasses.replace(run, rod_twist=RodTwist(self.compliance, self.inertia_share))
         )
 
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Let the rods twist."""
+        del stated, drawn
+        columns = (cls.column(effects, name).tolist() for name in ("compliance", "inertia_share"))
+        for place, (compliance, share) in enumerate(zip(*columns, strict=True)):
+            if compliance:
+                runs.rod_twist[place] = RodTwist(compliance, share)
+
 
 @dataclass(frozen=True)
 class SpringMiscalibration(Effect):

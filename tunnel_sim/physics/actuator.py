@@ -247,7 +247,19 @@ def _shortest(time: Array, width: Array) -> Array:
 
 
 def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
-    """States of x_k = factor_k x_(k−1) + added_k from x_(−1) = 0, shape (n,), real or complex."""
+    """States of x_k = factor_k x_(k−1) + added_k from x_(−1) = 0, real or complex.
+
+    Args:
+        factor: shape (n,), or one number for all.
+        added: shape (n,).
+
+    Returns:
+        Shape (n,).
+    """
+    if factor.ndim == 0:
+        from scipy.signal import lfilter  # only here: slow to load
+
+        return np.asarray(lfilter(np.ones(1), np.array([1.0, -factor.item()]), added))
     factor, state, reach = factor.copy(), added.copy(), 1
     while reach < state.size:  # each round covers twice as many steps
         state[reach:] += factor[reach:] * state[:-reach]

@@ -162,10 +162,29 @@ class DriveMoment:
             time_s: since the run's start, at which it begins at rest.
             derivative: which derivative of q is returned, per s or s²: 0, 1 or 2.
         """
+        ringing = np.sqrt(1.0 - damping_ratio**2)
+        pole = frequency * complex(-damping_ratio, ringing)
+        response = (pole**derivative * self.mode(pole, time_s)).imag
+        if derivative == 2:
+            response = response + pole.imag * self.scale * _pieces(self.acting, np.maximum(time_s, 0.0))[0]
+        moment: Moments = frequency / ringing * response
+        return moment
+
+    def mode(self, root: complex, time_s: Times) -> np.ndarray:
+        """The state z of a mode that is at rest at first and excited by the moment u: ż = root · z + u, N m s.
+
+        Exact for both holds.
+
+        Args:
+            root: 1/s.
+            time_s: since the run's start, s, shape (n,).
+
+        Returns:
+            Complex, shape (n,).
+        """
         acting = self.acting
         of = _Same(acting.time_s), _Same(acting.values), acting.held, acting.delay
-        moment: Moments = self.scale * _oscillation(*of, frequency, damping_ratio, _Same(time_s), derivative)
-        return moment
+        return self.scale * _mode(*of, root, _Same(time_s))
 
 
 def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
@@ -226,38 +245,57 @@ def _lines_of_steps(
     )
 
 
-@lru_cache(maxsize=64)
-def _oscillation(
-    times: _Same,
-    values: _Same,
-    held: bool,
-    delay: float,
-    frequency: RadPerS,
-    damping_ratio: Number,
-    at: _Same,
-    derivative: int,
-) -> PerSample:
-    """As `DriveMoment.oscillation`, in the unit of the samples."""
-    drive, time_s = DriveMoment(times.array, values.array, delay=delay, held=held), at.array
-    ringing = np.sqrt(1.0 - damping_ratio**2)
-    pole = frequency * complex(-damping_ratio, ringing)
-    kinks = drive.time_s + drive.delay
-    starts = np.concatenate([[0.0], kinks[kinks > 0.0]])
-    level, slope = _pieces(drive, starts)
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """An input as straight lines from the run's start on, and the places of some times on them.
 
-    def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
-        turn = pole * since
+    Args:
+        lengths: of the lines but the last, s, shape (lines − 1,), or one number for all.
+        level, slope: of the lines, in the unit of the samples, and per s, shape (lines,).
+        line: on which each time is, shape (n,).
+        since: time since that line's start, s, shape (n,); None where every time is at one.
+    """
+
+    lengths: Array | float
+    level: PerSample
+    slope: PerSample
+    line: NDArray[np.intp]
+    since: Times | None
+
+
+@lru_cache(maxsize=64)
+def _course(times: _Same, values: _Same, held: bool, delay: float, at: _Same) -> _Course:
+    drive, time_s = DriveMoment(times.array, values.array, delay=delay, held=held), at.array
+    within = _EVEN * drive.interval
+    kinks = drive.time_s + delay
+    starts = np.concatenate([[0.0], kinks[kinks > within]])
+    level, slope = _pieces(drive, starts + within)
+    lengths: Array | float = np.diff(starts)
+    if drive.interval and np.all(np.abs(lengths - drive.interval) <= within):
+        lengths = drive.interval
+    line = np.maximum(np.searchsorted(starts, time_s + within, side="right") - 1, 0)
+    since = np.maximum(time_s - starts[line], 0.0)
+    apart = np.max(since, initial=0.0) > within
+    return _Course(lengths, level - slope * within, slope, line, since if apart else None)
+
+
+@lru_cache(maxsize=64)
+def _mode(times: _Same, values: _Same, held: bool, delay: float, root: complex, at: _Same) -> np.ndarray:
+    """As `DriveMoment.mode`, in the unit of the samples and s."""
+    course = _course(times, values, held, delay, at)
+
+    def forced(since: Array | float, level: Array, slope: Array) -> np.ndarray:  # from z = 0
+        turn = root * since
         grown = np.expm1(turn)
-        found: np.ndarray = level[j] * grown / pole + slope[j] * (grown - turn) / pole**2
+        found: np.ndarray = level * (grown / root) + slope * ((grown - turn) / root**2)
         return found
 
-    factor = np.exp(pole * np.diff(starts))
-    state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
-    state = recurrence(np.concatenate([[0j], factor]), state)  # z at the starts
-    j = np.maximum(np.searchsorted(starts, time_s, side="right") - 1, 0)
-    since = np.maximum(time_s - starts[j], 0.0)
-    state = np.exp(pole * since) * state[j] + forced(j, since)
-    response = (pole**derivative * state).imag
-    if derivative == 2:
-        response = response + pole.imag * (level[j] + slope[j] * since)
-    return read_only(frequency / ringing * response)
+    factor = np.exp(root * course.lengths)
+    added = forced(course.lengths, course.level[:-1], course.slope[:-1])
+    state = np.concatenate([[0j], recurrence(factor, added)])  # at the starts of lines
+    found = state[course.line]
+    if course.since is not None:
+        beyond = forced(course.since, course.level[course.line], course.slope[course.line])
+        found = np.exp(root * course.since) * found + beyond
+    found.flags.writeable = False
+    return found

@@ -6,18 +6,14 @@ friction. Tests compare it with the MuJoCo model for every term. Calls release t
 
 from __future__ import annotations
 
-import cmath
-import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling, spring_end_angle
-from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
-from tunnel_sim.vocabulary.quantities import Angles, Hertz, Laws, Rad, Rates, Seconds
+from tunnel_sim.vocabulary.quantities import Angles, Hertz, Laws, Rad
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -124,130 +120,3 @@ def backlash(angle: Angles, half_width: Rad, start: Rad) -> Angles:
     result = np.empty_like(source)
     forward_library().vwt_backlash(source.size, source.ctypes.data, half_width, start, result.ctypes.data)
     return result
-
-
-# A rod rings many times faster than the body swings and decays soon, but an integrator has to resolve it to the
-# end. Here the two oscillations of the linear rig are separated instead. The slow one is integrated with a rigid
-# rod whose inertia, damping and lead of the body give its exact frequency, damping and shape. The ringing is added
-# in closed form. Nonlinear terms act only on the slow motion.
-
-#: How many times faster than the body the rod must ring for the two to be separated.
-SEPARATION = 5.0
-_GONE = 1e-9  # rad: ringing below this is not computed
-_MOST_ITERATIONS = 60
-_CONVERGED = 1e-14  # relative
-
-
-@dataclass(frozen=True)
-class Ringing:
-    """A decaying oscillation of the rod's upper end, Re(amplitude · exp(root · t)), rad; root: 1/s, Im > 0."""
-
-    amplitude: complex
-    root: complex
-
-    def added(self, angle: Angles, rate: Rates, interval: Seconds) -> tuple[Angles, Rates]:
-        """Angle and rate of the slow motion, at equal intervals from the release, with the ringing."""
-        size = abs(self.amplitude)
-        if size <= _GONE:
-            return angle, rate
-        lasting = np.log(size / _GONE) / max(-self.root.real * interval, 1e-9)
-        count = min(angle.size, int(lasting) + 1)
-        ringing = self.amplitude * np.exp(self.root * interval * np.arange(count))
-        angle, rate = angle.copy(), rate.copy()
-        angle[:count] += ringing.real
-        rate[:count] += (self.root * ringing).real
-        return angle, rate
-
-
-@dataclass(frozen=True)
-class SlowMotion:
-    """A run with a rigid rod and the slow oscillation of the run with a flexible rod.
-
-    Args:
-        lead: of the body before the upper end, as a share of the angle there.
-        rod_stiffness: of the leading rod, seen from the upper end, N m/rad.
-        body_release: the body's release angle, rad.
-    """
-
-    run: RunSettings
-    lead: float
-    rod_stiffness: float
-    body_release: float
-    ringing: Ringing
-
-    def forward_run(self) -> tuple[NDArray[np.void], Sequence[Array]]:
-        """The run for the compiled integrator; result as of `forward_run`."""
-        row, keep_alive = forward_run(self.run)
-        row["lead"], row["rod_stiffness"], row["lagged"] = self.lead, self.rod_stiffness, self.body_release
-        return row, keep_alive
-
-
-def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
-    """Separate the rod's ringing from the motion of the body on its spring; the run's release angle is the body's.
-
-    None for a rigid rod, and where the two oscillations are not `SEPARATION` apart or one of them does not
-    oscillate.
-    """
-    twist = run.rod_twist
-    if twist is None:
-        return None
-    upper, lower = (share * run.yaw_inertia for share in (twist.inertia_share, 1.0 - twist.inertia_share))
-    flow = rig.body.flow(run.air_density, run.wind_speed)
-    air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
-    air_damping = aerodynamic_damping(run.derivatives.cn_r, **flow)
-    spring = run.spring_stiffness + run.parameters.get("gravity_stiffness", 0.0)
-    loss, rod, rod_loss = run.mechanical_damping, 1.0 / twist.compliance, twist.damping(run.yaw_inertia)
-
-    def lead_at(root: complex) -> complex:
-        """The twist per angle of the upper end in an oscillation exp(root · t), from the balance of the body."""
-        free = air + air_damping * root - lower * root**2
-        return free / (rod + rod_loss * root - free)
-
-    lead, root = 0j, 0j
-    for _ in range(_MOST_ITERATIONS):
-        previous = root
-        # the balance of the whole rig, whose body moves 1 + lead times as far as the upper end
-        body = 1.0 + lead
-        root = _upper_root(upper + lower * body, loss - air_damping * body, spring - air * body)
-        lead = lead_at(root)
-        if abs(root - previous) <= _CONVERGED * abs(root):
-            break
-    else:
-        return None
-    if not root.imag > 0.0:
-        return None
-    # The four roots' sum and product give the other two.
-    total = (loss + rod_loss) / upper + (rod_loss - air_damping) / lower
-    product = (rod * (spring - air) - air * spring) / (upper * lower)
-    fast = _upper_root(1.0, total + 2.0 * root.real, product / abs(root) ** 2)
-    if not (fast.imag > 0.0 and abs(fast) > SEPARATION * abs(root)):
-        return None
-    end = spring_end_angle(run)
-    # Amplitudes of two oscillations that add up to the release's angle, its rate, the twist and its rate.
-    roots, leads = (root, fast), (lead, lead_at(fast))
-    rows = [(1.0, 1.0), roots, leads, (roots[0] * leads[0], roots[1] * leads[1])]
-    matrix = [[part for value in row for part in (value.real, -value.imag)] for row in rows]
-    state = np.array((end, run.release_rate, run.release_angle - end, 0.0))
-    found = np.linalg.solve(np.array(matrix), state).tolist()
-    slow, ringing = complex(found[0], found[1]), complex(found[2], found[3])
-    shape = (1.0 + lead.real) ** 2  # a moment on the body does work on its own angle
-    strained = rod * lead.real**2
-    inertia = (spring + strained - air * shape) / abs(root) ** 2
-    if not inertia > 0.0:
-        return None
-    damping = -2.0 * root.real * inertia + air_damping * shape
-    rigid = dataclasses.replace(
-        run,
-        rod_twist=None,
-        yaw_inertia=inertia,
-        mechanical_damping=damping,
-        release_angle=slow.real,
-        release_rate=(root * slow).real,
-    )
-    return SlowMotion(rigid, lead.real, strained, run.release_angle, Ringing(ringing, fast))
-
-
-def _upper_root(inertia: complex, damping: complex, stiffness: complex) -> complex:
-    """The root of inertia s² + damping s + stiffness with the larger imaginary part, 1/s."""
-    half = damping / (2.0 * inertia)
-    return -half + 1j * cmath.sqrt(stiffness / inertia - half * half)

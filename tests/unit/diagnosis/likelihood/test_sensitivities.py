@@ -18,8 +18,8 @@ BY_DIFFERENCES = {
     "coulomb_friction": {"exponent", "saturation", "peak", "load"},
     "wind_speed_drift": {"settling"},
 }
-#: A rod that twists, and readings at times of their own: all parameters take differences.
-READ_BY_DIFFERENCES = {"rod_flexibility", "dropped_samples"}
+#: Readings at times of their own: all parameters take differences.
+READ_BY_DIFFERENCES = {"dropped_samples"}
 
 
 @pytest.fixture(scope="module")
@@ -70,12 +70,19 @@ def test_friction_without_derivatives_takes_finite_differences(data, form):
     assert len(without_derivative(problem, moved)) == common.size + point.release.shape[1]
 
 
+def test_a_rod_that_is_followed_takes_finite_differences(data):
+    problem, point = at_example(data, effect_class("rod_flexibility"))
+    followed = dataclasses.replace(problem, rod_followed=True)
+    assert len(without_derivative(followed, point)) == point.common.size + point.release.shape[1]
+
+
 @pytest.mark.parametrize(
     ("name", "tolerance"),
     [
         ("cubic_stiffness", 2e-4),
         ("unsteady_aero_lag", 2e-4),
         ("coulomb_friction", 2e-4),
+        ("rod_flexibility", 2e-4),
         ("wind_speed_offset", 2e-4),
         ("wind_speed_drift", 2e-4),
         ("sensor_nonlinearity", 2e-4),
@@ -111,7 +118,9 @@ def driven(data, *, on_body, even):
 
 
 DRIVEN = [
-    *((name, body) for name in ("spring_miscalibration", "cubic_stiffness", "coulomb_friction", "second_mode")
+    *((name, body) for name in (
+        "spring_miscalibration", "cubic_stiffness", "coulomb_friction", "second_mode", "rod_flexibility",
+    )
       for body in (True, False)),
     *((name, True) for name in ("input_delay", "actuator_lag", "actuator_saturation", "actuator_rate_limit")),
 ]  # fmt: skip
