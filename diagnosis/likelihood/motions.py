@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -181,17 +181,22 @@ class Motions:
             found.setdefault((row.tobytes(), *samples), []).append(place)
         return list(found.values())
 
-    def steps(self, place: int) -> tuple[float, ...]:
-        """Key of the motions that are integrated side by side: samples, and steps between them."""
-        row = self.rows[place]
-        return float(self.blocks[place]), float(row["steps"]), float(row["stride"])
+    def parts(self, places: Sequence[int], most: int) -> Iterator[list[int]]:
+        """Motions in parts of at most a given number, each of equal steps and similar length."""
+        equal: dict[tuple[float, float], list[int]] = {}
+        for place in sorted(places, key=lambda place: int(self.blocks[place])):
+            row = self.rows[place]
+            equal.setdefault((float(row["steps"]), float(row["stride"])), []).append(place)
+        for group in equal.values():
+            for first in range(0, len(group), most):
+                yield group[first : first + most]
 
     def integrated(self, places: Sequence[int]) -> tuple[Array, Array]:
-        """Angle and rate at the block ends of runs of equal length and steps, without a rod's ringing.
+        """Angle and rate at the block ends of runs of equal steps, without a rod's ringing.
 
-        In rad and rad/s, shape (places, blocks + 1); infinite where a motion diverges.
+        In rad and rad/s, shape (places, blocks of the longest + 1); infinite where a motion diverges.
         """
-        samples = int(self.blocks[places[0]]) + 1
+        samples = self.blocks[places] + 1
         angle, rate, status = integrate(self.law[places], self.rows[places], samples)
         first = 0
         while status:  # one of them diverged, and the later ones are not done
@@ -200,21 +205,16 @@ class Motions:
             if first == len(places):
                 break
             some = places[first:]
-            angle[first:], rate[first:], status = integrate(self.law[some], self.rows[some], samples)
+            rest, of_rest, status = integrate(self.law[some], self.rows[some], samples[first:])
+            angle[first:, : rest.shape[1]], rate[first:, : rest.shape[1]] = rest, of_rest
         return angle, rate
 
 
 def readings(asked: Asked) -> list[Array]:
     """Block means of the reading, by run, shape (blocks,) each; infinite where the motion diverges."""
     motions = Motions.of(asked)
-    equal: dict[tuple[float, ...], list[list[int]]] = {}
-    for places in motions.alike():
-        equal.setdefault(motions.steps(places[0]), []).append(places)
-    parts = [
-        group[first : first + _TOGETHER]
-        for group in equal.values()
-        for first in range(0, len(group), _TOGETHER)
-    ]
+    alike = {places[0]: places for places in motions.alike()}
+    parts = [[alike[place] for place in part] for part in motions.parts(list(alike), _TOGETHER)]
     found: list[Array] = [np.zeros(0)] * len(asked.runs)
 
     def read(part: list[list[int]]) -> None:
@@ -251,10 +251,11 @@ def read_together(
 
     Args:
         members: for each run, the index of its motion and its own index.
-        angle: at the blocks' ends, rad, shape (motions, blocks + 1).
+        angle: at the blocks' ends, rad, shape (motions, blocks of the longest + 1).
         rate: at the blocks' ends, rad/s, of the same shape.
     """
     places = [place for _, place in members]
+    blocks = motions.blocks[places].tolist()
     if len(members) != len(angle):
         of = [number for number, _ in members]
         angle, rate = angle[of], rate[of]
@@ -262,20 +263,24 @@ def read_together(
     for number, (place, run) in enumerate(zip(places, runs, strict=True)):
         ringing = motions.ringing[place]
         if ringing is not None:
-            angle[number], rate[number] = ringing.added(angle[number], rate[number], run.interval)
+            ends = slice(blocks[number] + 1)
+            of_run = angle[number, ends], rate[number, ends]
+            angle[number, ends], rate[number, ends] = ringing.added(*of_run, run.interval)
     if reads_plainly(asked.effects[places[0]]):
-        return list(block_means(runs, angle, rate) + asked.zero[places, None])
+        means = block_means(runs, angle, rate) + asked.zero[places, None]
+        return [mean[:count] for mean, count in zip(means, blocks, strict=True)]
     found, chains = [], [asked.chain(place) for place in places]
     steady = [number for number, chain in enumerate(chains) if not chain.skips]
     of_steady = block_means([runs[i] for i in steady], angle[steady], rate[steady]) if steady else ()
-    means = dict(zip(steady, of_steady, strict=True))
+    means = {number: mean[: blocks[number]] for number, mean in zip(steady, of_steady, strict=True)}
     for number, (chain, run) in enumerate(zip(chains, runs, strict=True)):
         zero = float(asked.zero[places[number]])
         if not np.isfinite(angle[number, 0]):  # it diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
-            ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
-            found.append(sample_means(chain, Motion(ends, angle[number], rate[number]), run, zero))
+            ends = np.arange(blocks[number] + 1, dtype=np.float64) * run.interval
+            motion = Motion(ends, angle[number, : ends.size], rate[number, : ends.size])
+            found.append(sample_means(chain, motion, run, zero))
         else:
             found.append(chain.reading(chain.angle(means[number], run.times, run.derivative) + zero))
     return found
@@ -305,18 +310,26 @@ def _lines(inputs: Mapping[int, DriveMoment], step: Array, steps: Array, like: i
 def end_weights(runs: Sequence[RunData], blocks: int) -> Array:
     """Weights of a block's first and last angle, and first and last rate per interval, in its mean.
 
-    Shape (runs, 4, 1), or (runs, 4, blocks) where samples are not evenly spaced.
+    Shape (runs, 4, 1), or (runs, 4, blocks) where samples are not evenly spaced; 0 beyond the end of a run.
+
+    Args:
+        blocks: of the longest run.
     """
     if all(run.samples is None for run in runs):
         return np.stack([run.weights for run in runs])[:, :, None]
-    return np.stack([np.broadcast_to(run.weights.reshape(4, -1), (4, blocks)) for run in runs])
+    found = np.zeros((len(runs), 4, blocks))
+    for place, run in zip(found, runs, strict=True):
+        own = run.weights.reshape(4, -1)
+        place[:, : blocks if own.shape[1] == 1 else own.shape[1]] = own
+    return found
 
 
 def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
     """Block means of the angle, or of the derivative that is read, from the block ends, shape (runs, blocks).
 
     Args:
-        angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1).
+        angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1). Those beyond the end of a
+            run have no meaning, nor have their means.
     """
     weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]

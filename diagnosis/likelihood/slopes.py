@@ -50,14 +50,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
     moved = np.swapaxes(values[1:] - values[0], 0, 1)
     sampled = [_samples(motions, place, count) for place in range(count)]
-    equal: dict[tuple[float, ...], list[int]] = {}
-    for place in range(count):
-        equal.setdefault(motions.steps(place), []).append(place)
-    parts = [
-        group[first : first + _TOGETHER]
-        for group in equal.values()
-        for first in range(0, len(group), _TOGETHER)
-    ]
+    parts = list(motions.parts(range(count), _TOGETHER))
     found = [np.zeros(0)] * count
 
     def follow(part: list[int]) -> None:
@@ -101,10 +94,10 @@ def _part(
     columns = np.flatnonzero(moved.any(axis=(0, 1)))
     resampled = np.array([change.any(axis=1) for change in sampled])  # a change that is NaN is one, too
     along = np.flatnonzero(resampled.any(axis=0))[: most_changes()]
-    runs, blocks = [asked.runs[place] for place in part], int(motions.blocks[part[0]])
+    runs, blocks = [asked.runs[place] for place in part], motions.blocks[part]
     effects = asked.effects[part[0]]
     weights = (
-        end_weights(runs, blocks)
+        end_weights(runs, int(np.max(blocks)))
         * np.array([(1.0, 1.0, run.interval, run.interval) for run in runs])[:, :, None]
     )
     changed = [np.nan_to_num(change[along]) for change in sampled]
@@ -118,11 +111,11 @@ def _part(
     lost |= np.array([np.isnan(change).any(axis=1) for change in sampled])
     lost |= resampled & ~np.isin(np.arange(points), along)
     found.by_angle[unknown] = 0.0
-    result = list(steps @ found.by_angle)
+    result = [change[:, :size] for change, size in zip(steps @ found.by_angle, blocks, strict=True)]
     ringing = {}
     for number, (place, run) in enumerate(zip(part, runs, strict=True)):
         if any(motions.ringing[place::count]):
-            ringing[number] = _ringing(motions.ringing[place::count], run, blocks)
+            ringing[number] = _ringing(motions.ringing[place::count], run, int(blocks[number]))
             result[number] += ringing[number][1:] - ringing[number][0]
     if reads_plainly(effects):
         zeros = asked.zero.reshape(points + 1, count)[:, part]
@@ -131,9 +124,9 @@ def _part(
     else:
         means = block_means(runs, found.angle, found.rate)
         for number, added in ringing.items():
-            means[number] += added[0]
+            means[number, : added.shape[1]] += added[0]
         result = [
-            _read(asked, range(place, len(asked.runs), count), mean, change)
+            _read(asked, range(place, len(asked.runs), count), mean[: change.shape[1]], change)
             for place, mean, change in zip(part, means, result, strict=True)
         ]
     for change, without in zip(result, lost, strict=True):

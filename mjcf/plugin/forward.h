@@ -118,16 +118,17 @@ enum { VWT_MOST_CHANGES = 8 };  // of the samples of a wind or a drive, by which
 VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values);
 
 // As `vwt_forward`, for plain runs: also the derivatives of angle and rate by the terms in `columns`, `width` of them,
-// shape (width, samples) by run. The column VWT_TERM_COUNT + k is along a change of the run's samples: the k-th row of
+// shape (width, size) by run, of which a run sets its first samples. The column VWT_TERM_COUNT + k is along a change of the run's samples: the k-th row of
 // its `changes`, at most VWT_MOST_CHANGES. A row holds a change of the wind, m/s, shape (wind_count,), or of the drive,
 // its samples before their slopes, shape (2, moment_count). With weights of the ends of an interval between
 // samples, by run, shape (4, weighed) for its first and last angle and its first and last rate, the derivatives are
-// those of the weighted sums instead, shape (width, samples - 1), in `angle_slopes`; one weight of each kind serves all
+// those of the weighted sums instead, shape (width, size - 1), in `angle_slopes`; one weight of each kind serves all
 // intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain, or its friction is
 // a root of the rate or depends on the load.
-VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-                       const double* const* changes, const double* const* weights, int weighed, double* const* angle,
-                       double* const* rate, double* const* angle_slopes, double* const* rate_slopes);
+VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int size, int width,
+                       const int* columns, const double* const* changes, const double* const* weights, int weighed,
+                       double* const* angle, double* const* rate, double* const* angle_slopes,
+                       double* const* rate_slopes);
 
 // Reading behind a backlash of half width `half`: it moves only when pushed. `in` and `out` may be the same array.
 VWT_API void vwt_backlash(int count, const double* in, double half, double start, double* out);

@@ -21,7 +21,7 @@ int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
 }
 
 int vwt_alike(const vwt_run* one, const vwt_run* other) {
-  return one->steps == other->steps && one->stride == other->stride && one->samples == other->samples;
+  return one->steps == other->steps && one->stride == other->stride;
 }
 
 // The motion after a step.
@@ -78,44 +78,48 @@ INLINE void step(const Lanes* c, State* s, int features, Step* alone) {
 }
 
 // Samples within a step, as vwt_fill.
-INLINE void fill(const Lanes* c, const State* from, const State* to, int stride, int at, int samples,
-                 double* const* angle, double* const* rate) {
+INLINE void fill(const Lanes* c, const State* from, const State* to, int stride, int at, double* const* angle,
+                 double* const* rate) {
   const Lane h = c->whole_step, change = to->angle - from->angle;
   const Lane c1 = h * from->rate;
   const Lane c2 = 3 * change - h * (2 * from->rate + to->rate);
   const Lane c3 = h * (from->rate + to->rate) - 2 * change;
-  for (int j = 1; j < stride && at + j < samples; j++) {
+  for (int j = 1; j < stride; j++) {
     const double u = j / (double)stride;
     const Lane angles = from->angle + u * (c1 + u * (c2 + u * c3));
     const Lane rates = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
     for (int k = 0; k < c->count; k++) {
-      angle[k][at + j] = angles[k];
-      rate[k][at + j] = rates[k];
+      if (at + j < c->run[k]->samples) {
+        angle[k][at + j] = angles[k];
+        rate[k][at + j] = rates[k];
+      }
     }
   }
 }
 
 INLINE int integrate(const Lanes* c, State* s, int features, int count, Step* alone,
                             const vwt_run* like, double* const* angle, double* const* rate) {
-  const int samples = (int)like->samples, steps = (int)like->steps;
+  const int samples = most_samples(c), steps = (int)like->steps;
   const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
   int failed = VWT_LANES;  // the first lane whose motion grew without bound
   for (int i = 0; i < samples; i += stride) {
     const State before = *s;
     for (int k = 0; k < count; k++) {
-      angle[k][i] = before.angle[k];
-      rate[k][i] = before.rate[k];
+      if (i < c->run[k]->samples) {
+        angle[k][i] = before.angle[k];
+        rate[k][i] = before.rate[k];
+      }
     }
     for (int j = 0; j < steps; j++) {
       step(c, s, features, alone);
       s->start = (i * (double)steps + stride * (j + 1)) * c->step;  // no drift of the clock
     }
     if (stride > 1) {
-      fill(c, &before, s, stride, i, samples, angle, rate);
+      fill(c, &before, s, stride, i, angle, rate);
     }
     if (any(~(size_of(s->angle) < 1e6))) {
       for (int k = count - 1; k >= 0; k--) {
-        failed = !(fabs(s->angle[k]) < 1e6) && k < failed ? k : failed;
+        failed = !(fabs(s->angle[k]) < 1e6) && i < c->run[k]->samples && k < failed ? k : failed;
       }
     }
     if (failed == 0) {

@@ -83,6 +83,15 @@ INLINE long long any(Mask where) {
   return out;
 }
 
+// Of the longest run; the others are followed beyond their ends.
+static int most_samples(const Lanes* c) {
+  double most = 0;
+  for (int k = 0; k < c->count; k++) {
+    most = fmax(most, c->run[k]->samples);
+  }
+  return (int)most;
+}
+
 // The air at a time.
 INLINE Air air_at(const Lanes* c, int features, Lane time) {
   Air out = c->air;

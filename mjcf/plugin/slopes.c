@@ -199,7 +199,7 @@ INLINE void step(const Law* law, const Asked* asked, State* s, int features, Ste
 
 // Where the results go.
 typedef struct {
-  int samples, width;
+  int size, width;  // samples in a row of the arrays, and columns
   double *const *angle, *const *rate, *const *angle_slopes, *const *rate_slopes;
   const double* const* weights;
   int weighed;
@@ -236,35 +236,35 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
 }
 
 // Writes a sample of the motions, and its change.
-INLINE void put(const Out* out, int count, int at, Lane angle, Lane rate, const Seen* change) {
-  for (int k = 0; k < count; k++) {
+INLINE void put(const Out* out, const Lanes* c, int at, Lane angle, Lane rate, const Seen* change) {
+  for (int k = 0; k < c->count; k++) {
+    if (at >= c->run[k]->samples) {
+      continue;
+    }
     out->angle[k][at] = angle[k];
     out->rate[k][at] = rate[k];
-  }
-  if (out->weights) {
-    return;
-  }
-  for (int i = 0; i < out->width; i++) {
-    for (int k = 0; k < count; k++) {
-      out->angle_slopes[k][(long)i * out->samples + at] = change->angle[i][k];
-      out->rate_slopes[k][(long)i * out->samples + at] = change->rate[i][k];
+    for (int i = 0; !out->weights && i < out->width; i++) {
+      out->angle_slopes[k][(long)i * out->size + at] = change->angle[i][k];
+      out->rate_slopes[k][(long)i * out->size + at] = change->rate[i][k];
     }
   }
 }
 
 // Writes the change of the mean of a block from the changes at its ends.
-INLINE void put_means(const Out* out, int count, int at, const Seen* from, const Seen* to) {
+INLINE void put_means(const Out* out, const Lanes* c, int at, const Seen* from, const Seen* to) {
   Lane w[4] = {{0}};
   const int place = at < out->weighed ? at : 0;
   for (int n = 0; n < 4; n++) {
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < c->count; k++) {
       w[n][k] = out->weights[k][n * out->weighed + place];
     }
   }
   for (int i = 0; i < out->width; i++) {
     const Lane mean = w[0] * from->angle[i] + w[1] * to->angle[i] + w[2] * from->rate[i] + w[3] * to->rate[i];
-    for (int k = 0; k < count; k++) {
-      out->angle_slopes[k][(long)i * (out->samples - 1) + at] = mean[k];
+    for (int k = 0; k < c->count; k++) {
+      if (at + 1 < c->run[k]->samples) {
+        out->angle_slopes[k][(long)i * (out->size - 1) + at] = mean[k];
+      }
     }
   }
 }
@@ -319,7 +319,7 @@ static int exists(const Lanes* c, int k, int term) {
 INLINE int integrate(const Law* law, const Asked* asked, State* s, int features, Step* alone, Passage* passages,
                      const vwt_run* like, const Out* out) {
   const Lanes* c = law->c;
-  const int samples = out->samples, steps = (int)like->steps, width = asked->width;
+  const int samples = most_samples(c), steps = (int)like->steps, width = asked->width;
   const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
   Change change;
   for (int i = 0; i < width; i++) {
@@ -336,7 +336,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
   }
   Seen first, last, next, seen;
   see(law, asked, features, s, &change, &seen);
-  put(out, c->count, 0, s->angle, s->rate, &seen);
+  put(out, c, 0, s->angle, s->rate, &seen);
   for (int i = 0; i + 1 < samples; i += stride) {
     const State before = *s;
     copy(width, &seen, &first);
@@ -346,7 +346,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
       s->start = (i * (double)steps + stride * (j + 1)) * c->step;  // no drift of the clock
     }
     for (int k = 0; k < c->count; k++) {
-      if (!(fabs(s->angle[k]) < 1e6)) {
+      if (i + 1 < c->run[k]->samples && !(fabs(s->angle[k]) < 1e6)) {
         return 1 + k;
       }
     }
@@ -362,16 +362,16 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
         between(c->whole_step, u, first.angle[n], rate0, seen.angle[n], rate1, &next.angle[n], &next.rate[n]);
         next.rate[n] = longer ? next.rate[n] - r : next.rate[n];
       }
-      put(out, c->count, i + j, y, r, &next);
+      put(out, c, i + j, y, r, &next);
       if (out->weights) {
-        put_means(out, c->count, i + j - 1, &last, &next);
+        put_means(out, c, i + j - 1, &last, &next);
         copy(width, &next, &last);
       }
     }
     if (i + stride < samples) {
-      put(out, c->count, i + stride, s->angle, s->rate, &seen);
+      put(out, c, i + stride, s->angle, s->rate, &seen);
       if (out->weights) {
-        put_means(out, c->count, i + stride - 1, &last, &seen);
+        put_means(out, c, i + stride - 1, &last, &seen);
       }
     }
   }
@@ -405,9 +405,9 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
                            : integrate(&law, &asked, &s, law.features, alone, passages, runs, out);
 }
 
-int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width, const int* columns,
-               const double* const* changes, const double* const* weights, int weighed, double* const* angle,
-               double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
+int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int size, int width,
+               const int* columns, const double* const* changes, const double* const* weights, int weighed,
+               double* const* angle, double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
     if (!vwt_is_plain(&parameters[i], &runs[i]) || !is_smooth(&parameters[i])) {
       return -1;
@@ -418,7 +418,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
     while (together < VWT_LANES && i + together < count && vwt_alike(&runs[i], &runs[i + together])) {
       together++;
     }
-    const Out out = {.samples = (int)runs[i].samples, .width = width, .angle = &angle[i], .rate = &rate[i],
+    const Out out = {.size = size, .width = width, .angle = &angle[i], .rate = &rate[i],
                      .angle_slopes = &angle_slopes[i], .rate_slopes = weights ? 0 : &rate_slopes[i],
                      .weights = weights ? &weights[i] : 0, .weighed = weighed};
     const int failed = slopes_of_lanes(together, &parameters[i], &runs[i], width, columns, changes ? &changes[i] : 0, &out);

@@ -20,23 +20,25 @@ from tunnel_sim.vocabulary.rig import Rig
 _NONE: Array = np.zeros(0)
 
 
-def integrate(law: Laws, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
-    """Integrate runs of equal length: angle (rad) and rate (rad/s) of the rod's upper end, shape (runs, samples).
+def integrate(
+    law: Laws, runs: NDArray[np.void], samples: int | NDArray[np.int64]
+) -> tuple[Array, Array, int]:
+    """Integrate runs: angle (rad) and rate (rad/s) of the rod's upper end, shape (runs, samples of the longest).
 
     The status is 0, or one more than the index of the first run whose motion diverged (that run and
-    the later ones are unset).
+    the later ones are unset). Beyond the end of a run both are 0.
 
     Args:
         runs: of `run_dtype`; the arrays behind its pointers must stay alive.
-        samples: samples per run, the first at time 0.
+        samples: of every run, or one number for all, the first at time 0.
     """
     count = len(runs)
     law = np.ascontiguousarray(law, dtype=np.float64)
     if law.shape != (count, len(parameter_names())):
         raise ValueError(f"law has shape {law.shape}, not {(count, len(parameter_names()))}")
     runs = np.ascontiguousarray(runs)
-    runs["samples"] = samples
-    angle, rate = np.zeros((count, samples)), np.zeros((count, samples))
+    runs["samples"], size = samples, int(np.max(samples))
+    angle, rate = np.zeros((count, size)), np.zeros((count, size))
     pointers = [
         (array.ctypes.data + np.arange(len(array)) * array.strides[0]).astype(np.uintp)
         for array in (angle, rate)

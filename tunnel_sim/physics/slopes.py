@@ -41,7 +41,7 @@ def terms(law: Laws, runs: NDArray[np.void]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Motions and their derivatives by some terms of their law.
+    """Motions and their derivatives by some terms of their law; 0 beyond the end of a run.
 
     Args:
         angle: of the rod's upper end, rad, shape (n, samples).
@@ -63,16 +63,16 @@ class Slopes:
 def slopes(
     law: Laws,
     runs: NDArray[np.void],
-    samples: int,
+    samples: int | NDArray[np.int64],
     columns: Sequence[int],
     weights: Array | None = None,
     changes: Sequence[Array] = (),
 ) -> Slopes:
-    """Integrate plain runs of equal length, and their derivatives by some terms.
+    """Integrate plain runs, and their derivatives by some terms.
 
     Args:
         runs: as in `terms`.
-        samples: samples per run, the first at time 0.
+        samples: of every run, or one number for all, the first at time 0.
         columns: places of the terms.
         weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
             between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
@@ -81,19 +81,19 @@ def slopes(
             2 samples). In a run with neither the derivatives are NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
-    runs["samples"] = samples
+    runs["samples"], size = samples, int(np.max(samples))
     further = len(changes[0]) if changes else 0
     places = [*columns, *(len(term_places()) + change for change in range(further))]
     chosen = np.ascontiguousarray(places, dtype=np.intc)
     moved = [np.ascontiguousarray(change, dtype=np.float64) for change in changes]
     at = np.array([change.ctypes.data for change in moved], dtype=np.uintp) if moved else None
-    angle, rate = np.empty((len(runs), samples)), np.empty((len(runs), samples))
+    angle, rate = np.zeros((len(runs), size)), np.zeros((len(runs), size))
     weights = None if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
-    by_angle = np.empty((len(runs), chosen.size, samples - (weights is not None)))
-    by_rate = None if weights is not None else np.empty_like(by_angle)
+    by_angle = np.zeros((len(runs), chosen.size, size - (weights is not None)))
+    by_rate = None if weights is not None else np.zeros_like(by_angle)
     given = [_rows(array) for array in (weights, angle, rate, by_angle, by_rate)]
     status = forward_library().vwt_slopes(
-        len(runs), law.ctypes.data, runs.ctypes.data, chosen.size, chosen.ctypes.data,
+        len(runs), law.ctypes.data, runs.ctypes.data, size, chosen.size, chosen.ctypes.data,
         _address(at), _address(given[0]), 1 if weights is None else weights.shape[2], *map(_address, given[1:]),
     )  # fmt: skip
     return Slopes(angle, rate, by_angle, by_rate, int(status))

@@ -221,7 +221,7 @@ static void check_slopes(void) {
                               .stiffness_cubic_exponent = features & 4 ? 2.5 : 0};
       runs[i] = (vwt_run){.wind = wind, .wind_count = sampled ? kWinds : 1, .wind_interval = 0.1,
                           .angle = 0.3 + 0.01 * i, .lagged = 0.3, .step = 0.002,
-                          .steps = features & 1 ? 2 : 1, .stride = 3, .samples = kSamples};
+                          .steps = features & 1 ? 2 : 1, .stride = 3, .samples = kSamples - i};
       if (i == 4) {
         runs[i].moment = drive;
         runs[i].moment_time = drive_time;
@@ -237,8 +237,8 @@ static void check_slopes(void) {
       weights[i] = sums;
       winds[i] = changes;
     }
-    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, winds, NULL, 1, angles, rates, by_angles, by_rates) == 0);
-    EXPECT(vwt_slopes(kRuns, p, runs, kColumns, columns, winds, weights, 1, angles, rates, by_angles, NULL) == 0);
+    EXPECT(vwt_slopes(kRuns, p, runs, kSamples, kColumns, columns, winds, NULL, 1, angles, rates, by_angles, by_rates) == 0);
+    EXPECT(vwt_slopes(kRuns, p, runs, kSamples, kColumns, columns, winds, weights, 1, angles, rates, by_angles, NULL) == 0);
     vwt_terms(kRuns, p, runs, values);
     EXPECT(values[VWT_TERM_start_angle] == 0.3);
   }

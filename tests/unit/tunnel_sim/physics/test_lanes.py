@@ -5,6 +5,7 @@ import pytest
 
 from tests.unit.tunnel_sim.physics.test_slopes import DRIVES, JUMPING, KINKED, SMOOTH, driven, runs
 from tunnel_sim.physics.forward import integrate
+from tunnel_sim.physics.slopes import slopes, term_places
 
 FORMS = {
     "linear": {},
@@ -62,3 +63,50 @@ def test_a_driven_run_has_free_ones_beside_it():
     found = integrate(law, run, 400)[0]
     np.testing.assert_array_equal(found[0], expected)
     np.testing.assert_array_equal(found[1], integrate(*runs({}), 400)[0][0])
+
+
+LENGTHS = np.array([400, 7, 399, 131, 1, 250, 400, 2, 90, 398, 64])
+
+
+@pytest.mark.parametrize("name", FORMS)
+@pytest.mark.parametrize(("steps", "stride"), [(2, 1), (1, 3)])
+def test_runs_of_any_length_move_as_alone_and_nothing_is_written_beyond_their_ends(name, steps, stride):
+    law, run = runs(FORMS[name], steps, stride, count=LENGTHS.size)
+    run["angle"] += 0.01 * np.arange(LENGTHS.size)
+    angle, rate, status = integrate(law, run, LENGTHS)
+    assert status == 0
+    for i, length in enumerate(LENGTHS):
+        alone = integrate(law[i : i + 1], run[i : i + 1], int(length))
+        np.testing.assert_array_equal(angle[i, :length], alone[0][0])
+        np.testing.assert_array_equal(rate[i, :length], alone[1][0])
+        assert not angle[i, length:].any()
+        assert not rate[i, length:].any()
+
+
+def test_a_motion_that_diverges_after_its_record_is_no_failure():
+    law, run = runs({}, count=2)
+    law[1] = law[0]
+    run["rate"][1] = 3e7  # rad/s
+    assert integrate(law, run, np.array([400, 2]))[2] == 0
+    assert integrate(law, run, np.array([400, 400]))[2] == 2
+
+
+@pytest.mark.parametrize("weighed", [False, True])
+@pytest.mark.parametrize(("steps", "stride"), [(2, 1), (1, 3)])
+def test_derivatives_of_runs_of_any_length_are_those_of_a_run_alone(steps, stride, weighed):
+    law, run = runs(FORMS["friction"], steps, stride, count=LENGTHS.size)
+    run["angle"] += 0.01 * np.arange(LENGTHS.size)
+    columns = [term_places()[name] for name in ("angle", "rate", "start_angle")]
+    weights = np.random.default_rng(1).normal(size=(LENGTHS.size, 4, 1)) if weighed else None
+    found = slopes(law, run, LENGTHS, columns, weights)
+    assert found.status == 0
+    for i, length in enumerate(LENGTHS):
+        own = slice(i, i + 1)
+        given = None if weights is None else weights[own]
+        alone = slopes(law[own], run[own], int(length), columns, given)
+        np.testing.assert_array_equal(found.angle[i, :length], alone.angle[0])
+        last = alone.by_angle.shape[2]
+        np.testing.assert_array_equal(found.by_angle[i, :, :last], alone.by_angle[0])
+        assert not found.by_angle[i, :, last:].any()
+        if alone.by_rate is not None:
+            np.testing.assert_array_equal(found.by_rate[i, :, :last], alone.by_rate[0])
