@@ -16,12 +16,13 @@ int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
   const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
   return steady && run->forcing_count == 0 && run->ambient_count == 0 &&
          (run->moment_count == 0 || is_plain_drive(p, run)) &&
-         run->program_count == 0 && run->twist_stiffness == 0 && run->twist == 0 && run->twist_rate == 0 &&
-         !(p->presliding > 0);
+         run->program_count == 0 && !(p->presliding > 0) &&
+         (twists(run) ? p->aero_lag == 0 && run->lead == 0 && run->rod_stiffness == 0
+                      : run->twist == 0 && run->twist_rate == 0);
 }
 
 int vwt_alike(const vwt_run* one, const vwt_run* other) {
-  return one->steps == other->steps && one->stride == other->stride;
+  return one->steps == other->steps && one->stride == other->stride && twists(one) == twists(other);
 }
 
 // The motion after a step.
@@ -52,9 +53,59 @@ INLINE void runge_kutta(const Lanes* c, const State* s, int features, Lane* angl
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }
 
+// The derivatives of the rates of the rod's upper end and of its twist.
+typedef struct {
+  Lane rate, twist_rate;
+} Accelerations;
+
+INLINE Accelerations twisting(const Lanes* c, const State* s, const Input* in, int features, Lane time, Lane angle,
+                              Lane rate, Lane twist, Lane twist_rate) {
+  Powers powers;
+  const Coefficients* law = &c->law;
+  const Lane none = {0}, shed = features & SHEDDING ? shed_at(law, time) : none;
+  const Air flow = air_at(c, features, time);
+  Lane air = moment_of_air(law, &flow, features, angle + twist, rate + twist_rate, shed, none, &powers);
+  Lane deflection = angle, moment = none;
+  if (features & DRIVE) {
+    const Lane input = input_at(in, features, time), drive = c->scale * input + c->offset;
+    deflection = deflection_at(c, features, angle, input);
+    air = air + choose(c->on_end, none, drive);
+    moment = choose(c->on_end, drive, none);
+  }
+  moment = moment_of_mechanism(law, features, angle, deflection, rate, &powers) + moment;
+  moment = moment - law->spring * angle - c->damping * rate;
+  const Lane spring = c->twist_stiffness * twist, loss = c->twist_damping * twist_rate;
+  Accelerations out;
+  out.rate = (moment + spring + loss - s->slip * friction_at(c, features, s->slip, angle, rate)) / c->inertia;
+  out.twist_rate = (air - (spring + loss)) / c->lower - out.rate;
+  return out;
+}
+
+// The motion after a step with a rod that twists.
+INLINE void runge_kutta_twisting(const Lanes* c, const State* s, int features, State* to) {
+  const Lane h = c->whole_step, half = c->half_step, middle = s->start + half;
+  const Input in = input_of(c, features, s->start, half);
+  const Accelerations a1 = twisting(c, s, &in, features, s->start, s->angle, s->rate, s->twist, s->twist_rate);
+  const Lane r2 = s->rate + half * a1.rate, w2 = s->twist_rate + half * a1.twist_rate;
+  const Accelerations a2 = twisting(c, s, &in, features, middle, s->angle + half * s->rate, r2,
+                                    s->twist + half * s->twist_rate, w2);
+  const Lane r3 = s->rate + half * a2.rate, w3 = s->twist_rate + half * a2.twist_rate;
+  const Accelerations a3 = twisting(c, s, &in, features, middle, s->angle + half * r2, r3, s->twist + half * w2, w3);
+  const Lane r4 = s->rate + h * a3.rate, w4 = s->twist_rate + h * a3.twist_rate;
+  const Accelerations a4 = twisting(c, s, &in, features, s->start + h, s->angle + h * r3, r4, s->twist + h * w3, w4);
+  to->angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
+  to->rate = s->rate + h * ((a1.rate + 2 * (a2.rate + a3.rate) + a4.rate) / 6);
+  to->twist = s->twist + h * ((s->twist_rate + 2 * (w2 + w3) + w4) / 6);
+  to->twist_rate = s->twist_rate + h * ((a1.twist_rate + 2 * (a2.twist_rate + a3.twist_rate) + a4.twist_rate) / 6);
+}
+
 INLINE void step(const Lanes* c, State* s, int features, Step* alone) {
   const State before = *s;
-  runge_kutta(c, &before, features, &s->angle, &s->rate);
+  if (features & TWIST) {
+    runge_kutta_twisting(c, &before, features, s);
+  } else {
+    runge_kutta(c, &before, features, &s->angle, &s->rate);
+  }
   if (features & LAG) {
     s->lagged = lagged_at(c, &before, c->whole, c->whole_step, s->angle, s->rate);
   }
@@ -69,6 +120,8 @@ INLINE void step(const Lanes* c, State* s, int features, Step* alone) {
     if (turns[k]) {
       s->angle[k] = before.angle[k];
       s->rate[k] = before.rate[k];
+      s->twist[k] = before.twist[k];
+      s->twist_rate[k] = before.twist_rate[k];
       s->lagged[k] = before.lagged[k];
       if (!before.rests[k]) {
         step_alone(c, s, k, &alone[k]);
@@ -137,6 +190,9 @@ CLONED int vwt_integrate_lanes(int count, const vwt_parameters* parameters, cons
   Step alone[VWT_LANES];
   release(count, parameters, runs, &c, &s, alone, weights);
   // the law of most runs has none of the features that need a function of the library
+  if (c.law.features & TWIST) {  // compiled apart from a rigid rod
+    return integrate(&c, &s, c.law.features | TWIST, count, alone, runs, angle, rate);
+  }
   return c.law.features == 0 ? integrate(&c, &s, 0, count, alone, runs, angle, rate)
-                         : integrate(&c, &s, c.law.features, count, alone, runs, angle, rate);
+                             : integrate(&c, &s, c.law.features & ~TWIST, count, alone, runs, angle, rate);
 }

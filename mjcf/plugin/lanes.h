@@ -26,8 +26,11 @@ typedef struct {
   Mask dry;   // the lanes that have
   int count;  // of the lanes that are runs; the others repeat the first one's start
   const vwt_run* run[VWT_LANES];
-  Lane step, whole_step, half_step, body, inertia, damping, rod, friction, least_rate;
+  Lane step, whole_step, half_step, body, inertia, damping, rod;
+  Lane twist_stiffness, twist_damping, lower;  // of a rod that twists, and the inertia below it; above it: `inertia`
+  Friction friction;
   Lane scale, offset, turns;  // of a drive: N m per unit and N m, seen from the upper end; 1 where it turns the root
+  Mask on_end;                // the lanes whose drive acts on the upper end
   double half[VWT_LANES][4], whole[VWT_LANES][4];  // weights of the lag
 } Lanes;
 
@@ -39,9 +42,11 @@ typedef struct {
 
 // The start of a step, by lane.
 typedef struct {
-  Lane start, angle, rate, lagged, slip;
+  Lane start, angle, rate, twist, twist_rate, lagged, slip;
   int rests[VWT_LANES];
 } State;
+
+static int twists(const vwt_run* run) { return run->twist_stiffness > 0; }
 
 static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* run) {
   const double wind = fmax(0, run->wind[0]);
@@ -49,7 +54,8 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   set_coefficients(&c->law, k, p);
   set_wake(&c->law, k, p, wind);
   set_air(&c->air, k, p, wind);
-  c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0) | (run->moment_count > 0 ? DRIVE : 0);
+  c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0) | (run->moment_count > 0 ? DRIVE : 0) |
+                     (twists(run) ? TWIST : 0);
   c->rubs |= vwt_rubs(p);
   c->dry[k] = -vwt_rubs(p);
   c->run[k] = run;
@@ -58,14 +64,18 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   c->half_step[k] = c->whole_step[k] / 2;
   c->body[k] = 1 + run->lead;
   c->rod[k] = run->rod_stiffness;
-  c->inertia[k] = p->yaw_inertia;
+  const double upper = (twists(run) ? run->inertia_share : 1) * p->yaw_inertia;
+  c->inertia[k] = upper;
+  c->lower[k] = (1 - run->inertia_share) * p->yaw_inertia;
+  c->twist_stiffness[k] = run->twist_stiffness;
+  c->twist_damping[k] = run->twist_damping;
   c->damping[k] = p->mechanical_damping;
-  c->friction[k] = p->friction_moment;
-  c->least_rate[k] = vwt_friction_least_rate(p, p->yaw_inertia, run->step);
+  set_friction(&c->friction, k, p, vwt_friction_least_rate(p, upper, run->step));
   if (run->moment_count > 0) {
     const double share = run->moment_on_end != 0 ? 1 : c->body[k];
     c->scale[k] = share * run->moment_scale;
     c->offset[k] = share * run->moment_offset;
+    c->on_end[k] = -(run->moment_on_end != 0);
     c->turns[k] = run->moment_on_end != 0 && p->spring_stiffness > 0;
   }
   const double lag = fabs(c->law.lag[k]);
@@ -135,6 +145,17 @@ INLINE Lane deflection_at(const Lanes* c, int features, Lane angle, Lane input) 
   return features & DRIVE ? angle - c->turns * input : angle;
 }
 
+INLINE Lane friction_at(const Lanes* c, int features, Lane slip, Lane angle, Lane rate) {
+  if (!(features & RATE)) {
+    return c->friction.moment;
+  }
+  Lane load = {0};
+  for (int k = 0; features & LOAD && k < VWT_LANES; k++) {
+    load[k] = vwt_load(c->law.p[k], angle[k], 0);
+  }
+  return friction_level(&c->friction, features, slip * rate, load);
+}
+
 // Angular acceleration at a motion, with the powers in it; `shed`, `lagged` and `input` are read only with the features
 // they belong to.
 INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
@@ -148,14 +169,7 @@ INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int feature
   if (features & DRIVE) {
     moment = moment + (c->scale * input + c->offset);
   }
-  Lane friction = c->friction;
-  if (features & RATE) {
-    for (int k = 0; k < VWT_LANES; k++) {
-      const double load = vwt_load(law->p[k], angle[k], 0);
-      friction[k] = vwt_friction_level(law->p[k], c->least_rate[k], slip[k] * rate[k], load);
-    }
-  }
-  return (moment - slip * friction) / c->inertia;
+  return (moment - slip * friction_at(c, features, slip, angle, rate)) / c->inertia;
 }
 
 INLINE Lane acceleration_at(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
@@ -186,9 +200,12 @@ INLINE Mask turning(const Lanes* c, const State* before, Lane rate) {
 // rests for good.
 static void step_alone(const Lanes* c, State* s, int k, Step* alone) {
   const double angle = s->angle[k], rate = s->rate[k], lagged = s->lagged[k];
+  const int steady = c->law.shedding[k] == 0 && alone->run->moment_count == 0 && !twists(alone->run);
   alone->start = s->start[k];
   alone->from.angle = s->angle[k];
   alone->from.rate = s->rate[k];
+  alone->from.twist = s->twist[k];
+  alone->from.twist_rate = s->twist_rate[k];
   alone->lagged = s->lagged[k];
   alone->slip = (int)s->slip[k];
   if (alone->run->moment_count > 0) {
@@ -197,10 +214,12 @@ static void step_alone(const Lanes* c, State* s, int k, Step* alone) {
   vwt_step_with_friction(alone, c->whole_step[k]);
   s->angle[k] = alone->from.angle;
   s->rate[k] = alone->from.rate;
+  s->twist[k] = alone->from.twist;
+  s->twist_rate[k] = alone->from.twist_rate;
   s->lagged[k] = alone->lagged;
   s->slip[k] = alone->slip;
   const int changed = s->rate[k] != 0 || rate != 0 || s->angle[k] != angle || s->lagged[k] != lagged;
-  s->rests[k] = !changed && c->law.shedding[k] == 0 && alone->run->moment_count == 0;
+  s->rests[k] = !changed && steady;
 }
 
 // Up to `VWT_LANES` runs at their start.
@@ -213,6 +232,8 @@ static void release(int count, const vwt_parameters* parameters, const vwt_run* 
     s->start[k] = 0;
     s->angle[k] = alone[k].from.angle;
     s->rate[k] = alone[k].from.rate;
+    s->twist[k] = alone[k].from.twist;
+    s->twist_rate[k] = alone[k].from.twist_rate;
     s->lagged[k] = alone[k].lagged;
     s->slip[k] = vwt_rubs(&parameters[i]) ? alone[k].slip : 0;
   }

@@ -1,5 +1,6 @@
 // The moment law, written once for every width: one run (moment.c), or LAW_LANES runs side by side (lanes.h). A file
-// includes it for one width. Both widths do the same operations in the same order, so that their bits are the same.
+// includes it for one width. Both widths do the same operations in the same order, so that their bits are the same but
+// for elementary functions.
 // A term whose coefficient is zero vanishes: one run skips it, lanes add zero.
 
 #ifndef VWT_LAW_H_
@@ -37,19 +38,45 @@ INLINE Lane with_sign(Lane size, Lane x) { return copysign(size, x); }
 INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : other; }
 #endif
 
-// What a law has that needs a function of the library, or a loop. RATE: friction that depends on rate or load; WIND: of
-// samples, where a run has them; DRIVE: a drive, where a run has one
-enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8, RATE = 16, WIND = 32, DRIVE = 64, ANY = 127 };
+#include "elementary.h"
+
+// What a law has that takes long: an elementary function, or a loop. The first five: powers with a free exponent; ROOT,
+// SATURATION, PEAK and LOAD: of the friction; WIND: of samples; DRIVE: a drive; TWIST: a rod that twists
+enum {
+  STEEPENING = 1,
+  THICKENING = 2,
+  RATE_POWER = 4,
+  CUBE = 8,
+  SQUARE = 16,
+  GRAVITY = 32,
+  SHEDDING = 64,
+  LAG = 128,
+  ROOT = 256,
+  SATURATION = 512,
+  PEAK = 1024,
+  LOAD = 2048,
+  RATE = ROOT | SATURATION | PEAK | LOAD,
+  WIND = 4096,
+  DRIVE = 8192,
+  TWIST = 16384,
+  ANY = 32767
+};
 
 // The coefficients of the law, by lane.
 typedef struct {
   int features;  // of any lane
   const vwt_parameters* p[WIDTH];
   Lane moment_cubic, damping_quadratic, flow_angle;
+  Lane steepening, thickening, rate, cube, square;  // exponents; 0: that of the textbook
   Lane lag;                    // s, in a constant wind
   Lane shedding, turn, phase;  // of the vortices in a constant wind: N m, rad/s and rad
   Lane spring, quadratic_damping, loss, cubic, quadratic, free_play, gravity, gravity_angle;
 } Coefficients;
+
+// The friction's coefficients, with the ranges of rates that act; 0 where a factor is one.
+typedef struct {
+  Lane moment, load, exponent, saturation, peak, peak_rate;
+} Friction;
 
 // The air's coefficients at a time: Ka and Ca (paper, eqs 4 and 5).
 typedef struct {
@@ -61,23 +88,27 @@ typedef struct {
   Lane steepening, thickening, rate, cube, square;
 } Powers;
 
-// Whether a term has another power than that of the textbook.
-INLINE int is_free(double coefficient, double exponent, double textbook) {
-  return coefficient != 0 && exponent != 0 && exponent != textbook;
+// Whether a power has another exponent than that of the textbook.
+INLINE int is_free(double exponent, double textbook) { return exponent != 0 && exponent != textbook; }
+
+// The powers with free exponents, whether or not their coefficients are zero.
+INLINE int free_powers(const vwt_parameters* p) {
+  return (is_free(p->moment_cubic_exponent, 2) ? STEEPENING : 0) |
+         (is_free(p->damping_quadratic_exponent, 2) ? THICKENING : 0) |
+         (is_free(p->quadratic_damping_exponent, 2) ? RATE_POWER : 0) |
+         (is_free(p->stiffness_cubic_exponent, 3) ? CUBE : 0) |
+         (is_free(p->stiffness_quadratic_exponent, 2) ? SQUARE : 0);
 }
 
 INLINE int features_of(const vwt_parameters* p, double wind) {
-  const int powers = is_free(p->moment_cubic, p->moment_cubic_exponent, 2) ||
-                     is_free(p->damping_quadratic, p->damping_quadratic_exponent, 2) ||
-                     is_free(p->quadratic_damping, p->quadratic_damping_exponent, 2) ||
-                     is_free(p->stiffness_cubic, p->stiffness_cubic_exponent, 3) ||
-                     is_free(p->stiffness_quadratic, p->stiffness_quadratic_exponent, 2);
-  return (powers ? POWERS : 0) | (p->gravity_stiffness != 0 ? GRAVITY : 0) |
+  const int moves = (p->moment_cubic != 0 ? STEEPENING : 0) | (p->damping_quadratic != 0 ? THICKENING : 0) |
+                    (p->quadratic_damping != 0 ? RATE_POWER : 0) | (p->stiffness_cubic != 0 ? CUBE : 0) |
+                    (p->stiffness_quadratic != 0 ? SQUARE : 0);
+  return (free_powers(p) & moves) | (p->gravity_stiffness != 0 ? GRAVITY : 0) |
          (p->shedding_amplitude != 0 && p->width > 0 && wind > 0 ? SHEDDING : 0) |
          (vwt_lag_time(p, wind) != 0 ? LAG : 0) |
-         (p->friction_exponent != 0 || p->friction_saturation != 0 || p->friction_peak != 0 || p->friction_load != 0
-              ? RATE
-              : 0);
+         (p->friction_exponent != 0 ? ROOT : 0) | (p->friction_saturation != 0 ? SATURATION : 0) |
+         (p->friction_peak_rate != 0 ? PEAK : 0) | (p->friction_load != 0 ? LOAD : 0);
 }
 
 INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
@@ -86,6 +117,11 @@ INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
   AT(c->moment_cubic, k) = p->moment_cubic;
   AT(c->damping_quadratic, k) = p->damping_quadratic;
   AT(c->flow_angle, k) = p->flow_angle;
+  AT(c->steepening, k) = p->moment_cubic_exponent;
+  AT(c->thickening, k) = p->damping_quadratic_exponent;
+  AT(c->rate, k) = p->quadratic_damping_exponent;
+  AT(c->cube, k) = p->stiffness_cubic_exponent;
+  AT(c->square, k) = p->stiffness_quadratic_exponent;
   AT(c->spring, k) = spring;
   AT(c->quadratic_damping, k) = p->quadratic_damping;
   AT(c->loss, k) = p->loss_factor != 0 ? p->loss_factor * sqrt(spring * p->yaw_inertia) : 0;  // eta Kr/wn at rest
@@ -94,6 +130,16 @@ INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
   AT(c->free_play, k) = p->free_play;
   AT(c->gravity, k) = p->gravity_stiffness;
   AT(c->gravity_angle, k) = p->gravity_angle;
+}
+
+// With ranges of rates of at least `least`.
+INLINE void set_friction(Friction* f, int k, const vwt_parameters* p, double least) {
+  AT(f->moment, k) = p->friction_moment;
+  AT(f->load, k) = p->friction_load;
+  AT(f->exponent, k) = p->friction_exponent;
+  AT(f->saturation, k) = p->friction_saturation != 0 ? fmax(p->friction_saturation, least) : 0;
+  AT(f->peak, k) = p->friction_peak;
+  AT(f->peak_rate, k) = p->friction_peak_rate != 0 ? fmax(p->friction_peak_rate, least) : 0;
 }
 
 // rho V A l/2.
@@ -117,20 +163,19 @@ INLINE void set_wake(Coefficients* c, int k, const vwt_parameters* p, double win
   AT(c->phase, k) = p->shedding_phase;
 }
 
-// A power of x >= 0: that of the textbook, 2 or 3, or another with the exponent of index `exponent` in the law.
-INLINE Lane power_of(const Coefficients* c, int features, Lane x, int textbook, int exponent, double reference) {
-  Lane out = textbook == 2 ? x * x : x * x * x;
-  for (int k = 0; features & POWERS && k < WIDTH; k++) {
-    const double n = ((const double*)c->p[k])[exponent];
-    if (n != 0) {
-      AT(out, k) = vwt_power(AT(x, k), textbook, n, reference);
-    }
+// A power of x >= 0: that of the textbook, 2 or 3, or, where some are free, one with another exponent, equal at the
+// reference.
+INLINE Lane power_of(int free, Lane x, int textbook, Lane exponent, double reference) {
+  const Lane plain = textbook == 2 ? x * x : x * x * x;
+  if (!free || !ACTS(exponent)) {
+    return plain;
   }
-  return out;
+  const double scale = textbook == 2 ? reference * reference : reference * reference * reference;
+  return choose(exponent != 0, scale * power(x * (1 / reference), exponent), plain);
 }
 
-INLINE Lane power_of_angle(const Coefficients* c, int features, Lane x, int textbook, int exponent) {
-  return power_of(c, features, x, textbook, exponent, VWT_ANGLE_REFERENCE);
+INLINE Lane power_of_angle(int free, Lane x, int textbook, Lane exponent) {
+  return power_of(free, x, textbook, exponent, VWT_ANGLE_REFERENCE);
 }
 
 // What the air sees as the body's angle: the lag's state, or for a lead its mirror image about the angle, because the
@@ -143,13 +188,7 @@ INLINE Lane seen_at(const Coefficients* c, int features, Lane body, Lane lagged)
 }
 
 INLINE Lane shed_at(const Coefficients* c, Lane time) {
-  Lane out = {0};
-  for (int k = 0; k < WIDTH; k++) {
-    if (AT(c->shedding, k) != 0) {
-      AT(out, k) = AT(c->shedding, k) * sin(AT(c->turn, k) * AT(time, k) + AT(c->phase, k));
-    }
-  }
-  return out;
+  return ACTS(c->shedding) ? c->shedding * sine(c->turn * time + c->phase) : (Lane){0};
 }
 
 // Moment of the air on the body, with the powers in it; `shed` and `lagged` are read only with the features they belong
@@ -158,11 +197,11 @@ INLINE Lane moment_of_air(const Coefficients* c, const Air* air, int features, L
                        Lane lagged, Powers* powers) {
   Lane steepening = (Lane){0} + 1, thickening = steepening;
   if (ACTS(c->moment_cubic)) {
-    powers->steepening = power_of_angle(c, features, size_of(body), 2, VWT_INDEX_moment_cubic_exponent);
+    powers->steepening = power_of_angle(features & STEEPENING, size_of(body), 2, c->steepening);
     steepening += c->moment_cubic * powers->steepening;
   }
   if (ACTS(c->damping_quadratic)) {
-    powers->thickening = power_of_angle(c, features, size_of(body), 2, VWT_INDEX_damping_quadratic_exponent);
+    powers->thickening = power_of_angle(features & THICKENING, size_of(body), 2, c->thickening);
     thickening += c->damping_quadratic * powers->thickening;
   }
   const Lane moment = air->stiffness * (seen_at(c, features, body, lagged) * steepening + c->flow_angle) +
@@ -176,16 +215,6 @@ INLINE Lane taken_up(const Coefficients* c, Lane deflection) {
   return choose(deflection > c->free_play, c->free_play, above);
 }
 
-INLINE Lane gravity_moment(const Coefficients* c, Lane angle) {
-  Lane out = {0};
-  for (int k = 0; k < WIDTH; k++) {
-    if (AT(c->gravity, k) != 0) {
-      AT(out, k) = -(AT(c->gravity, k) * sin(AT(angle, k) - AT(c->gravity_angle, k)));
-    }
-  }
-  return out;
-}
-
 // Moment of the mechanism on the rod's upper end, without friction and without the linear spring and damper, and the
 // powers in it.
 INLINE Lane moment_of_mechanism(const Coefficients* c, int features, Lane angle, Lane deflection, Lane rate,
@@ -193,27 +222,58 @@ INLINE Lane moment_of_mechanism(const Coefficients* c, int features, Lane angle,
   const Lane size = size_of(deflection);
   Lane moment = {0};
   if (ACTS(c->quadratic_damping)) {
-    powers->rate = power_of(c, features, size_of(rate), 2, VWT_INDEX_quadratic_damping_exponent, VWT_RATE_REFERENCE);
+    powers->rate = power_of(features & RATE_POWER, size_of(rate), 2, c->rate, VWT_RATE_REFERENCE);
     moment -= c->quadratic_damping * with_sign(powers->rate, rate);
   }
   if (ACTS(c->loss)) {
     moment -= c->loss * rate;
   }
   if (ACTS(c->cubic)) {
-    powers->cube = power_of_angle(c, features, size, 3, VWT_INDEX_stiffness_cubic_exponent);
+    powers->cube = power_of_angle(features & CUBE, size, 3, c->cube);
     moment -= c->cubic * with_sign(powers->cube, deflection);
   }
   if (ACTS(c->quadratic)) {
-    powers->square = power_of_angle(c, features, size, 2, VWT_INDEX_stiffness_quadratic_exponent);
+    powers->square = power_of_angle(features & SQUARE, size, 2, c->square);
     moment -= c->quadratic * powers->square;
   }
   if (ACTS(c->free_play)) {
     moment += c->spring * taken_up(c, deflection);  // cancels the linear spring inside the dead zone
   }
   if (features & GRAVITY && ACTS(c->gravity)) {
-    moment += gravity_moment(c, angle);
+    moment -= c->gravity * sine(angle - c->gravity_angle);
   }
   return moment;
+}
+
+// The factors of the friction at a rate along the slip, 1 where it has none: of the rate's power, the saturation and the
+// peak, and the peak's own shape.
+typedef struct {
+  Lane power, turn, peak, shape;
+} Factors;
+
+INLINE Factors factors_of(const Friction* f, int features, Lane along) {
+  const Lane none = {0}, one = none + 1;
+  Factors out = {one, one, one, none};
+  if (features & ROOT && ACTS(f->exponent)) {
+    out.power = choose(f->exponent != 0, power(size_of(along) * (1 / VWT_RATE_REFERENCE), f->exponent), one);
+  }
+  if (features & SATURATION && ACTS(f->saturation)) {
+    const Mask acts = f->saturation > 0;
+    out.turn = choose(acts, hyperbolic_tangent(along / choose(acts, f->saturation, one)), one);
+  }
+  if (features & PEAK && ACTS(f->peak_rate)) {
+    const Mask acts = f->peak_rate > 0;
+    const Lane share = along / choose(acts, f->peak_rate, one);
+    out.shape = choose(acts, exponential(-share * share), none);
+    out.peak = 1 + f->peak * out.shape;
+  }
+  return out;
+}
+
+// As vwt_friction_level.
+INLINE Lane friction_level(const Friction* f, int features, Lane along, Lane load) {
+  const Factors factors = factors_of(f, features, along);
+  return (f->moment + f->load * load) * factors.power * factors.turn * factors.peak;
 }
 
 #endif  // VWT_LAW_H_

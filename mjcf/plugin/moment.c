@@ -18,13 +18,6 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
   return wind_speed > 0 ? p->aero_lag * p->reference_length / wind_speed : 0;
 }
 
-double vwt_power(double x, double textbook, double exponent, double reference) {
-  if (exponent == textbook) {
-    return textbook == 2 ? x * x : x * x * x;
-  }
-  return pow(reference, textbook) * pow(x / reference, exponent);
-}
-
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   if (!(s->wind_speed > 0)) {
     return 0;
@@ -50,50 +43,14 @@ double vwt_load(const vwt_parameters* p, double angle, double drive) {
   if (p->friction_load == 0) {
     return 0;
   }
-  const double gravity = p->gravity_stiffness * sin(angle - p->gravity_angle);
-  return fmax(fabs(gravity + p->load_stiffness * sin(angle - p->load_angle)), fabs(drive));
+  const double gravity = p->gravity_stiffness * sine(angle - p->gravity_angle);
+  return fmax(fabs(gravity + p->load_stiffness * sine(angle - p->load_angle)), fabs(drive));
 }
 
 double vwt_friction_level(const vwt_parameters* p, double least, double along, double load) {
-  double level = p->friction_moment + p->friction_load * load;
-  if (p->friction_exponent != 0) {
-    level *= pow(fabs(along) / VWT_RATE_REFERENCE, p->friction_exponent);
-  }
-  if (p->friction_saturation != 0) {
-    level *= tanh(along / fmax(p->friction_saturation, least));
-  }
-  if (p->friction_peak != 0 && p->friction_peak_rate != 0) {
-    const double share = along / fmax(p->friction_peak_rate, least);
-    level *= 1 + p->friction_peak * exp(-share * share);
-  }
-  return level;
-}
-
-void vwt_friction_slopes(const vwt_parameters* p, double least, double along, double slopes[5]) {
-  const double size = fabs(along), n = p->friction_exponent;
-  const double power = n != 0 ? pow(size / VWT_RATE_REFERENCE, n) : 1;
-  double turn = 1, steepness = 0, by_saturation = 0;  // the factor tanh, and its derivatives
-  if (p->friction_saturation != 0) {
-    const double range = fmax(p->friction_saturation, least);
-    turn = tanh(along / range);
-    steepness = (1 - turn * turn) / range;
-    by_saturation = -steepness * along / range;
-  }
-  double peak = 1, shape = 0, falling = 0, by_peak_rate = 0;  // the factor of the peak, and its derivatives
-  if (p->friction_peak_rate != 0) {
-    const double range = fmax(p->friction_peak_rate, least), share = along / range;
-    shape = exp(-share * share);
-    peak = 1 + p->friction_peak * shape;
-    falling = -2 * p->friction_peak * shape * share / range;
-    by_peak_rate = -falling * share;
-  }
-  const double level = p->friction_moment;
-  const double by_power = n != 0 && size > 0 ? n * power / along : 0;
-  slopes[0] = level * (by_power * turn * peak + power * (steepness * peak + turn * falling));
-  slopes[1] = size > 0 ? level * power * turn * peak * log(size / VWT_RATE_REFERENCE) : 0;
-  slopes[2] = level * power * by_saturation * peak;
-  slopes[3] = level * power * turn * by_peak_rate;
-  slopes[4] = level * power * turn * shape;
+  Friction f;
+  set_friction(&f, 0, p, least);
+  return friction_level(&f, ANY, along, load);
 }
 
 // Under the greatest load of gravity.

@@ -88,10 +88,9 @@ typedef struct {
 // Time constant of the aerodynamic lag, s (a l/V); 0 without lag, negative for a phase lead.
 double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 
-// x^textbook for x >= 0, textbook 2 or 3, or another power of x that equals it at the reference.
+// Where a power with a free exponent equals that of the textbook.
 #define VWT_ANGLE_REFERENCE 0.2  // rad
 #define VWT_RATE_REFERENCE 2.0   // rad/s
-double vwt_power(double x, double textbook, double exponent, double reference);
 
 // Aerodynamic yaw moment on the body, N m.
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
@@ -113,9 +112,6 @@ double vwt_load(const vwt_parameters* p, double angle, double drive);
 // from `vwt_friction_least_rate`, so that friction does not change by more than the integration with steps of `duration` s
 // follows.
 double vwt_friction_level(const vwt_parameters* p, double least, double along, double load);
-// Its derivatives by `along`, by its exponent, and by the saturation and the peak rate that act, which are those above
-// `least`, and by the peak, in this order.
-void vwt_friction_slopes(const vwt_parameters* p, double least, double along, double slopes[5]);
 double vwt_friction_least_rate(const vwt_parameters* p, double inertia, double duration);
 
 // Coulomb friction in a step of `duration` s, N m. It opposes the rate. Where the rate would pass zero within the step, it

@@ -409,7 +409,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
                const int* columns, const double* const* changes, const double* const* weights, int weighed,
                double* const* angle, double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
-    if (!vwt_is_plain(&parameters[i], &runs[i]) || !is_smooth(&parameters[i])) {
+    if (!vwt_is_plain(&parameters[i], &runs[i]) || twists(&runs[i]) || !is_smooth(&parameters[i])) {
       return -1;
     }
   }

@@ -68,10 +68,7 @@ static Law law_of(const Lanes* c) {
     law.seen[k] = 1 / body;
     law.steep[k] = body != 1 ? pow(body, -1 - law.steepening[k]) : 1;
     law.thick[k] = body != 1 ? pow(body, -law.thickening[k]) : 1;
-    if (law.steepening[k] != 2 || law.thickening[k] != 2 || law.rate[k] != 2 || law.cube[k] != 3 ||
-        law.square[k] != 2) {
-      law.features |= POWERS;  // also where the coefficient is zero, by which there is a derivative
-    }
+    law.features |= free_powers(p);  // also where the coefficient is zero, by which there is a derivative
   }
   return law;
 }
@@ -112,27 +109,35 @@ INLINE Lane steepness(Lane power, Lane x, Lane exponent) {
   return choose(x > 0, exponent * power / x, (Lane){0});
 }
 
+// ln(x/reference); 0 where x is 0.
+INLINE Lane log_of(Lane x, double reference) {
+  const Mask above = x > 0;
+  return choose(above, logarithm(choose(above, x, (Lane){0} + 1) / reference), (Lane){0});
+}
+
 // The derivative of the friction's level by the rate in its own direction, and what belongs to its form.
 INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
-  const Lanes* c = law->c;
-  Lane by_rate = {0};
+  const Friction* f = &law->c->friction;
+  const Lane none = {0}, one = none + 1;
   if (!(law->features & RATE)) {
-    at->level = (Lane){0} + 1;
-    return by_rate;
+    at->level = one;
+    return none;
   }
-  for (int k = 0; k < VWT_LANES; k++) {
-    const double along = slip[k] * at->rate[k], moment = c->friction[k];
-    double slopes[5] = {0};
-    if (moment > 0 && slip[k] != 0) {
-      vwt_friction_slopes(c->law.p[k], c->least_rate[k], along, slopes);
-    }
-    at->level[k] = moment > 0 ? vwt_friction_level(c->law.p[k], c->least_rate[k], along, 0) / moment : 1;
-    by_rate[k] = slopes[0];
-    for (int n = 0; n < 4; n++) {
-      at->by_friction[n][k] = -slip[k] * slopes[n + 1] * law->inverse[k];
-    }
-  }
-  return by_rate;
+  const Lane along = slip * at->rate, size = size_of(along);
+  const Factors by = factors_of(f, law->features, along);
+  const Mask slips = (f->moment > 0) & (slip != 0), saturates = f->saturation > 0, peaks = f->peak_rate > 0;
+  const Lane saturation = choose(saturates, f->saturation, one), peak_rate = choose(peaks, f->peak_rate, one);
+  const Lane steepness = choose(saturates, (1 - by.turn * by.turn) / saturation, none);
+  const Lane falling = -2 * f->peak * by.shape * along / (peak_rate * peak_rate);
+  const Mask moves = (f->exponent != 0) & (size > 0);
+  const Lane by_power = choose(moves, f->exponent * by.power / choose(moves, along, one), none);
+  const Lane level = choose(slips, f->moment, none), per = -slip * level * law->inverse;
+  at->level = choose(f->moment > 0, by.power * by.turn * by.peak, one);
+  at->by_friction[0] = per * by.power * by.turn * by.peak * log_of(size, VWT_RATE_REFERENCE);
+  at->by_friction[1] = -per * by.power * steepness * along / saturation * by.peak;
+  at->by_friction[2] = -per * by.power * by.turn * falling * along / peak_rate;
+  at->by_friction[3] = per * by.power * by.turn * by.shape;
+  return level * (by_power * by.turn * by.peak + by.power * (steepness * by.peak + by.turn * falling));
 }
 
 // The wind's speed at a stage, and the derivative of the acceleration by it.
@@ -176,10 +181,16 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
        square = 2 * bend;
-  if (features & POWERS) {
+  if (features & STEEPENING) {
     steepening = steepness(p->steepening, size, law->steepening);
+  }
+  if (features & THICKENING) {
     thickening = steepness(p->thickening, size, law->thickening);
+  }
+  if (features & RATE_POWER) {
     turning_rate = steepness(p->rate, size_of(rate), law->rate);
+  }
+  if (features & (CUBE | SQUARE)) {
     cube = steepness(p->cube, bend, law->cube);
     square = steepness(p->square, bend, law->square);
   }
@@ -201,9 +212,7 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
   }
   by_angle -= choose(bend < c->law.free_play, none, c->law.spring);
   if (features & GRAVITY) {
-    for (int k = 0; k < VWT_LANES; k++) {
-      by_angle[k] -= c->law.gravity[k] != 0 ? c->law.gravity[k] * cos(angle[k] - c->law.gravity_angle[k]) : 0;
-    }
+    by_angle -= c->law.gravity * cosine(angle - c->law.gravity_angle);
   }
   Lane by_rate = c->body * air.damping * (1 + c->law.damping_quadratic * p->thickening) * c->body;
   by_rate -= c->law.quadratic_damping * turning_rate + c->law.loss + c->damping + slip * slip * rub(law, slip, at);
@@ -214,22 +223,6 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     at->by_lagged = side * c->body * steep * law->inverse;
   }
   return found;
-}
-
-INLINE Lane logarithm(Lane x, double reference) {
-  Lane out = {0};
-  for (int k = 0; k < VWT_LANES; k++) {
-    out[k] = x[k] > 0 ? log(x[k] / reference) : 0;
-  }
-  return out;
-}
-
-INLINE Lane sine(const Stage* at, Lane turn, Lane phase, double shift) {
-  Lane out;
-  for (int k = 0; k < VWT_LANES; k++) {
-    out[k] = sin(turn[k] * at->time[k] + phase[k] + shift);
-  }
-  return out;
 }
 
 // The derivative of the acceleration at a stage along a change of the samples of its wind or its drive.
@@ -253,7 +246,6 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
   const Lanes* c = law->c;
   const Lane none = {0}, angle = at->angle, rate = at->rate, bend = at->deflection;
   const Powers* p = &at->powers;
-  const double quarter = 1.5707963267948966192313216916398;
   const Lane speed = features & WIND ? at->speed : none + 1, pressure = features & WIND ? at->pressure : none + 1;
   if (term >= VWT_TERM_COUNT) {
     return by_samples(law, term - VWT_TERM_COUNT, in, at);
@@ -283,44 +275,34 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
       return pressure;
     case VWT_TERM_drive:
       return at->input;
-    case VWT_TERM_gravity_sine: {
-      Lane out;
-      for (int k = 0; k < VWT_LANES; k++) {
-        out[k] = -sin(angle[k]);
-      }
-      return out;
-    }
-    case VWT_TERM_gravity_cosine: {
-      Lane out;
-      for (int k = 0; k < VWT_LANES; k++) {
-        out[k] = cos(angle[k]);
-      }
-      return out;
-    }
+    case VWT_TERM_gravity_sine:
+      return -sine(angle);
+    case VWT_TERM_gravity_cosine:
+      return cosine(angle);
     case VWT_TERM_friction:
       return -slip * at->level;
     case VWT_TERM_shedding_sine:
-      return sine(at, c->law.turn, none, 0);
+      return sine(c->law.turn * at->time);
     case VWT_TERM_shedding_cosine:
-      return sine(at, c->law.turn, none, quarter);
+      return cosine(c->law.turn * at->time);
     case VWT_TERM_steepening_exponent:
       return law->inverse * c->body * at->air.stiffness * c->law.moment_cubic * at->seen * p->steepening *
-             logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+             log_of(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_thickening_exponent:
       return law->inverse * c->body * c->body * at->air.damping * c->law.damping_quadratic * rate * p->thickening *
-             logarithm(size_of(angle), VWT_ANGLE_REFERENCE);
+             log_of(size_of(angle), VWT_ANGLE_REFERENCE);
     case VWT_TERM_rate_exponent:
       return -law->inverse * c->law.quadratic_damping * with_sign(p->rate, rate) *
-             logarithm(size_of(rate), VWT_RATE_REFERENCE);
+             log_of(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_cube_exponent:
-      return -law->inverse * c->law.cubic * with_sign(p->cube, bend) * logarithm(size_of(bend), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.cubic * with_sign(p->cube, bend) * log_of(size_of(bend), VWT_ANGLE_REFERENCE);
     case VWT_TERM_square_exponent:
-      return -law->inverse * c->law.quadratic * p->square * logarithm(size_of(bend), VWT_ANGLE_REFERENCE);
+      return -law->inverse * c->law.quadratic * p->square * log_of(size_of(bend), VWT_ANGLE_REFERENCE);
     case VWT_TERM_gap:
       return choose(size_of(bend) > c->law.free_play, with_sign(law->inverse * c->law.spring, bend), none);
     case VWT_TERM_friction_exponent:
       return law->features & RATE ? at->by_friction[0]
-                                  : -slip * law->inverse * c->friction * logarithm(size_of(rate), VWT_RATE_REFERENCE);
+                                  : -slip * law->inverse * c->friction.moment * log_of(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_friction_saturation:
       return law->features & RATE ? at->by_friction[1] : none;
     case VWT_TERM_friction_peak_rate:
@@ -330,7 +312,7 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
     case VWT_TERM_lag:
       return at->by_lag;
     case VWT_TERM_turn:
-      return law->inverse * c->body * c->law.shedding * at->time * sine(at, c->law.turn, c->law.phase, quarter);
+      return law->inverse * c->body * c->law.shedding * at->time * cosine(c->law.turn * at->time + c->law.phase);
     default:  // of the start
       return none;
   }
@@ -358,7 +340,7 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_drive] = c->scale[k] * inverse;
   out[VWT_TERM_gravity_sine] = c->law.gravity[k] * inverse * cos(c->law.gravity_angle[k]);
   out[VWT_TERM_gravity_cosine] = c->law.gravity[k] * inverse * sin(c->law.gravity_angle[k]);
-  out[VWT_TERM_friction] = c->friction[k] * inverse;
+  out[VWT_TERM_friction] = c->friction.moment[k] * inverse;
   out[VWT_TERM_shedding_sine] = body * c->law.shedding[k] * inverse * cos(c->law.phase[k]);
   out[VWT_TERM_shedding_cosine] = body * c->law.shedding[k] * inverse * sin(c->law.phase[k]);
   out[VWT_TERM_steepening_exponent] = law->steepening[k];
@@ -368,8 +350,8 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_square_exponent] = law->square[k];
   out[VWT_TERM_gap] = c->law.free_play[k];
   out[VWT_TERM_friction_exponent] = p->friction_exponent;
-  out[VWT_TERM_friction_saturation] = p->friction_saturation != 0 ? fmax(p->friction_saturation, c->least_rate[k]) : 0;
-  out[VWT_TERM_friction_peak_rate] = p->friction_peak_rate != 0 ? fmax(p->friction_peak_rate, c->least_rate[k]) : 0;
+  out[VWT_TERM_friction_saturation] = c->friction.saturation[k];
+  out[VWT_TERM_friction_peak_rate] = c->friction.peak_rate[k];
   out[VWT_TERM_friction_peak] = p->friction_peak;
   out[VWT_TERM_friction_load] = p->friction_load;
   out[VWT_TERM_lag] = c->law.lag[k];

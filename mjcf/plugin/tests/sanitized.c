@@ -10,6 +10,8 @@
 #include <mujoco/mujoco.h>
 
 #include "forward.h"
+#define LAW_LANES 4
+#include "law.h"
 
 #define EXPECT(condition)                                              \
   do {                                                                 \
@@ -244,7 +246,36 @@ static void check_slopes(void) {
   }
 }
 
+static double greater(double one, double other) { return one > other ? one : other; }
+
+// The elementary functions of runs side by side against the library's.
+static void check_functions(void) {
+  double of_sine = 0, of_cosine = 0, of_power = 0, of_tangent = 0, of_exponential = 0;
+  for (int i = 0; i <= 2000000; i++) {
+    const double angle = i < 1000000 ? 1e-5 * (i - 500000) : (i - 1500000) * 1.37;
+    const Lane x = (Lane){0} + angle;
+    of_sine = greater(of_sine, fabs(sine(x)[i % LAW_LANES] - sin(angle)));
+    of_cosine = greater(of_cosine, fabs(cosine(x)[i % LAW_LANES] - cos(angle)));
+  }
+  for (int i = -200000; i <= 200000; i++) {
+    const double x = exp(1e-4 * i), n = 0.1 + 2.9 * fabs(sin((double)i)), y = 3.3e-3 * i;
+    const Lane lane = (Lane){0} + x;
+    of_power = greater(of_power, fabs(power(lane, (Lane){0} + n)[0] / pow(x, n) - 1));
+    of_tangent = greater(of_tangent, fabs(hyperbolic_tangent(lane)[0] - tanh(x)));
+    of_exponential = greater(of_exponential, fabs(exponential((Lane){0} + y)[0] / exp(y) - 1));
+  }
+  EXPECT(of_sine > 0 && of_sine < 3e-16);
+  EXPECT(of_cosine < 3e-16);
+  EXPECT(of_power < 3e-14);  // the rounding error of its logarithm
+  EXPECT(of_tangent < 4e-16);
+  EXPECT(of_exponential < 1e-15);
+  EXPECT(power((Lane){0}, (Lane){0} + 2)[0] == 0);
+  EXPECT(hyperbolic_tangent((Lane){0} - 3)[0] == -hyperbolic_tangent((Lane){0} + 3)[0]);
+  EXPECT(exponential((Lane){0} - 1e6)[0] > 0 && exponential((Lane){0} - 1e6)[0] < 1e-300);
+}
+
 int main(void) {
+  check_functions();
   check_forward();
   check_slopes();
   mju_user_error = on_error;
