@@ -5,18 +5,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effect
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.drive import DriveMoment, Same
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, read_only
 
 _REFERENCE = 0.2  # rad: angle at which every exponent gives the same error
 
@@ -269,9 +270,9 @@ class DroppedSamples(Effect):
         run = replace(run, duration=run.duration + self.lost_time + _MARGIN)
         if run.drive is None or stated.drive is None or self.input_kept == 1.0:
             return run
-        stamps = run.drive.time_s + stated.drive.delay  # since the run's start
-        later = self.on_time(stamps, stated, drawn) - stamps
-        return replace(run, drive=replace(run.drive, time_s=run.drive.time_s + later))
+        times, instants = Same(run.drive.time_s), self._instants(drawn) * stated.duration
+        late = _after_losses(times, stated.drive.delay, self.lost_time, tuple(instants.tolist()))
+        return replace(run, drive=replace(run.drive, time_s=late))
 
     @classmethod
     def on_rows(
@@ -289,14 +290,24 @@ class DroppedSamples(Effect):
         """The true time runs ahead of the stamps after every instant."""
         if self.is_null:
             return time_s
-        instants = self._instants(drawn) * stated.duration
-        interval = time_s[1] - time_s[0]
-        after = sum(np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0) for instant in instants)
-        return np.asarray(time_s + self.lost_time * (after / instants.size), np.float64)
+        return time_s + _lost(time_s, self.lost_time, (self._instants(drawn) * stated.duration).tolist())
 
     def _instants(self, drawn: Drawn) -> Array:
         """Shares of the run, shape (n,)."""
         return drawn if isinstance(drawn, np.ndarray) else np.array([self.drawn_number(drawn)])
+
+
+def _lost(time_s: Array, lost_time: float, instants: Sequence[float]) -> Array:
+    """Time lost until each time stamp, s, in equal parts at the instants, s."""
+    interval = time_s[1] - time_s[0]
+    after = sum(np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0) for instant in instants)
+    return np.asarray(lost_time * (after / len(instants)), np.float64)
+
+
+@lru_cache(maxsize=64)
+def _after_losses(times: Same, delay: float, lost_time: float, instants: tuple[float, ...]) -> Array:
+    """The true times of an input's samples, s: one object for equal losses, whose lines are computed once."""
+    return read_only(times.array + _lost(times.array + delay, lost_time, instants))
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ class DriveMoment:
                 one for each step, with the impulse and the first moment of the input there. The motion of a body
                 then differs by less than the order of step².
         """
-        of = _Same(self.time_s), _Same(self.values), self.held, self.delay
+        of = Same(self.time_s), Same(self.values), self.held, self.delay
         return _lines_of_samples(*of) if sampled else _lines_of_steps(*of, step, steps)
 
     def oscillation(
@@ -183,8 +183,8 @@ class DriveMoment:
             Complex, shape (n,).
         """
         acting = self.acting
-        of = _Same(acting.time_s), _Same(acting.values), acting.held, acting.delay
-        return self.scale * _mode(*of, root, _Same(time_s))
+        of = Same(acting.time_s), Same(acting.values), acting.held, acting.delay
+        return self.scale * _mode(*of, root, Same(time_s))
 
 
 def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
@@ -212,7 +212,7 @@ def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
     return first, second
 
 
-class _Same:
+class Same:
     """An array as a key of a cache: equal to itself only."""
 
     def __init__(self, array: Array) -> None:
@@ -222,11 +222,11 @@ class _Same:
         return id(self.array)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.array is self.array
+        return isinstance(other, Same) and other.array is self.array
 
 
 @lru_cache(maxsize=64)
-def _lines_of_samples(time_s: _Same, values: _Same, held: bool, delay: float) -> Lines:
+def _lines_of_samples(time_s: Same, values: Same, held: bool, delay: float) -> Lines:
     drive = DriveMoment(time_s.array, values.array, delay=delay, held=held)
     rise = 0.0 if held else np.diff(drive.values) / drive.interval
     slopes = np.append(np.broadcast_to(rise, drive.values.size - 1), 0.0)
@@ -234,9 +234,7 @@ def _lines_of_samples(time_s: _Same, values: _Same, held: bool, delay: float) ->
 
 
 @lru_cache(maxsize=64)
-def _lines_of_steps(
-    time_s: _Same, values: _Same, held: bool, delay: float, step: Seconds, steps: int
-) -> Lines:
+def _lines_of_steps(time_s: Same, values: Same, held: bool, delay: float, step: Seconds, steps: int) -> Lines:
     ends = np.asarray(step * np.arange(steps + 1), np.float64)
     impulse, product = _impulses(DriveMoment(time_s.array, values.array, delay=delay, held=held), ends)
     slopes = 12.0 * (product - impulse * step / 2.0) / step**3
@@ -264,7 +262,7 @@ class _Course:
 
 
 @lru_cache(maxsize=64)
-def _course(times: _Same, values: _Same, held: bool, delay: float, at: _Same) -> _Course:
+def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _Course:
     drive, time_s = DriveMoment(times.array, values.array, delay=delay, held=held), at.array
     within = _EVEN * drive.interval
     kinks = drive.time_s + delay
@@ -280,7 +278,7 @@ def _course(times: _Same, values: _Same, held: bool, delay: float, at: _Same) ->
 
 
 @lru_cache(maxsize=64)
-def _mode(times: _Same, values: _Same, held: bool, delay: float, root: complex, at: _Same) -> np.ndarray:
+def _mode(times: Same, values: Same, held: bool, delay: float, root: complex, at: Same) -> np.ndarray:
     """As `DriveMoment.mode`, in the unit of the samples and s."""
     course = _course(times, values, held, delay, at)
 
