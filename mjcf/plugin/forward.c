@@ -350,7 +350,7 @@ int vwt_forward(int count, const vwt_parameters* parameters, const vwt_run* runs
     int side_by_side = 0;
     while (side_by_side < VWT_LANES && i + side_by_side < count &&
            vwt_is_plain(&parameters[i + side_by_side], &runs[i + side_by_side]) &&
-           vwt_alike(&runs[i], &runs[i + side_by_side])) {
+           vwt_alike(&parameters[i], &runs[i], &parameters[i + side_by_side], &runs[i + side_by_side])) {
       side_by_side++;
     }
     const int failed = side_by_side > 0

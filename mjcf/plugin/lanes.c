@@ -16,39 +16,44 @@ int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
   const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
   return steady && run->forcing_count == 0 && run->ambient_count == 0 &&
          (run->moment_count == 0 || is_plain_drive(p, run)) &&
-         run->program_count == 0 && !(p->presliding > 0) &&
-         (twists(run) ? p->aero_lag == 0 && run->lead == 0 && run->rod_stiffness == 0
+         run->program_count == 0 &&
+         (twists(run) ? p->aero_lag == 0 && run->lead == 0 && run->rod_stiffness == 0 && !bends(p)
                       : run->twist == 0 && run->twist_rate == 0);
 }
 
-int vwt_alike(const vwt_run* one, const vwt_run* other) {
-  return one->steps == other->steps && one->stride == other->stride && twists(one) == twists(other);
+int vwt_alike(const vwt_parameters* p, const vwt_run* one, const vwt_parameters* q, const vwt_run* other) {
+  return one->steps == other->steps && one->stride == other->stride && twists(one) == twists(other) &&
+         bends(p) == bends(q);
 }
 
 // The motion after a step.
 INLINE void runge_kutta(const Lanes* c, const State* s, int features, Lane* angle, Lane* rate) {
   const Lane h = c->whole_step, half = c->half_step, none = {0};
-  const int sheds = features & SHEDDING, lags = features & LAG;
+  const int sheds = features & SHEDDING, lags = features & LAG, bent = features & DAHL;
   const Input in = input_of(c, features, s->start, half);
   Lane shed = sheds ? shed_at(&c->law, s->start) : none;
   Air air = air_at(c, features, s->start);
   Lane input = input_at(&in, features, s->start);
-  const Lane a1 = acceleration_at(c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged, input);
+  Lane slip = bent ? s->deflection / c->range : s->slip;
+  const Lane a1 = acceleration_at(c, &air, slip, features, s->angle, s->rate, shed, s->lagged, input);
   const Lane y2 = s->angle + half * s->rate, r2 = s->rate + half * a1;
   shed = sheds ? shed_at(&c->law, s->start + half) : none;
   air = air_at(c, features, s->start + half);
   input = input_at(&in, features, s->start + half);
   Lane lagged = lags ? lagged_at(c, s, c->half, half, y2, r2) : none;
-  const Lane a2 = acceleration_at(c, &air, s->slip, features, y2, r2, shed, lagged, input);
+  slip = bent ? deflection_after(c, s, half, y2, r2) / c->range : s->slip;
+  const Lane a2 = acceleration_at(c, &air, slip, features, y2, r2, shed, lagged, input);
   const Lane y3 = s->angle + half * r2, r3 = s->rate + half * a2;
   lagged = lags ? lagged_at(c, s, c->half, half, y3, r3) : none;
-  const Lane a3 = acceleration_at(c, &air, s->slip, features, y3, r3, shed, lagged, input);
+  slip = bent ? deflection_after(c, s, half, y3, r3) / c->range : s->slip;
+  const Lane a3 = acceleration_at(c, &air, slip, features, y3, r3, shed, lagged, input);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
   shed = sheds ? shed_at(&c->law, s->start + h) : none;
   air = air_at(c, features, s->start + h);
   input = input_at(&in, features, s->start + h);
   lagged = lags ? lagged_at(c, s, c->whole, h, y4, r4) : none;
-  const Lane a4 = acceleration_at(c, &air, s->slip, features, y4, r4, shed, lagged, input);
+  slip = bent ? deflection_after(c, s, h, y4, r4) / c->range : s->slip;
+  const Lane a4 = acceleration_at(c, &air, slip, features, y4, r4, shed, lagged, input);
   *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }
@@ -108,6 +113,9 @@ INLINE void step(const Lanes* c, State* s, int features, Step* alone) {
   }
   if (features & LAG) {
     s->lagged = lagged_at(c, &before, c->whole, c->whole_step, s->angle, s->rate);
+  }
+  if (features & DAHL) {
+    s->deflection = deflection_after(c, &before, c->whole_step, s->angle, s->rate);
   }
   if (!c->rubs) {
     return;

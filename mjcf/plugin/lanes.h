@@ -29,6 +29,7 @@ typedef struct {
   Lane step, whole_step, half_step, body, inertia, damping, rod;
   Lane twist_stiffness, twist_damping, lower;  // of a rod that twists, and the inertia below it; above it: `inertia`
   Friction friction;
+  Lane range;  // of Dahl's friction, rad
   Lane scale, offset, turns;  // of a drive: N m per unit and N m, seen from the upper end; 1 where it turns the root
   Mask on_end;                // the lanes whose drive acts on the upper end
   double half[VWT_LANES][4], whole[VWT_LANES][4];  // weights of the lag
@@ -42,11 +43,12 @@ typedef struct {
 
 // The start of a step, by lane.
 typedef struct {
-  Lane start, angle, rate, twist, twist_rate, lagged, slip;
+  Lane start, angle, rate, twist, twist_rate, lagged, slip, deflection;
   int rests[VWT_LANES];
 } State;
 
 static int twists(const vwt_run* run) { return run->twist_stiffness > 0; }
+static int bends(const vwt_parameters* p) { return p->presliding > 0; }
 
 static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* run) {
   const double wind = fmax(0, run->wind[0]);
@@ -55,9 +57,10 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   set_wake(&c->law, k, p, wind);
   set_air(&c->air, k, p, wind);
   c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0) | (run->moment_count > 0 ? DRIVE : 0) |
-                     (twists(run) ? TWIST : 0);
-  c->rubs |= vwt_rubs(p);
-  c->dry[k] = -vwt_rubs(p);
+                     (twists(run) ? TWIST : 0) | (bends(p) ? DAHL : 0);
+  c->rubs |= vwt_rubs(p) && !bends(p);
+  c->dry[k] = -(vwt_rubs(p) && !bends(p));
+  c->range[k] = bends(p) ? vwt_presliding_range(p, p->yaw_inertia, run->step) : 1;
   c->run[k] = run;
   c->step[k] = run->step;
   c->whole_step[k] = stride * run->step;
@@ -145,6 +148,7 @@ INLINE Lane deflection_at(const Lanes* c, int features, Lane angle, Lane input) 
   return features & DRIVE ? angle - c->turns * input : angle;
 }
 
+// Per unit of the slip, which is that of Dahl's deflection over its range where friction is his.
 INLINE Lane friction_at(const Lanes* c, int features, Lane slip, Lane angle, Lane rate) {
   if (!(features & RATE)) {
     return c->friction.moment;
@@ -153,7 +157,7 @@ INLINE Lane friction_at(const Lanes* c, int features, Lane slip, Lane angle, Lan
   for (int k = 0; features & LOAD && k < VWT_LANES; k++) {
     load[k] = vwt_load(c->law.p[k], angle[k], 0);
   }
-  return friction_level(&c->friction, features, slip * rate, load);
+  return friction_level(&c->friction, features, features & DAHL ? size_of(rate) : slip * rate, load);
 }
 
 // Angular acceleration at a motion, with the powers in it; `shed`, `lagged` and `input` are read only with the features
@@ -188,6 +192,20 @@ INLINE Lane lagged_at(const Lanes* c, const State* s, const double weights[][4],
     }
   }
   return out;
+}
+
+INLINE Lane slid(const Lanes* c, Lane deflection, Lane side, Lane distance) {
+  const Lane end = side * c->range, moved = end + (deflection - end) * exponential(-distance / c->range);
+  return choose(distance > 0, moved, deflection);
+}
+
+// Dahl's deflection, as vwt_presliding_advance.
+INLINE Lane deflection_after(const Lanes* c, const State* s, Lane duration, Lane angle, Lane rate) {
+  const Lane none = {0}, one = none + 1, change = angle - s->angle;
+  const Mask forwards = (s->rate > 0) | ((s->rate == 0) & (change > 0)), reverses = s->rate * rate < 0;
+  const Lane side = choose(forwards, one, -one), apart = choose(reverses, size_of(rate - s->rate), one);
+  const Lane back = choose(reverses, duration * rate * rate / (2 * apart), none);
+  return slid(c, slid(c, s->deflection, side, side * change + back), -side, back);
 }
 
 // The lanes that have Coulomb friction and do not slide on throughout a step: the others have moved as the step says.
@@ -235,7 +253,8 @@ static void release(int count, const vwt_parameters* parameters, const vwt_run* 
     s->twist[k] = alone[k].from.twist;
     s->twist_rate[k] = alone[k].from.twist_rate;
     s->lagged[k] = alone[k].lagged;
-    s->slip[k] = vwt_rubs(&parameters[i]) ? alone[k].slip : 0;
+    s->slip[k] = c->dry[k] ? alone[k].slip : 0;
+    s->deflection[k] = 0;
   }
 }
 

@@ -41,7 +41,8 @@ INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : othe
 #include "elementary.h"
 
 // What a law has that takes long: an elementary function, or a loop. The first five: powers with a free exponent; ROOT,
-// SATURATION, PEAK and LOAD: of the friction; WIND: of samples; DRIVE: a drive; TWIST: a rod that twists
+// SATURATION, PEAK and LOAD: of the friction; WIND: of samples; DRIVE: a drive; TWIST: a rod that twists; DAHL:
+// Dahl's friction
 enum {
   STEEPENING = 1,
   THICKENING = 2,
@@ -59,7 +60,8 @@ enum {
   WIND = 4096,
   DRIVE = 8192,
   TWIST = 16384,
-  ANY = 32767
+  DAHL = 32768,
+  ANY = 65535
 };
 
 // The coefficients of the law, by lane.

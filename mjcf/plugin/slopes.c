@@ -278,11 +278,11 @@ INLINE void between(Lane h, double u, Lane angle0, Lane rate0, Lane angle1, Lane
   *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
 }
 
-// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, and
-// friction that depends on the load has none by gravity's terms.
+// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, that with
+// a load has none by gravity's terms, and Dahl's none yet.
 static int is_smooth(const vwt_parameters* p) {
   const int root = p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1;
-  return !root && p->friction_load == 0;
+  return !root && !bends(p) && p->friction_load == 0;
 }
 
 // Whether a term of one lane has a derivative.
@@ -415,7 +415,7 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
   }
   for (int i = 0; i < count;) {
     int together = 1;
-    while (together < VWT_LANES && i + together < count && vwt_alike(&runs[i], &runs[i + together])) {
+    while (together < VWT_LANES && i + together < count && vwt_alike(&parameters[i], &runs[i], &parameters[i + together], &runs[i + together])) {
       together++;
     }
     const Out out = {.size = size, .width = width, .angle = &angle[i], .rate = &rate[i],

@@ -12,13 +12,20 @@ FORMS = {
     "friction": {"friction_moment": 0.01},
     "friction with a peak": {"friction_moment": 0.01, "friction_peak": 0.6, "friction_peak_rate": 0.5},
     "friction with a load": {"friction_load": 0.05, "gravity_stiffness": 0.4, "gravity_angle": 0.1},
+    "friction that gives way": {"friction_moment": 0.01, "presliding": 0.01},
     "other powers": {"moment_cubic": -2.0, "moment_cubic_exponent": 2.5, "damping_quadratic": 3.0},
     "gravity": {"gravity_stiffness": 0.4, "gravity_angle": 0.1},
 }
 
 
 #: Those with an elementary function, which lanes and the library round differently.
-ROUNDED = ("friction with a peak", "friction with a load", "other powers", "gravity")
+ROUNDED = (
+    "friction with a peak",
+    "friction with a load",
+    "friction that gives way",
+    "other powers",
+    "gravity",
+)
 
 
 def kept_apart(run):
