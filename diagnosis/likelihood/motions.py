@@ -263,12 +263,12 @@ def read_together(
     for number, (place, run) in enumerate(zip(places, runs, strict=True)):
         ringing = motions.ringing[place]
         if ringing is not None:
-            ends = slice(blocks[number] + 1)
-            of_run = angle[number, ends], rate[number, ends]
-            angle[number, ends], rate[number, ends] = ringing.added(*of_run, run.interval)
+            own = slice(blocks[number] + 1)
+            slow = angle[number, own], rate[number, own]
+            angle[number, own], rate[number, own] = ringing.added(*slow, run.interval)
     if reads_plainly(asked.effects[places[0]]):
-        means = block_means(runs, angle, rate) + asked.zero[places, None]
-        return [mean[:count] for mean, count in zip(means, blocks, strict=True)]
+        values = block_means(runs, angle, rate) + asked.zero[places, None]
+        return [value[:count] for value, count in zip(values, blocks, strict=True)]
     found, chains = [], [asked.chain(place) for place in places]
     steady = [number for number, chain in enumerate(chains) if not chain.skips]
     of_steady = block_means([runs[i] for i in steady], angle[steady], rate[steady]) if steady else ()

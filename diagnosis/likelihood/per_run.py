@@ -231,6 +231,7 @@ class _Skipping:
                 for first, second in ((one, other), (other, one))
             ]
         self.powers = [z ** np.arange(rate.size) for *_, z in self.terms]
+        self._known: dict[int, Array] = {}
         self.scale = np.asarray(scale, np.float64)
         self.left = self._unabsorbed(residual)
         power = self._powers() - np.sum(self._seen(run.noise.transposed(self.basis)) ** 2, axis=1)
@@ -267,14 +268,18 @@ class _Skipping:
         return float(step.block * self.run.interval / self.run.duration)
 
     def _change(self, steps: list[tuple[_Skip, float]]) -> Array:
-        added = np.zeros(self.left.size)
-        for step, time in steps:
-            after = slice(step.block, None)
-            added[after] += time * sum(
-                (a[step.block] * b[after] * power[: self.left.size - step.block]).real
+        return sum((time * self._by_second(step.block) for step, time in steps), np.zeros(self.left.size))
+
+    def _by_second(self, block: int) -> Array:
+        """The unabsorbed change of the residual by a second lost at a block, which is sought again and again."""
+        if block not in self._known:
+            after, added = slice(block, None), np.zeros(self.left.size)
+            added[after] = sum(
+                (a[block] * b[after] * power[: self.left.size - block]).real
                 for (a, b, _), power in zip(self.terms, self.powers, strict=True)
             )
-        return self._unabsorbed(self.run.scaled(added))
+            self._known[block] = self._unabsorbed(self.run.scaled(added))
+        return self._known[block]
 
     def _seen(self, whitened: Array) -> Array:
         """Products of the change by a second lost at every block with values after the transposed filter."""
