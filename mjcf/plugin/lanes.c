@@ -197,8 +197,8 @@ CLONED int vwt_integrate_lanes(int count, const vwt_parameters* parameters, cons
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
   Step alone[VWT_LANES];
   release(count, parameters, runs, &c, &s, alone, weights);
-  // the law of most runs has none of the features that need a function of the library
-  if (c.law.features & TWIST) {  // compiled apart from a rigid rod
+  // compiled apart: rods that twist, and the law of most runs, which has none of the features
+  if (c.law.features & TWIST) {
     return integrate(&c, &s, c.law.features | TWIST, count, alone, runs, angle, rate);
   }
   return c.law.features == 0 ? integrate(&c, &s, 0, count, alone, runs, angle, rate)

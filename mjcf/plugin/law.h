@@ -69,7 +69,7 @@ typedef struct {
   int features;  // of any lane
   const vwt_parameters* p[WIDTH];
   Lane moment_cubic, damping_quadratic, flow_angle;
-  Lane steepening, thickening, rate, cube, square;  // exponents; 0: that of the textbook
+  Lane steepening, thickening, rate, cube, square;  // free exponents; 0: that of the textbook
   Lane lag;                    // s, in a constant wind
   Lane shedding, turn, phase;  // of the vortices in a constant wind: N m, rad/s and rad
   Lane spring, quadratic_damping, loss, cubic, quadratic, free_play, gravity, gravity_angle;
@@ -92,6 +92,8 @@ typedef struct {
 
 // Whether a power has another exponent than that of the textbook.
 INLINE int is_free(double exponent, double textbook) { return exponent != 0 && exponent != textbook; }
+
+INLINE double exponent_of(double exponent, double textbook) { return is_free(exponent, textbook) ? exponent : 0; }
 
 // The powers with free exponents, whether or not their coefficients are zero.
 INLINE int free_powers(const vwt_parameters* p) {
@@ -119,11 +121,11 @@ INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
   AT(c->moment_cubic, k) = p->moment_cubic;
   AT(c->damping_quadratic, k) = p->damping_quadratic;
   AT(c->flow_angle, k) = p->flow_angle;
-  AT(c->steepening, k) = p->moment_cubic_exponent;
-  AT(c->thickening, k) = p->damping_quadratic_exponent;
-  AT(c->rate, k) = p->quadratic_damping_exponent;
-  AT(c->cube, k) = p->stiffness_cubic_exponent;
-  AT(c->square, k) = p->stiffness_quadratic_exponent;
+  AT(c->steepening, k) = exponent_of(p->moment_cubic_exponent, 2);
+  AT(c->thickening, k) = exponent_of(p->damping_quadratic_exponent, 2);
+  AT(c->rate, k) = exponent_of(p->quadratic_damping_exponent, 2);
+  AT(c->cube, k) = exponent_of(p->stiffness_cubic_exponent, 3);
+  AT(c->square, k) = exponent_of(p->stiffness_quadratic_exponent, 2);
   AT(c->spring, k) = spring;
   AT(c->quadratic_damping, k) = p->quadratic_damping;
   AT(c->loss, k) = p->loss_factor != 0 ? p->loss_factor * sqrt(spring * p->yaw_inertia) : 0;  // eta Kr/wn at rest

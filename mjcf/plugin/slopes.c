@@ -415,7 +415,8 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
   }
   for (int i = 0; i < count;) {
     int together = 1;
-    while (together < VWT_LANES && i + together < count && vwt_alike(&parameters[i], &runs[i], &parameters[i + together], &runs[i + together])) {
+    while (together < VWT_LANES && i + together < count &&
+           vwt_alike(&parameters[i], &runs[i], &parameters[i + together], &runs[i + together])) {
       together++;
     }
     const Out out = {.size = size, .width = width, .angle = &angle[i], .rate = &rate[i],

@@ -149,3 +149,26 @@ def test_derivatives_of_runs_of_any_length_are_those_of_a_run_alone(steps, strid
         assert not found.by_angle[i, :, last:].any()
         if alone.by_rate is not None:
             np.testing.assert_array_equal(found.by_rate[i, :, :last], alone.by_rate[0])
+
+
+def test_a_run_has_the_same_bits_in_any_company():
+    """Also one whose exponent is that of the textbook, beside one with another exponent."""
+    forms = [
+        {},
+        {"moment_cubic": -2.0, "moment_cubic_exponent": 2.0},
+        {"moment_cubic": -2.0, "moment_cubic_exponent": 2.5},
+        {"stiffness_cubic": 0.3, "stiffness_cubic_exponent": 3.0},
+        {"stiffness_cubic": 0.3, "stiffness_cubic_exponent": 3.4},
+        FORMS["gravity"],
+        FORMS["friction with a peak"],
+        {"friction_moment": 0.01, "friction_saturation": 0.2},
+        {"friction_moment": 0.01, "friction_exponent": 0.7},
+    ]
+    law = np.concatenate([runs(form)[0] for form in forms])
+    run = runs({}, count=len(forms))[1]
+    run["angle"] += 0.01 * np.arange(len(forms))
+    together = integrate(law, run, 400)
+    for i in range(len(forms)):
+        alone = integrate(law[i : i + 1], run[i : i + 1], 400)
+        np.testing.assert_array_equal(together[0][i], alone[0][0], err_msg=str(forms[i]))
+        np.testing.assert_array_equal(together[1][i], alone[1][0], err_msg=str(forms[i]))
