@@ -249,8 +249,8 @@ INLINE Lane moment_of_mechanism(const Coefficients* c, int features, Lane angle,
   return moment;
 }
 
-// The factors of the friction at a rate along the slip, 1 where it has none: of the rate's power, the saturation and the
-// peak, and the peak's own shape.
+// The factors of the friction at a rate along the slip, 1 where it has none: of the rate's power, the saturation and
+// the peak, and the peak's own shape.
 typedef struct {
   Lane power, turn, peak, shape;
 } Factors;

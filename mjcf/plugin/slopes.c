@@ -278,8 +278,8 @@ INLINE void between(Lane h, double u, Lane angle0, Lane rate0, Lane angle1, Lane
   *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
 }
 
-// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, that with
-// a load has none by gravity's terms, and Dahl's none yet.
+// Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, that
+// with a load has none by gravity's terms, and Dahl's none yet.
 static int is_smooth(const vwt_parameters* p) {
   const int root = p->friction_moment > 0 && p->friction_exponent > 0 && p->friction_exponent < 1;
   return !root && !bends(p) && p->friction_load == 0;

@@ -301,8 +301,9 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
     case VWT_TERM_gap:
       return choose(size_of(bend) > c->law.free_play, with_sign(law->inverse * c->law.spring, bend), none);
     case VWT_TERM_friction_exponent:
-      return law->features & RATE ? at->by_friction[0]
-                                  : -slip * law->inverse * c->friction.moment * log_of(size_of(rate), VWT_RATE_REFERENCE);
+      return law->features & RATE
+                 ? at->by_friction[0]
+                 : -slip * law->inverse * c->friction.moment * log_of(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_friction_saturation:
       return law->features & RATE ? at->by_friction[1] : none;
     case VWT_TERM_friction_peak_rate:

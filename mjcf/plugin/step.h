@@ -60,9 +60,9 @@ void vwt_step_with_friction(Step* s, double h);
 void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
               double* rate);
 
-// Runs that `vwt_forward` may integrate side by side: no imposed moment, a wind that is constant where the air has a lag
-// or sheds vortices, a drive whose samples are at the starts of steps, and neither a lag nor Dahl's friction with a rod
-// that twists.
+// Runs that `vwt_forward` may integrate side by side: no imposed moment, a wind that is constant where the air has a
+// lag or sheds vortices, a drive whose samples are at the starts of steps, and neither a lag nor Dahl's friction with
+// a rod that twists.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define VWT_WIDE 1  // a loader that chooses code by processor; a sanitizer is not ready when it does
 enum { VWT_LANES = 8 };
