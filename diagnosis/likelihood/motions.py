@@ -346,7 +346,7 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
 def _apart(
     physics: SettingsTable, place: int, asked: Asked, rig: Rig
 ) -> tuple[float, float, float, Ringing] | None:
-    """Replace a run with a flexible rod by its slow motion; one that is followed, by a rod that it can follow.
+    """Replace a run with a flexible rod by its slow motion, or a rod that is followed but too stiff by a rigid one.
 
     Returns:
         The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing to be

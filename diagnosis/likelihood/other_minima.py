@@ -72,16 +72,13 @@ def _elsewhere(fitted: Fit) -> list[_Elsewhere]:
             if np.all((lower <= at) & (at <= upper)):
                 held = [problem.names.index(n) for n in names if n != f"{effect.name}.{trial.scaled}"]
                 tried.append((Point(at, fitted.point.release), held))
-    # the change from the fit is that of slow motion and ringing, whether or not the fit follows the rod
-    apart = dataclasses.replace(problem, rod_followed=False)
-    here = apart.predict([fitted.point])[0] if tried else []
     moved: list[_Elsewhere] = []
     for first in range(0, len(tried), _TOGETHER):
         some = tried[first : first + _TOGETHER]
-        predictions = apart.predict([point for point, _ in some])
-        for (point, held), there in zip(some, predictions, strict=True):
-            runs = zip(problem.data.runs, fitted.residuals, here, there, strict=True)
-            residuals = [left - run.scaled(after - before) for run, left, before, after in runs]
+        predictions = problem.predict([point for point, _ in some])
+        for (point, held), prediction in zip(some, predictions, strict=True):
+            pairs = zip(problem.data.runs, prediction, strict=True)
+            residuals = [run.scaled(run.reading - values) for run, values in pairs]
             if all(np.all(np.isfinite(r)) for r in residuals):
                 moved.append(_by_linear_theory(fitted, point, residuals, held))
     return moved

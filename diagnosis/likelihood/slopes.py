@@ -7,7 +7,6 @@ to the reading of a motion, is cheap to compute: there a small step of the param
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -39,14 +38,13 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
     Returns:
         By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod rings almost as slowly as the body swings, or it is read at times of its own.
+        no derivative, its rod is followed, or it is read at times of its own.
     """
     points = len(asked.runs) // count - 1
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     if any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects}):
         return unknown
-    # of a rod that is followed, the derivatives of the slow motion and the ringing are exact enough for a step
-    motions = Motions.of(replace(asked, rod_followed=False), like=count)
+    motions = Motions.of(asked, like=count)
     if motions.rows["twist_stiffness"].any():
         return unknown
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)

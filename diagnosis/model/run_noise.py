@@ -117,8 +117,7 @@ class AutoregressiveNoise(RunNoise):
         start = _start(self.whitening.tobytes())[: len(values), : len(values)]
         with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
             errors = _convolved(values, self.whitening)
-            first = values[: len(start)]
-            errors[: len(start)] = start @ first if first.any() else first
+            errors[: len(start)] = start @ values[: len(start)]
         return errors
 
     def coloured(self, values: Array) -> Array:

@@ -48,17 +48,7 @@ def forward_library() -> ctypes.CDLL:
     library.vwt_terms.argtypes = [ctypes.c_int, *[pointer] * 3]
     library.vwt_terms.restype = None
     library.vwt_slopes.argtypes = [
-        *(
-            ctypes.c_int,
-            pointer,
-            pointer,
-            ctypes.c_int,
-            ctypes.c_int,
-            pointer,
-            pointer,
-            pointer,
-            ctypes.c_int,
-        ),
+        *(ctypes.c_int, pointer, pointer, ctypes.c_int, ctypes.c_int, *[pointer] * 3, ctypes.c_int),
         *[pointer] * 4,
     ]
     library.vwt_backlash.argtypes = [ctypes.c_int, pointer, ctypes.c_double, ctypes.c_double, pointer]
