@@ -43,12 +43,12 @@ def forward_library() -> ctypes.CDLL:
     library = ctypes.CDLL(str(native_library("vwt_forward")))
     for kind in ("parameter_name", "parameter_unit", "state_name", "operation_name", "run_name", "term_name"):
         getattr(library, f"vwt_{kind}").restype = ctypes.c_char_p
-    pointer = ctypes.c_void_p
+    pointer, number = ctypes.c_void_p, ctypes.c_int
     library.vwt_forward.argtypes = [ctypes.c_int, pointer, pointer, pointer, pointer]
     library.vwt_terms.argtypes = [ctypes.c_int, *[pointer] * 3]
     library.vwt_terms.restype = None
     library.vwt_slopes.argtypes = [
-        *(ctypes.c_int, pointer, pointer, ctypes.c_int, ctypes.c_int, *[pointer] * 3, ctypes.c_int),
+        *(number, pointer, pointer, number, number, pointer, pointer, pointer, number),
         *[pointer] * 4,
     ]
     library.vwt_backlash.argtypes = [ctypes.c_int, pointer, ctypes.c_double, ctypes.c_double, pointer]
