@@ -159,8 +159,7 @@ class Problem:
         ]
         if places:
             for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):
-                size = found[i][r].size
-                found[i][r] = values if values.size == size else values.reshape(size, -1).mean(axis=1)
+                found[i][r] = self.data.runs[r].in_blocks(values)
         return found
 
     def asked(self, points: Sequence[Point], places: Sequence[tuple[int, int]]) -> Asked:

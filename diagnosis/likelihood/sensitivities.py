@@ -97,9 +97,4 @@ def motion_changes(problem: Problem, point: Point, points: list[Point]) -> list[
         [point, *points], [(i, r) for i in range(len(points) + 1) for r in range(len(runs))]
     )
     found = changes(asked, len(runs))
-    return [
-        change
-        if change.shape[1] == run.reading.size
-        else change.reshape(len(points), run.reading.size, -1).mean(axis=2)
-        for change, run in zip(found, runs, strict=True)
-    ]
+    return [run.in_blocks(change) for change, run in zip(found, runs, strict=True)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.run_data import Data, RunData, Samples
+from diagnosis.model.run_data import Data, RunData, Samples, means_of
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
@@ -51,7 +51,7 @@ def prepare(
         count = record.yaw_rad.size // block
         samples = None if record.uniform else Samples.of(record, block)
         if samples is None:
-            reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
+            reading = means_of(record.yaw_rad[: count * block], block)
         else:
             since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
             reading = samples.means(np.interp(samples.time, since, record.yaw_rad))

@@ -94,6 +94,14 @@ def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array
     return np.array(basis) / interval**derivative
 
 
+def means_of(values: Array, count: int) -> Array:
+    """Means of consecutive values, ``count`` in each, along the last axis.
+
+    A product with equal weights takes a fifth of the time of NumPy's mean along a short axis.
+    """
+    return np.asarray(values.reshape(*values.shape[:-1], -1, count) @ np.full(count, 1.0 / count), np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class RunData:
     """One run as the fits see it.
@@ -146,7 +154,7 @@ class RunData:
         shorter = self.reading[: size * count]
         return dataclasses.replace(
             self,
-            reading=shorter.reshape(size, count).mean(axis=1),
+            reading=means_of(shorter, count),
             block=count * self.block,
             interval=count * self.interval,
             noise=dataclasses.replace(self.noise, variance=self.noise.variance / count),
@@ -216,7 +224,7 @@ class RunData:
             return self.samples.means(np.interp(at, self.drive.time_s, self.drive.values))
         first = round(self.start / self.interval) * self.block
         values = self.drive.values[first : first + self.reading.size * self.block]
-        return np.asarray(values.reshape(-1, self.block).mean(axis=1), np.float64)
+        return means_of(values, self.block)
 
     @property
     def wind_on(self) -> bool:
@@ -300,8 +308,11 @@ class RunData:
         """
         if self.samples is not None:
             return self.samples.means(values)
-        blocks = values.reshape(*values.shape[:-1], self.reading.size, self.block)
-        return np.asarray(blocks.mean(axis=-1), np.float64)
+        return means_of(values, self.block)
+
+    def in_blocks(self, means: Array) -> Array:
+        """Block means of the run from its own, or from those of the shorter blocks, shape (..., n)."""
+        return means if means.shape[-1] == self.reading.size else means_of(means, self.merges)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
         """The run from one block up to, and without, another; None: to the end.
