@@ -205,8 +205,9 @@ def beside(fit: Fit, starts: Starts) -> Beside:
             causes += [] if cause is None else [cause]
     if not causes:
         return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
-    changes = np.array([cause.left for cause in causes])
-    gram, score = changes @ changes.T, changes @ residuals
+    # a matrix of all changes would be the largest array of a diagnosis
+    gram = np.array([[one.left @ other.left for other in causes] for one in causes])
+    score = np.array([cause.left @ residuals for cause in causes])
     formal = _formal(fit, gradients)
     zero = np.zeros(formal.size)
     steps_taken = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
@@ -224,8 +225,9 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     odds = -0.5 * (excess / (1.0 + beyond / settings.misfit_degrees) + price)
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
+    mean_sizes = weights @ np.array([step.sizes for step in steps_taken])
     taken = np.split(
-        (weights @ np.array([step.sizes for step in steps_taken])) @ changes,
+        sum(size * cause.left for size, cause in zip(mean_sizes, causes, strict=True)),
         np.cumsum([residual.size for residual in fit.residuals])[:-1],
     )
     remaining = [residual - part for residual, part in zip(fit.residuals, taken, strict=True)]
