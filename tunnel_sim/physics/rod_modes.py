@@ -61,6 +61,9 @@ class Ringing:
     root: complex
     responses: Sequence[Response] = ()
 
+    @np.errstate(
+        over="ignore", invalid="ignore"
+    )  # a ringing that grows without bound; the caller looks for it
     def added(self, angle: Angles, rate: Rates, interval: Seconds) -> tuple[Angles, Rates]:
         """Angle and rate of the slow motion, at equal intervals from the release, with the ringing."""
         size = abs(self.amplitude)
