@@ -163,3 +163,11 @@ def test_the_ringing_is_added_until_it_is_below_a_nanoradian(size):
     assert np.abs(found[0] - angle - whole.real).max() <= 1e-9
     assert np.abs(found[1] - rate - (root * whole).real).max() <= 1e-9 * abs(root)
     assert angle[0] == 1.0  # what was given is not changed
+
+
+def test_a_ringing_that_grows_without_bound_gives_no_finite_angle_and_no_warning():
+    still = np.zeros(2000)
+    angle, rate = Ringing(1e-3 + 0j, 2000.0 + 300.0j).added(still, still, 1e-3)
+    assert not np.isfinite(angle[-1])
+    assert not np.isfinite(rate[-1])
+    assert np.isfinite(angle[0])
