@@ -100,10 +100,12 @@ class SearchSettings:
     )
     grown_on: int = setting(
         45_000,
-        "Maximum number of readings on which sets are grown; longer campaigns omit some stretches.",
+        "Maximum number of readings on which sets are grown; longer campaigns omit some stretches, or the end of "
+        "driven runs.",
         "judgement",
         "Time. Twelve runs of 10 s have fewer.",
         unit="block means",
+        decision="0054",
     )
     most_causes: int = setting(
         5,

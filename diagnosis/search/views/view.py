@@ -110,6 +110,11 @@ class View:
         with clock.step("effects"):
             return Sets(self, tuple(grow(self, clock.progress)))
 
+    def holds(self, sets: Sets) -> bool:
+        """Whether the answer of its sets holds in whole runs, so that these need no view of their own."""
+        del sets
+        return True
+
     # ---- how they are fitted to whole runs ----
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:

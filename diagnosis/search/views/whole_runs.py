@@ -48,9 +48,9 @@ class WholeRuns(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """The first view, unless the runs are viewed in stretches."""
+        """The first view, or one after a view whose answer does not hold in whole runs."""
         del clock
-        if known is not None:
+        if known is not None and known.view.holds(known):
             return None
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
@@ -222,20 +222,24 @@ class WholeRuns(View):
                 found[one.names] = of_more_weight(found.get(one.names), one, self._scattering_gap)
         return Sets(view, tuple(found.values()))
 
-    def whole(self, hypothesis: Hypothesis) -> Hypothesis:
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set, unchanged."""
         return hypothesis
 
-    def settled(self, hypothesis: Hypothesis) -> Hypothesis:
+    def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set, unchanged."""
         return hypothesis
+
+    def polished(self, settled: Hypothesis) -> Hypothesis:
+        """The answer fitted to convergence."""
+        return polish(settled)
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence; done last because another view may follow.
 
         It includes chance differences between the runs where they pay the price of an effect.
         """
-        polished = polish(settled)
+        polished = self.polished(settled)
         found, stated = polished.fit, bool(self.prepared.nominal.problem.scatter)
         repeats: Fit | None = found
         if found.problem.scatter:

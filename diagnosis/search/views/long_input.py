@@ -1,0 +1,118 @@
+"""Sets of causes of runs with a long input: found in the beginnings of the runs, then fitted to whole runs.
+
+An input keeps a body in motion, so that the beginning of a run shows what the whole run shows. A free decay has its
+large swings at its beginning and its small ones at its end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.residuals import misfit
+from diagnosis.model.run_data import Data
+from diagnosis.model.similarity import REFERENCE_FREQUENCY
+from diagnosis.search.clock import Clock
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, polish, restricted
+from diagnosis.search.prepared import Prepared
+from diagnosis.search.sets import Sets
+from diagnosis.search.views.whole_runs import WholeRuns
+from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
+
+_LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembers as many
+
+
+def common_length(data: Data) -> int:
+    """The greatest length, in blocks, with which all runs together are within the limit for growth.
+
+    Shorter runs stay whole.
+    """
+    left, length = data.settings.search.grown_on, 0
+    sizes = sorted(run.reading.size for run in data.runs)
+    for number, size in enumerate(sizes):
+        length = left // (len(sizes) - number)
+        if size > length:
+            break
+        left -= size
+    return length
+
+
+def beginnings(data: Data, length: int) -> Data:
+    """The runs up to a length, in blocks; shorter runs stay whole."""
+    runs = tuple(run if run.reading.size <= length else run.part(last=length) for run in data.runs)
+    return data.with_runs(runs)
+
+
+@dataclass(frozen=True, eq=False)
+class LongInput(WholeRuns):
+    """The beginnings of runs with a long input, in which sets are found and compared."""
+
+    @classmethod
+    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+        """The first view of runs with an input that are longer than sets are grown on.
+
+        None where their beginnings would be short, the nominal model has a second mode, or the runs differ by a
+        stated scatter.
+        """
+        data = prepared.nominal.problem.data
+        length, sizes = common_length(data), [run.reading.size for run in data.runs]
+        cycles = length * REFERENCE_FREQUENCY * min(run.interval for run in data.runs)
+        if not prepared.campaign.driven or max(sizes) <= length or cycles < _LEAST:
+            return None
+        view = super().after(prepared, known, clock)
+        if view is None or view.first is not None or view.unscattered is not None:
+            return None
+        problem = view.base.problem
+        begun = try_fit(replace(problem, data=beginnings(problem.data, length)), view.base.point)
+        return None if begun is None else replace(view, base=begun)
+
+    def holds(self, sets: Sets) -> bool:
+        """Whether the answer is a set that explains whole runs as well as their beginnings.
+
+        If not, an effect that acts later on could pay its price.
+        """
+        begun, whole, weighing = sets.answer, sets.settled, self.base.settings.weighing
+
+        def left(fit: Fit, nominal: Fit) -> float:
+            scale = misfit_scale(misfit(nominal), weighing)
+            return log_misfit(misfit(fit).excess, scale, OF_MOTION, weighing.leak)
+
+        if begun is None or whole is None:
+            return False
+        more = left(whole.fit, self.prepared.nominal) - left(begun.fit, self.repeating)
+        return weighing.steepness * more < weighing.set_price
+
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set fitted to whole runs.
+
+        An effect with instants of its own is sought there again, since it may act at later ones, too.
+        """
+        sought = [kind for kind in hypothesis.fit.problem.effects if kind.skips]
+        kept = [name for name in hypothesis.effects if all(kind.name != name for kind in sought)]
+        start = restricted(hypothesis.fit, kept) if sought else hypothesis.fit
+        problem = replace(start.problem, data=self.prepared.nominal.problem.data)
+        fitted = try_fit(problem, start.point)
+        found = [] if fitted is None else [Hypothesis(tuple(kept), fitted)]
+        for kind in sought:
+            found = sets_with_one_more(found, [kind])
+        return found[0] if found else None
+
+    def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set fitted to whole runs, with its forms of the beginnings and in the deepest minimum of these.
+
+        The covariance of other minima is that of the beginnings, too. Whole runs exclude more of them.
+        """
+        begun = polish(hypothesis)
+        whole, spread = self.whole(begun), begun.fit.spread
+        if whole is None or spread is None:
+            return whole
+        order = [begun.fit.problem.names.index(name) for name in whole.fit.problem.names]
+        return replace(whole, fit=replace(whole.fit, spread=spread[np.ix_(order, order)]))
+
+    def polished(self, settled: Hypothesis) -> Hypothesis:
+        """The answer, unchanged."""
+        return settled

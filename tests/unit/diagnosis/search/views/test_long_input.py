@@ -1,0 +1,97 @@
+"""Runs with a long input: their causes are found in their beginnings and fitted to whole runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from diagnosis import Settings
+from diagnosis.search.investigate import investigate
+from diagnosis.search.study import Study
+from diagnosis.search.views.long_input import LongInput, beginnings, common_length
+from diagnosis.search.views.whole_runs import WholeRuns
+from tests.support.driven_runs import COUNT, Planted, driven
+from tests.support.gap_campaigns import campaign, nominal
+from tests.unit.diagnosis.test_driven_lost_samples import COUNT as COUNT_LOST
+from tests.unit.diagnosis.test_driven_lost_samples import LOST, SHARES
+from tests.unit.diagnosis.test_driven_lost_samples import campaign as with_lost_samples
+from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.campaign import Campaign
+
+SPRING = Planted(cubic=-2.0)
+
+
+@cache
+def study(share: float, names: tuple[str, ...], lost: bool = False) -> Study:
+    """Two driven runs whose sets grow on a share of the readings."""
+    data: Campaign = with_lost_samples(kept=False) if lost else driven("moment", SPRING)
+    count = 2 * (COUNT_LOST if lost else COUNT)
+    settings = Settings().changed({"search.grown_on": round(share * count)})
+    kinds = [effect_class(name) for name in names]
+    return investigate(data, kinds, settings=settings, views=(LongInput, WholeRuns))
+
+
+def lengths(found: Study, *names: str) -> list[int]:
+    answer = found.of(names)
+    assert answer is not None
+    assert answer.hypothesis is not None
+    return [run.reading.size for run in answer.hypothesis.fit.problem.data.runs]
+
+
+def test_beginnings_have_a_common_length_and_shorter_runs_stay_whole() -> None:
+    data = nominal(campaign()).problem.data
+    size = data.runs[0].reading.size
+    short = data.with_runs((data.runs[0].part(last=100), *data.runs[1:]))
+    short = replace(short, settings=data.settings.changed({"search.grown_on": 100 + 5 * 300 + 4}))
+    assert common_length(short) == 300
+    found = beginnings(short, 300).runs
+    assert [run.reading.size for run in found] == [100, 300, 300, 300, 300, 300]
+    assert np.array_equal(found[1].reading, data.runs[1].reading[:300])
+    long = replace(short, settings=data.settings.changed({"search.grown_on": 100 + 5 * size}))
+    assert common_length(long) == size
+    assert beginnings(long, size).runs == short.runs
+
+
+def test_a_cause_is_found_in_the_beginnings_and_fitted_to_whole_runs() -> None:
+    names = "cubic_stiffness", "coulomb_friction", "quadratic_damping"
+    found = study(0.5, names)
+    assert found.causes == ("cubic_stiffness",)
+    whole = [run.reading.size for run in found.nominal.problem.data.runs]
+    assert lengths(found, "cubic_stiffness") == whole
+    assert max(lengths(found, "coulomb_friction")) <= whole[0] // 2 + 1  # as it was weighed
+    of_whole = study(1.0, names)
+    assert lengths(of_whole, "coulomb_friction") == whole
+    name = "cubic_stiffness.coefficient"
+    std = of_whole.chosen.std(name)
+    assert found.chosen.value(name) == pytest.approx(of_whole.chosen.value(name), abs=0.1 * std)
+    assert found.chosen.std(name) == pytest.approx(std, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [0.38, 0.5], ids=["in no beginning", "in the beginning of one run"])
+def test_what_acts_later_on_is_found_in_whole_runs(share: float) -> None:
+    assert SHARES[0] > 0.38  # of the run until samples are lost
+    assert SHARES[0] < 0.5 < SHARES[1]
+    found = study(share, ("dropped_samples", "input_delay", "cubic_stiffness"), lost=True)
+    assert found.causes == ("dropped_samples",)
+    whole = [run.reading.size for run in found.nominal.problem.data.runs]
+    assert lengths(found, "dropped_samples") == whole
+    assert found.chosen.excess < 0.2
+    lost = found.similarity.own(found.chosen.value("dropped_samples.lost_time"), "s")
+    assert lost == pytest.approx(LOST, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2], ids=["within the limit", "with beginnings of a few cycles"])
+def test_other_driven_runs_are_viewed_whole(share: float) -> None:
+    settings = Settings().changed({"search.grown_on": round(share * 2 * COUNT)})
+    with pytest.raises(ValueError, match="no view of the runs applies"):
+        investigate(driven("moment", SPRING), settings=settings, views=(LongInput,))
+
+
+def test_free_decays_are_viewed_whole() -> None:
+    settings = Settings().changed({"search.grown_on": 3000})
+    cause = effect_from("quadratic_damping", {"coefficient": 0.003})
+    with pytest.raises(ValueError, match="no view of the runs applies"):
+        investigate(campaign(cause), settings=settings, views=(LongInput,))
