@@ -20,6 +20,7 @@ from tests.unit.diagnosis.test_driven_lost_samples import LOST, SHARES
 from tests.unit.diagnosis.test_driven_lost_samples import campaign as with_lost_samples
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Record
 
 SPRING = Planted(cubic=-2.0)
 
@@ -81,6 +82,23 @@ def test_what_acts_later_on_is_found_in_whole_runs(share: float) -> None:
     assert found.chosen.excess < 0.2
     lost = found.similarity.own(found.chosen.value("dropped_samples.lost_time"), "s")
     assert lost == pytest.approx(LOST, rel=0.02)
+
+
+def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> None:
+    """Both runs lose five samples after five eighths of their length."""
+    lost, runs = slice(5 * COUNT // 8, 5 * COUNT // 8 + 5), []
+    for run in driven("moment", SPRING).runs:
+        assert run.drive is not None
+        yaw, drive = np.delete(run.record.yaw_rad, lost), np.delete(run.drive.values, lost)
+        record = Record(run.record.time_s[: yaw.size], yaw)
+        runs.append(replace(run, record=record, drive=replace(run.drive, values=drive)))
+    data = replace(driven("moment", SPRING), runs=tuple(runs))
+    kinds = [effect_class(name) for name in ("cubic_stiffness", "dropped_samples", "coulomb_friction")]
+    settings = Settings().changed({"search.grown_on": COUNT})
+    in_beginnings = investigate(data, kinds, settings=settings, views=(LongInput,))
+    assert in_beginnings.causes == ("cubic_stiffness",)
+    found = investigate(data, kinds, settings=settings, views=(LongInput, WholeRuns))
+    assert found.causes == ("cubic_stiffness", "dropped_samples")
 
 
 @pytest.mark.parametrize("share", [1.0, 0.2], ids=["within the limit", "with beginnings of a few cycles"])
