@@ -6,7 +6,7 @@
 const char* const vwt_operation_names[VWT_OPERATION_COUNT] = {VWT_OPERATIONS(X)};
 #undef X
 #define X(name, taken) taken,
-static const int taken_by[VWT_OPERATION_COUNT] = {VWT_OPERATIONS(X)};
+const int vwt_operation_taken[VWT_OPERATION_COUNT] = {VWT_OPERATIONS(X)};
 #undef X
 
 // The operation at an element of the code; -1 where there is none.
@@ -18,16 +18,29 @@ int vwt_program_sound(const vwt_program* program) {
   int height = 0;
   for (int i = 0; i < program->count; i++) {
     const int operation = operation_at(program->code, i);
-    if (operation < 0 || height < taken_by[operation] || height - taken_by[operation] >= VWT_STACK) {
+    if (operation < 0 || height < vwt_operation_taken[operation] || height - vwt_operation_taken[operation] >= VWT_STACK) {
       return 0;
     }
-    height += 1 - taken_by[operation];
+    height += 1 - vwt_operation_taken[operation];
     i += operation == VWT_OPERATION_number;
     if (i == program->count) {
       return 0;
     }
   }
   return height == 1;
+}
+
+int vwt_programs_alike(const vwt_program* one, const vwt_program* other) {
+  if (one->count != other->count) {
+    return 0;
+  }
+  for (int i = 0; i < one->count; i++) {
+    if (one->code[i] != other->code[i]) {
+      return 0;
+    }
+    i += one->code[i] == VWT_OPERATION_number;
+  }
+  return 1;
 }
 
 double vwt_program_value(const vwt_program* program, const vwt_program_input* in) {
@@ -41,7 +54,7 @@ double vwt_program_value(const vwt_program* program, const vwt_program_input* in
     if (operation < 0) {
       return NAN;
     }
-    const int taken = taken_by[operation];
+    const int taken = vwt_operation_taken[operation];
     if (height < taken || height - taken >= VWT_STACK) {
       return NAN;
     }

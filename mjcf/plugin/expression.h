@@ -27,6 +27,7 @@ enum {
 enum { VWT_STACK = 32 };  // values that a program may hold at once
 
 extern const char* const vwt_operation_names[VWT_OPERATION_COUNT];
+extern const int vwt_operation_taken[VWT_OPERATION_COUNT];
 
 typedef struct {
   const double* code;
@@ -39,6 +40,9 @@ typedef struct {
 
 // Whether a program leaves exactly one value, for any input.
 int vwt_program_sound(const vwt_program* program);
+
+// Whether two programs have the same operations; their numbers may differ.
+int vwt_programs_alike(const vwt_program* one, const vwt_program* other);
 
 // Value of a program, N m; zero where it is empty. Not a number where the program is malformed: it is checked while
 // it runs, because the numerics of a MuJoCo model may be changed after loading.

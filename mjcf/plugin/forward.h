@@ -124,7 +124,7 @@ VWT_API void vwt_terms(int count, const vwt_parameters* parameters, const vwt_ru
 // samples, by run, shape (4, weighed) for its first and last angle and its first and last rate, the derivatives are
 // those of the weighted sums instead, shape (width, size - 1), in `angle_slopes`; one weight of each kind serves all
 // intervals. A derivative that does not exist is NaN throughout. Returns -1 where a run is not plain, its rod
-// twists, or its friction is a root of the rate, depends on the load or is Dahl's.
+// twists, it has a moment by expression, or its friction is a root of the rate, depends on the load or is Dahl's.
 VWT_API int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int size, int width,
                        const int* columns, const double* const* changes, const double* const* weights, int weighed,
                        double* const* angle, double* const* rate, double* const* angle_slopes,

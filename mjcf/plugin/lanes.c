@@ -12,18 +12,29 @@ static int is_plain_drive(const vwt_parameters* p, const vwt_run* run) {
   return run->moment_slope && run->wind_count == 1 && p->friction_load == 0 && turned;
 }
 
+static vwt_program program_of(const vwt_run* run) {
+  const vwt_program program = {run->program, (int)run->program_count};
+  return program;
+}
+
+static int is_sound(const vwt_run* run) {
+  const vwt_program program = program_of(run);
+  return vwt_program_sound(&program);
+}
+
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run) {
   const int steady = run->wind_count == 1 || (p->aero_lag == 0 && p->shedding_amplitude == 0);
   return steady && run->forcing_count == 0 && run->ambient_count == 0 &&
          (run->moment_count == 0 || is_plain_drive(p, run)) &&
-         run->program_count == 0 &&
+         (run->program_count == 0 || is_sound(run)) &&
          (twists(run) ? p->aero_lag == 0 && run->lead == 0 && run->rod_stiffness == 0 && !bends(p)
                       : run->twist == 0 && run->twist_rate == 0);
 }
 
 int vwt_alike(const vwt_parameters* p, const vwt_run* one, const vwt_parameters* q, const vwt_run* other) {
+  const vwt_program program = program_of(one), beside = program_of(other);
   return one->steps == other->steps && one->stride == other->stride && twists(one) == twists(other) &&
-         bends(p) == bends(q);
+         bends(p) == bends(q) && vwt_programs_alike(&program, &beside);
 }
 
 // The motion after a step.
@@ -35,25 +46,25 @@ INLINE void runge_kutta(const Lanes* c, const State* s, int features, Lane* angl
   Air air = air_at(c, features, s->start);
   Lane input = input_at(&in, features, s->start);
   Lane slip = bent ? s->deflection / c->range : s->slip;
-  const Lane a1 = acceleration_at(c, &air, slip, features, s->angle, s->rate, shed, s->lagged, input);
+  const Lane a1 = acceleration_at(c, &air, slip, features, s->start, s->angle, s->rate, shed, s->lagged, input);
   const Lane y2 = s->angle + half * s->rate, r2 = s->rate + half * a1;
   shed = sheds ? shed_at(&c->law, s->start + half) : none;
   air = air_at(c, features, s->start + half);
   input = input_at(&in, features, s->start + half);
   Lane lagged = lags ? lagged_at(c, s, c->half, half, y2, r2) : none;
   slip = bent ? deflection_after(c, s, half, y2, r2) / c->range : s->slip;
-  const Lane a2 = acceleration_at(c, &air, slip, features, y2, r2, shed, lagged, input);
+  const Lane a2 = acceleration_at(c, &air, slip, features, s->start + half, y2, r2, shed, lagged, input);
   const Lane y3 = s->angle + half * r2, r3 = s->rate + half * a2;
   lagged = lags ? lagged_at(c, s, c->half, half, y3, r3) : none;
   slip = bent ? deflection_after(c, s, half, y3, r3) / c->range : s->slip;
-  const Lane a3 = acceleration_at(c, &air, slip, features, y3, r3, shed, lagged, input);
+  const Lane a3 = acceleration_at(c, &air, slip, features, s->start + half, y3, r3, shed, lagged, input);
   const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
   shed = sheds ? shed_at(&c->law, s->start + h) : none;
   air = air_at(c, features, s->start + h);
   input = input_at(&in, features, s->start + h);
   lagged = lags ? lagged_at(c, s, c->whole, h, y4, r4) : none;
   slip = bent ? deflection_after(c, s, h, y4, r4) / c->range : s->slip;
-  const Lane a4 = acceleration_at(c, &air, slip, features, y4, r4, shed, lagged, input);
+  const Lane a4 = acceleration_at(c, &air, slip, features, s->start + h, y4, r4, shed, lagged, input);
   *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
   *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
 }
@@ -77,7 +88,8 @@ INLINE Accelerations twisting(const Lanes* c, const State* s, const Input* in, i
     air = air + choose(c->on_end, none, drive);
     moment = choose(c->on_end, drive, none);
   }
-  moment = moment_of_mechanism(law, features, angle, deflection, rate, &powers) + moment;
+  const Lane mechanism = moment_of_mechanism(law, features, angle, deflection, rate, &powers);
+  moment = with_stated(c, features, mechanism, time, angle, rate) + moment;
   moment = moment - law->spring * angle - c->damping * rate;
   const Lane spring = c->twist_stiffness * twist, loss = c->twist_damping * twist_rate;
   Accelerations out;

@@ -57,7 +57,7 @@ static void set_lane(Lanes* c, int k, const vwt_parameters* p, const vwt_run* ru
   set_wake(&c->law, k, p, wind);
   set_air(&c->air, k, p, wind);
   c->law.features |= features_of(p, wind) | (run->wind_count > 1 ? WIND : 0) | (run->moment_count > 0 ? DRIVE : 0) |
-                     (twists(run) ? TWIST : 0) | (bends(p) ? DAHL : 0);
+                     (twists(run) ? TWIST : 0) | (bends(p) ? DAHL : 0) | (run->program_count > 0 ? PROGRAM : 0);
   c->rubs |= vwt_rubs(p) && !bends(p);
   c->dry[k] = -(vwt_rubs(p) && !bends(p));
   c->range[k] = bends(p) ? vwt_presliding_range(p, p->yaw_inertia, run->step) : 1;
@@ -97,7 +97,7 @@ INLINE long long any(Mask where) {
 }
 
 // Of the longest run; the others are followed beyond their ends.
-static int most_samples(const Lanes* c) {
+static inline int most_samples(const Lanes* c) {
   double most = 0;
   for (int k = 0; k < c->count; k++) {
     most = fmax(most, c->run[k]->samples);
@@ -160,14 +160,27 @@ INLINE Lane friction_at(const Lanes* c, int features, Lane slip, Lane angle, Lan
   return friction_level(&c->friction, features, features & DAHL ? size_of(rate) : slip * rate, load);
 }
 
+// The moment by expression, N m.
+void vwt_program_lanes(const Lanes* c, const Lane* time, const Lane* angle, const Lane* rate, Lane* value);
+
+INLINE Lane with_stated(const Lanes* c, int features, Lane moment, Lane time, Lane angle, Lane rate) {
+  Lane stated;
+  if (!(features & PROGRAM)) {
+    return moment;
+  }
+  vwt_program_lanes(c, &time, &angle, &rate, &stated);
+  return moment + stated;
+}
+
 // Angular acceleration at a motion, with the powers in it; `shed`, `lagged` and `input` are read only with the features
 // they belong to.
-INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
-                         Lane lagged, Lane input, Powers* powers) {
+INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int features, Lane time, Lane angle, Lane rate,
+                         Lane shed, Lane lagged, Lane input, Powers* powers) {
   const Coefficients* law = &c->law;
   const Lane air = moment_of_air(law, flow, features, c->body * angle, c->body * rate, shed, lagged, powers);
   const Lane deflection = deflection_at(c, features, angle, input);
   Lane moment = moment_of_mechanism(law, features, angle, deflection, rate, powers);
+  moment = with_stated(c, features, moment, time, angle, rate);
   moment = moment - law->spring * angle - c->damping * rate;
   moment = moment + c->body * air - c->rod * angle;
   if (features & DRIVE) {
@@ -176,10 +189,10 @@ INLINE Lane acceleration(const Lanes* c, const Air* flow, Lane slip, int feature
   return (moment - slip * friction_at(c, features, slip, angle, rate)) / c->inertia;
 }
 
-INLINE Lane acceleration_at(const Lanes* c, const Air* flow, Lane slip, int features, Lane angle, Lane rate, Lane shed,
-                            Lane lagged, Lane input) {
+INLINE Lane acceleration_at(const Lanes* c, const Air* flow, Lane slip, int features, Lane time, Lane angle, Lane rate,
+                            Lane shed, Lane lagged, Lane input) {
   Powers powers;
-  return acceleration(c, flow, slip, features, angle, rate, shed, lagged, input, &powers);
+  return acceleration(c, flow, slip, features, time, angle, rate, shed, lagged, input, &powers);
 }
 
 INLINE Lane lagged_at(const Lanes* c, const State* s, const double weights[][4], Lane duration,
@@ -216,9 +229,10 @@ INLINE Mask turning(const Lanes* c, const State* before, Lane rate) {
 
 // A step of one lane that reverses or sticks under Coulomb friction. Where it changes nothing in a steady law, the lane
 // rests for good.
-static void step_alone(const Lanes* c, State* s, int k, Step* alone) {
+static inline void step_alone(const Lanes* c, State* s, int k, Step* alone) {
   const double angle = s->angle[k], rate = s->rate[k], lagged = s->lagged[k];
-  const int steady = c->law.shedding[k] == 0 && alone->run->moment_count == 0 && !twists(alone->run);
+  const int steady = c->law.shedding[k] == 0 && alone->run->moment_count == 0 && alone->run->program_count == 0 &&
+                     !twists(alone->run);
   alone->start = s->start[k];
   alone->from.angle = s->angle[k];
   alone->from.rate = s->rate[k];
@@ -241,7 +255,7 @@ static void step_alone(const Lanes* c, State* s, int k, Step* alone) {
 }
 
 // Up to `VWT_LANES` runs at their start.
-static void release(int count, const vwt_parameters* parameters, const vwt_run* runs, Lanes* c, State* s,
+static inline void release(int count, const vwt_parameters* parameters, const vwt_run* runs, Lanes* c, State* s,
                     Step* alone, LagWeights* weights) {
   for (int k = 0; k < VWT_LANES; k++) {
     const int i = k < count ? k : 0;  // a lane too many repeats the first run

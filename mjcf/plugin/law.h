@@ -42,7 +42,7 @@ INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : othe
 
 // What a law has that takes long: an elementary function, or a loop. The first five: powers with a free exponent; ROOT,
 // SATURATION, PEAK and LOAD: of the friction; WIND: of samples; DRIVE: a drive; TWIST: a rod that twists; DAHL:
-// Dahl's friction
+// Dahl's friction; PROGRAM: a moment by expression
 enum {
   STEEPENING = 1,
   THICKENING = 2,
@@ -61,7 +61,8 @@ enum {
   DRIVE = 8192,
   TWIST = 16384,
   DAHL = 32768,
-  ANY = 65535
+  PROGRAM = 65536,
+  ANY = 131071
 };
 
 // The coefficients of the law, by lane.

@@ -228,7 +228,8 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
     const Air air = air_at(law->c, features, s->start);
     const Input in = input_of(law->c, features, s->start, law->c->half_step);
     const Lane input = input_at(&in, features, s->start);
-    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->angle, s->rate, shed, s->lagged, input);
+    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->start, s->angle, s->rate, shed,
+                                   s->lagged, input);
     const Mask rests = law->c->dry & (s->rate == 0);
     out->angle[asked->pace] = s->start * s->rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);
@@ -409,7 +410,8 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
                const int* columns, const double* const* changes, const double* const* weights, int weighed,
                double* const* angle, double* const* rate, double* const* angle_slopes, double* const* rate_slopes) {
   for (int i = 0; i < count; i++) {
-    if (!vwt_is_plain(&parameters[i], &runs[i]) || twists(&runs[i]) || !is_smooth(&parameters[i])) {
+    if (!vwt_is_plain(&parameters[i], &runs[i]) || twists(&runs[i]) || runs[i].program_count > 0 ||
+        !is_smooth(&parameters[i])) {
       return -1;
     }
   }

@@ -177,7 +177,7 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
   at->air = air_at(c, features, time);
   const Air air = at->air;
   const Lane shed = features & SHEDDING ? shed_at(&c->law, time) : none;
-  const Lane found = acceleration(c, &air, slip, features, angle, rate, shed, lagged, input, &at->powers);
+  const Lane found = acceleration(c, &air, slip, features, time, angle, rate, shed, lagged, input, &at->powers);
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
        square = 2 * bend;

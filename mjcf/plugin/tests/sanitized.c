@@ -195,6 +195,51 @@ static void check_forward(void) {
   }
 }
 
+// Programs side by side: one of every operation, and one that fills the stack; the last run has none.
+static void check_programs(void) {
+  enum { kRuns = 6, kSamples = 100, kDeep = 3 * VWT_STACK - 1 };
+  double deep[kDeep], every[8 * VWT_OPERATION_COUNT];
+  const double above_none[] = {VWT_OPERATION_cos, VWT_OPERATION_square, VWT_OPERATION_number, 0.5, VWT_OPERATION_add};
+  int size = 0;
+  for (int i = 0; i < kDeep; i++) {
+    deep[i] = i >= 2 * VWT_STACK ? VWT_OPERATION_add : i % 2 ? 1e-4 : VWT_OPERATION_number;
+  }
+  for (int operation = VWT_OPERATION_angle; operation < VWT_OPERATION_COUNT; operation++) {
+    const int taken = vwt_operation_taken[operation];
+    if (taken == 2) {
+      every[size++] = VWT_OPERATION_number;
+      every[size++] = 1.5;
+    }
+    every[size++] = operation;
+    if (taken == 0 && operation != VWT_OPERATION_angle) {
+      every[size++] = VWT_OPERATION_add;
+    }
+    for (int i = 0; i < 5; i++) {  // roots and logarithms have values
+      every[size++] = above_none[i];
+    }
+  }
+  static double angle[kRuns][kSamples], rate[kRuns][kSamples], alone[kSamples], alone_rate[kSamples];
+  double *angles[kRuns], *rates[kRuns], *one[] = {alone}, *one_rate[] = {alone_rate};
+  const double wind[] = {18}, nothing[] = {0};
+  vwt_parameters p[kRuns];
+  vwt_run runs[kRuns];
+  for (int i = 0; i < kRuns; i++) {
+    p[i] = (vwt_parameters){.spring_stiffness = 16, .yaw_inertia = 0.1, .mechanical_damping = 0.02};
+    runs[i] = (vwt_run){.wind = wind, .wind_count = 1, .angle = 0.3 + 0.01 * i, .step = 0.002, .steps = 2,
+                        .samples = kSamples, .program = i < 3 ? deep : every,
+                        .program_count = i == 5 ? 0 : i < 3 ? kDeep : size};
+    angles[i] = angle[i];
+    rates[i] = rate[i];
+  }
+  EXPECT(vwt_forward(kRuns, p, runs, angles, rates) == 0);
+  for (int i = 0; i < kRuns; i++) {
+    runs[i].forcing = nothing;  // keeps it from the others
+    runs[i].forcing_count = 1;
+    EXPECT(vwt_forward(1, &p[i], &runs[i], one, one_rate) == 0);
+    EXPECT(fabs(angle[i][kSamples - 1] - alone[kSamples - 1]) < 1e-12);
+  }
+}
+
 static void check_slopes(void) {
   enum { kSamples = 200, kRuns = 5, kTerms = VWT_TERM_COUNT, kColumns = kTerms + VWT_MOST_CHANGES, kWinds = 3,
          kDrives = 4 };
@@ -277,6 +322,7 @@ static void check_functions(void) {
 int main(void) {
   check_functions();
   check_forward();
+  check_programs();
   check_slopes();
   mju_user_error = on_error;
   check_models_on_one_data();

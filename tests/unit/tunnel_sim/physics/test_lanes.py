@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.unit.tunnel_sim.physics.test_slopes import DRIVES, JUMPING, KINKED, SMOOTH, driven, runs
+from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.forward import integrate
 from tunnel_sim.physics.slopes import slopes, term_places
 
@@ -52,19 +53,87 @@ def test_a_sampled_wind_has_the_same_bits_side_by_side(name, steps, stride):
         np.testing.assert_allclose(one, other, rtol=error, atol=error)
 
 
+INPUTS = {"b": "angle", "r": "rate", "t": "time", "v": "speed"}
+#: Moments by expression, of every operation.
+STATED = (
+    "-k*b^3 - 0.01*r^2*sign(r)",
+    "-0.01*exp(-(r/k)^2)*sign(r) - 0.02*tanh(r/0.2)",
+    "0.02*sin(3*t)*cos(k*b) - 0.001*v*b/15",
+    "-0.05*abs(b)^1.5*sign(b) - 0.1*(b + 2)^k + 0.1*2^k",
+    "-0.01*max(b, 0.02*k) + 0.01*min(r, -0.1)",
+    "-0.02*atan(r/k) - 0.01*tan(b) - 0.01*b*sqrt(1 + r^2)",
+    "-0.01*b*log(k + b^2) - (-b)",
+    "0.03*(b - 0.1)^3 - 0.01*(b - 0.05)^k",
+)
+
+
+def stated(run, texts, size=1.0):
+    """Give runs moments by expression, whose number differs from run to run."""
+    expressions = [parse(text, frozenset({*INPUTS, "k"})) for text in texts]
+    codes = [
+        np.array(expressions[i % len(texts)].program({"k": 0.4 + 0.1 * i * size}, INPUTS))
+        for i in range(len(run))
+    ]
+    run["program"], run["program_count"] = [c.ctypes.data for c in codes], [c.size for c in codes]
+    return codes
+
+
+@pytest.mark.parametrize("name", ["linear", "friction", "gravity"])
+@pytest.mark.parametrize("text", STATED)
+def test_moments_by_expression_act_side_by_side_as_alone(text, name):
+    law, run = runs(FORMS[name], count=11)
+    without = integrate(law, run, 400)
+    run["angle"] += 0.01 * np.arange(11)
+    power = text.endswith("^k")  # of a negative number: only whole powers have values
+    keep_alive = [stated(run, [text]) if not power else stated(run, [text.replace("^k", "^5")])]
+    together = integrate(law, run, 400)
+    keep_alive.append(kept_apart(run))
+    alone = integrate(law, run, 400)
+    assert together[2] == alone[2] == 0
+    for one, other in zip(together[:2], alone[:2], strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12)
+    assert np.max(np.abs(together[0][0] - without[0][0])) > 1e-5
+
+
+def test_runs_with_other_expressions_and_with_none_move_beside_each_other():
+    law, run = runs({}, count=11)
+    keep_alive = [stated(run, STATED[:3])]
+    run["program_count"][[4, 9]] = 0
+    wind = 15.0 + np.random.default_rng(1).normal(size=(11, 20)).cumsum(axis=1)
+    run["wind"] = wind.ctypes.data + wind.strides[0] * np.arange(11)
+    run["wind_count"], run["wind_interval"] = 20, 0.1
+    together = integrate(law, run, 400)
+    keep_alive.append(kept_apart(run))
+    alone = integrate(law, run, 400)
+    np.testing.assert_allclose(together[0], alone[0], rtol=0.0, atol=1e-12)
+
+
+def test_an_expression_without_a_value_has_none_beside_others_either():
+    law, run = runs({}, count=3)
+    keep_alive = [stated(run, ["0.01*(b - 0.5)^k"])]
+    assert integrate(law, run, 400)[2] == 1
+    keep_alive = [stated(run, ["0.01*log(b - 0.5)"])]
+    assert integrate(law, run, 400)[2] == 1
+    keep_alive = [stated(run, ["0.01*exp(1000*k/abs(b))"])]  # greater than any number
+    assert integrate(law, run, 400)[2] == 1
+    keep_alive.append(kept_apart(run))
+    assert integrate(law, run, 400)[2] == 1
+
+
 @pytest.mark.parametrize("drive", [None, *DRIVES])
 @pytest.mark.parametrize("name", FORMS)
 def test_rods_twist_side_by_side_as_alone(name, drive):
     law, run = runs(FORMS[name], 4, 1, count=11)
+    keep_alive = [stated(run, STATED[:1])] if name == "linear" else []
     if drive is not None:
         law, run = driven(law, run, drive)
     rigid = integrate(law, run, 400)
     run["angle"] += 0.01 * np.arange(11)
     run["twist_stiffness"], run["twist_damping"], run["inertia_share"] = 800.0, 0.03, 0.3
     run["twist"], run["twist_rate"] = 0.01, 0.1
-    together, keep_alive = integrate(law, run, 400), kept_apart(run)
+    together = integrate(law, run, 400)
+    keep_alive.append(kept_apart(run))
     alone = integrate(law, run, 400)
-    del keep_alive
     assert together[2] == alone[2] == 0
     error = 1e-12 if name in ROUNDED else 0.0
     if drive is not None:
