@@ -83,11 +83,10 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     if not _may_show(data, kind):
         return []
     if kind.own_numbers(1):
-        found = [_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one]
+        tried = (_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one)
     else:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
-        found = [start for start in tried if start is not None]
-    return sorted(found, key=lambda start: -start.predicted_drop)
+    return sorted(filter(None, tried), key=lambda start: -start.predicted_drop)
 
 
 def _may_show(data: Data, kind: type[Effect]) -> bool:
@@ -95,8 +94,8 @@ def _may_show(data: Data, kind: type[Effect]) -> bool:
     return kind.acts(wind_on=data.wind_on) and (not kind.driven or data.driven)
 
 
-def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint:
-    """An effect with a phase or instants in every run, as found in the residuals."""
+def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint | None:
+    """An effect with a phase or instants in every run, as found in the residuals; None where its size is zero."""
     of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
     fixed = (*base.problem.fixed, *(of_input if base.problem.data.driven else ()))
     instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
@@ -104,6 +103,8 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, instants=instants)
     infos = zip(one.values, _own_parameters(problem, kind), strict=True)
     values = [np.clip(value, info.lower, info.upper) for value, info in infos]
+    if values[0] == 0.0:
+        return None
     release = np.column_stack([base.point.release, one.numbers])
     point = Point(np.concatenate([base.point.common, values]), release)
     predicted = misfit(base).excess

@@ -73,7 +73,8 @@ class LongInput(WholeRuns):
     def holds(self, sets: Sets) -> bool:
         """Whether the answer is a set that explains whole runs as well as their beginnings.
 
-        If not, an effect that acts later on could pay its price.
+        If not, an effect that acts later on could pay its price. Chance differences between the runs imitate an
+        effect that seldom acts, so that whole runs decide between the two.
         """
         begun, whole, weighing = sets.answer, sets.settled, self.base.settings.weighing
 
@@ -81,7 +82,7 @@ class LongInput(WholeRuns):
             scale = misfit_scale(misfit(nominal), weighing)
             return log_misfit(misfit(fit).excess, scale, OF_MOTION, weighing.leak)
 
-        if begun is None or whole is None:
+        if begun is None or whole is None or begun.fit.problem.scatter or whole.fit.problem.scatter:
             return False
         more = left(whole.fit, self.prepared.nominal) - left(begun.fit, self.repeating)
         return weighing.steepness * more < weighing.set_price
@@ -108,11 +109,13 @@ class LongInput(WholeRuns):
         """
         begun = polish(hypothesis)
         whole, spread = self.whole(begun), begun.fit.spread
-        if whole is None or spread is None:
-            return whole
-        order = [begun.fit.problem.names.index(name) for name in whole.fit.problem.names]
-        return replace(whole, fit=replace(whole.fit, spread=spread[np.ix_(order, order)]))
+        if whole is None:
+            return None
+        if spread is not None:
+            order = [begun.fit.problem.names.index(name) for name in whole.fit.problem.names]
+            whole = replace(whole, fit=replace(whole.fit, spread=spread[np.ix_(order, order)]))
+        return self.with_differences(whole)
 
-    def polished(self, settled: Hypothesis) -> Hypothesis:
+    def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer, unchanged."""
         return settled

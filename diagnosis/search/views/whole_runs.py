@@ -230,16 +230,12 @@ class WholeRuns(View):
         """The set, unchanged."""
         return hypothesis
 
-    def polished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence."""
-        return polish(settled)
-
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence; done last because another view may follow.
+        """The answer fitted to convergence; done last because another view may follow."""
+        return self.with_differences(polish(settled))
 
-        It includes chance differences between the runs where they pay the price of an effect.
-        """
-        polished = self.polished(settled)
+    def with_differences(self, polished: Hypothesis) -> Hypothesis:
+        """An answer with chance differences between the runs, where they pay the price of an effect."""
         found, stated = polished.fit, bool(self.prepared.nominal.problem.scatter)
         repeats: Fit | None = found
         if found.problem.scatter:
