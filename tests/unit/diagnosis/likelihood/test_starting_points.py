@@ -17,6 +17,7 @@ from tests.reference import free_decays
 from tests.reference.free_decays import SIX, Setting, Truth
 from tests.support.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Trial
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
@@ -261,6 +262,15 @@ def test_an_effect_that_would_have_to_be_larger_than_it_may_is_not_tried(monkeyp
     far = Trial({"limit": 3.6, "centre": 6.4}, None)
     monkeypatch.setattr(clipping, "trials", lambda _: (far,))
     assert starting_points(base, clipping) == []
+
+
+def test_an_effect_of_size_zero_is_no_start(monkeypatch):
+    base, kind = nominal(campaign()), effect_class("dropped_samples")
+    instants = np.full((len(base.problem.data.runs), 1), 0.5)
+    for lost, count in ((0.02, 1), (-0.02, 0)):  # a search may find a time below the least one, zero
+        found = Sought((lost,), instants, 100.0)
+        monkeypatch.setattr(kind, "sought", classmethod(lambda _cls, _residuals, found=found: (found,)))
+        assert len(starting_points(base, kind)) == count
 
 
 @pytest.mark.parametrize("angle", [1e7, 1e308, np.inf])
