@@ -27,12 +27,13 @@ _LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembe
 
 
 def common_length(data: Data) -> int:
-    """The greatest length, in blocks, with which all runs together are within the limit for growth.
+    """The greatest length of driven runs, in blocks, with which all runs are within the limit for growth.
 
-    Shorter runs stay whole.
+    Shorter runs and free decays stay whole. 0 where these alone exceed the limit.
     """
-    left, length = data.settings.search.grown_on, 0
-    sizes = sorted(run.reading.size for run in data.runs)
+    free = sum(run.reading.size for run in data.runs if run.drive is None)
+    left, length = max(data.settings.search.grown_on - free, 0), 0
+    sizes = sorted(run.reading.size for run in data.runs if run.drive is not None)
     for number, size in enumerate(sizes):
         length = left // (len(sizes) - number)
         if size > length:
@@ -42,9 +43,11 @@ def common_length(data: Data) -> int:
 
 
 def beginnings(data: Data, length: int) -> Data:
-    """The runs up to a length, in blocks; shorter runs stay whole."""
-    runs = tuple(run if run.reading.size <= length else run.part(last=length) for run in data.runs)
-    return data.with_runs(runs)
+    """Driven runs up to a length, in blocks; shorter ones and free decays stay whole."""
+    cut = (run.drive is not None and run.reading.size > length for run in data.runs)
+    return data.with_runs(
+        tuple(run.part(last=length) if long else run for run, long in zip(data.runs, cut, strict=True))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +62,10 @@ class LongInput(WholeRuns):
         stated scatter.
         """
         data = prepared.nominal.problem.data
-        length, sizes = common_length(data), [run.reading.size for run in data.runs]
-        cycles = length * REFERENCE_FREQUENCY * min(run.interval for run in data.runs)
-        if not prepared.campaign.driven or max(sizes) <= length or cycles < _LEAST:
+        length, driven = common_length(data), [run for run in data.runs if run.drive is not None]
+        longest = max((run.reading.size for run in driven), default=0)
+        cycles = length * REFERENCE_FREQUENCY * min((run.interval for run in driven), default=0.0)
+        if longest <= length or cycles < _LEAST:
             return None
         view = super().after(prepared, known, clock)
         if view is None or view.first is not None or view.unscattered is not None:

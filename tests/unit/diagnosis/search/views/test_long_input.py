@@ -42,18 +42,21 @@ def lengths(found: Study, *names: str) -> list[int]:
     return [run.reading.size for run in answer.hypothesis.fit.problem.data.runs]
 
 
-def test_beginnings_have_a_common_length_and_shorter_runs_stay_whole() -> None:
-    data = nominal(campaign()).problem.data
-    size = data.runs[0].reading.size
-    short = data.with_runs((data.runs[0].part(last=100), *data.runs[1:]))
-    short = replace(short, settings=data.settings.changed({"search.grown_on": 100 + 5 * 300 + 4}))
-    assert common_length(short) == 300
-    found = beginnings(short, 300).runs
-    assert [run.reading.size for run in found] == [100, 300, 300, 300, 300, 300]
-    assert np.array_equal(found[1].reading, data.runs[1].reading[:300])
-    long = replace(short, settings=data.settings.changed({"search.grown_on": 100 + 5 * size}))
-    assert common_length(long) == size
-    assert beginnings(long, size).runs == short.runs
+def test_driven_runs_have_beginnings_of_a_common_length_and_others_stay_whole() -> None:
+    data = nominal(driven("moment, then released")).problem.data
+    longer, free = data.runs
+    size = longer.reading.size
+    runs = (longer.part(last=100), longer, free, longer)
+    limited = replace(data.with_runs(runs), settings=data.settings.changed({"search.grown_on": size + 701}))
+    assert common_length(limited) == 300
+    found = beginnings(limited, 300).runs
+    assert [run.reading.size for run in found] == [100, 300, size, 300]
+    assert np.array_equal(found[1].reading, longer.reading[:300])
+    all_of_it = replace(limited, settings=data.settings.changed({"search.grown_on": 100 + 3 * size}))
+    assert common_length(all_of_it) == size
+    assert beginnings(all_of_it, size).runs == runs
+    of_free_alone = replace(limited, settings=data.settings.changed({"search.grown_on": size}))
+    assert common_length(of_free_alone) == 0
 
 
 def test_a_cause_is_found_in_the_beginnings_and_fitted_to_whole_runs() -> None:
