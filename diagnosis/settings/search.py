@@ -100,11 +100,32 @@ class SearchSettings:
     )
     grown_on: int = setting(
         45_000,
-        "Maximum number of readings on which sets are grown; longer campaigns omit some stretches, or the end of "
-        "driven runs.",
+        "Maximum number of readings on which sets are grown; longer campaigns omit some stretches.",
         "judgement",
         "Time. Twelve runs of 10 s have fewer.",
         unit="block means",
+    )
+    long_input: int = setting(
+        75_000,
+        "Number of readings above which sets of causes of driven runs are found in their beginnings.",
+        "judgement",
+        "Time. Shorter ones are not answered sooner that way.",
+        unit="block means",
+        decision="0054",
+    )
+    begun_on: int = setting(
+        15_000,
+        "Number of readings in these beginnings.",
+        "judgement",
+        "Time against coverage. Twelve free decays of 10 s have nearly as many.",
+        unit="block means",
+        decision="0054",
+    )
+    compared_from: float = setting(
+        0.01,
+        "Minimum probability of a set of the beginnings of driven runs for comparison in whole runs.",
+        "judgement",
+        "Time against coverage.",
         decision="0054",
     )
     most_causes: int = setting(

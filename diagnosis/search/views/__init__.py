@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from diagnosis.search.views.beginnings import AfterBeginnings, Beginnings
 from diagnosis.search.views.by_moment import ByMoment
-from diagnosis.search.views.long_input import LongInput
 from diagnosis.search.views.stretches import InStretches
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 
 #: In order of preference; each gets the results of the one before.
-VIEWS: tuple[type[View], ...] = (InStretches, LongInput, WholeRuns, ByMoment)
+VIEWS: tuple[type[View], ...] = (InStretches, Beginnings, AfterBeginnings, WholeRuns, ByMoment)

@@ -42,7 +42,6 @@ KNOWN_IN_SEVERAL = {
     "own_number_gain": "wherever an instant or a phase counts",
     "trend_rate": "one test, for the answer and for its sentence",
     "which_scatters_rate": "shown beside other numbers, or beside a drift",
-    "grown_on": "of stretches, and of the beginnings of driven runs",
     "set_price": "scatter pays the price of an effect, and so would one that acts later on",
     "steepness": "by the same measure as an effect",
     "chance_stds": "chance, whether of all that is left or of every channel",

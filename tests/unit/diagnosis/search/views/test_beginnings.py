@@ -11,7 +11,7 @@ import pytest
 from diagnosis import Settings
 from diagnosis.search.investigate import investigate
 from diagnosis.search.study import Study
-from diagnosis.search.views.long_input import LongInput, beginnings, common_length
+from diagnosis.search.views.beginnings import AfterBeginnings, Beginnings, beginnings, common_length
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.support.driven_runs import COUNT, Planted, driven
 from tests.support.gap_campaigns import campaign, nominal
@@ -23,6 +23,12 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 
 SPRING = Planted(cubic=-2.0)
+VIEWS = Beginnings, AfterBeginnings, WholeRuns
+
+
+def cut_to(readings: int) -> Settings:
+    """Longer driven runs are cut to so many readings."""
+    return Settings().changed({"search.long_input": readings, "search.begun_on": readings})
 
 
 @cache
@@ -30,9 +36,9 @@ def study(share: float, names: tuple[str, ...], lost: bool = False) -> Study:
     """Two driven runs whose sets grow on a share of the readings."""
     data: Campaign = with_lost_samples(kept=False) if lost else driven("moment", SPRING)
     count = 2 * (COUNT_LOST if lost else COUNT)
-    settings = Settings().changed({"search.grown_on": round(share * count)})
+    settings = cut_to(round(share * count))
     kinds = [effect_class(name) for name in names]
-    return investigate(data, kinds, settings=settings, views=(LongInput, WholeRuns))
+    return investigate(data, kinds, settings=settings, views=VIEWS)
 
 
 def lengths(found: Study, *names: str) -> list[int]:
@@ -47,15 +53,15 @@ def test_driven_runs_have_beginnings_of_a_common_length_and_others_stay_whole() 
     longer, free = data.runs
     size = longer.reading.size
     runs = (longer.part(last=100), longer, free, longer)
-    limited = replace(data.with_runs(runs), settings=data.settings.changed({"search.grown_on": size + 701}))
+    limited = replace(data.with_runs(runs), settings=cut_to(size + 701))
     assert common_length(limited) == 300
     found = beginnings(limited, 300).runs
     assert [run.reading.size for run in found] == [100, 300, size, 300]
     assert np.array_equal(found[1].reading, longer.reading[:300])
-    all_of_it = replace(limited, settings=data.settings.changed({"search.grown_on": 100 + 3 * size}))
+    all_of_it = replace(limited, settings=cut_to(100 + 3 * size))
     assert common_length(all_of_it) == size
     assert beginnings(all_of_it, size).runs == runs
-    of_free_alone = replace(limited, settings=data.settings.changed({"search.grown_on": size}))
+    of_free_alone = replace(limited, settings=cut_to(size))
     assert common_length(of_free_alone) == 0
 
 
@@ -65,7 +71,7 @@ def test_a_cause_is_found_in_the_beginnings_and_fitted_to_whole_runs() -> None:
     assert found.causes == ("cubic_stiffness",)
     whole = [run.reading.size for run in found.nominal.problem.data.runs]
     assert lengths(found, "cubic_stiffness") == whole
-    assert max(lengths(found, "coulomb_friction")) <= whole[0] // 2 + 1  # as it was weighed
+    assert found.of(["coulomb_friction"]) is None  # unlikely in the beginnings
     of_whole = study(1.0, names)
     assert lengths(of_whole, "coulomb_friction") == whole
     name = "cubic_stiffness.coefficient"
@@ -97,10 +103,10 @@ def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> No
         runs.append(replace(run, record=record, drive=replace(run.drive, values=drive)))
     data = replace(driven("moment", SPRING), runs=tuple(runs))
     kinds = [effect_class(name) for name in ("cubic_stiffness", "dropped_samples", "coulomb_friction")]
-    settings = Settings().changed({"search.grown_on": COUNT})
-    in_beginnings = investigate(data, kinds, settings=settings, views=(LongInput,))
+    settings = cut_to(COUNT)
+    in_beginnings = investigate(data, kinds, settings=settings, views=(Beginnings,))
     assert in_beginnings.causes == ("cubic_stiffness",)
-    found = investigate(data, kinds, settings=settings, views=(LongInput, WholeRuns))
+    found = investigate(data, kinds, settings=settings, views=VIEWS)
     assert found.causes == ("cubic_stiffness", "dropped_samples")
 
 
@@ -113,21 +119,21 @@ def test_whole_runs_decide_where_the_runs_differ_by_chance() -> None:
             runs.append(replace(run, id=f"{run.id}-{seed}", spring_stiffness=stated))
     data = replace(driven("moment", SPRING), runs=tuple(runs))
     kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "stiffness_scatter")]
-    settings = Settings().changed({"search.grown_on": 4 * COUNT})
-    found = investigate(data, kinds, settings=settings, views=(LongInput, WholeRuns))
+    settings = cut_to(4 * COUNT)
+    found = investigate(data, kinds, settings=settings, views=VIEWS)
     assert found.causes == ("cubic_stiffness", "stiffness_scatter")
     assert lengths(found, "coulomb_friction") == [run.reading.size for run in found.nominal.problem.data.runs]
 
 
 @pytest.mark.parametrize("share", [1.0, 0.2], ids=["within the limit", "with beginnings of a few cycles"])
 def test_other_driven_runs_are_viewed_whole(share: float) -> None:
-    settings = Settings().changed({"search.grown_on": round(share * 2 * COUNT)})
+    settings = cut_to(round(share * 2 * COUNT))
     with pytest.raises(ValueError, match="no view of the runs applies"):
-        investigate(driven("moment", SPRING), settings=settings, views=(LongInput,))
+        investigate(driven("moment", SPRING), settings=settings, views=(Beginnings,))
 
 
 def test_free_decays_are_viewed_whole() -> None:
-    settings = Settings().changed({"search.grown_on": 3000})
+    settings = cut_to(3000)
     cause = effect_from("quadratic_damping", {"coefficient": 0.003})
     with pytest.raises(ValueError, match="no view of the runs applies"):
-        investigate(campaign(cause), settings=settings, views=(LongInput,))
+        investigate(campaign(cause), settings=settings, views=(Beginnings,))

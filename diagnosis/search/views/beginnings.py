@@ -1,4 +1,4 @@
-"""Sets of causes of runs with a long input: found in the beginnings of the runs, then fitted to whole runs.
+"""Sets of causes of runs with a long input: found in the beginnings of the runs, then compared in whole runs.
 
 An input keeps a body in motion, so that the beginning of a run shows what the whole run shows. A free decay has its
 large swings at its beginning and its small ones at its end.
@@ -7,7 +7,7 @@ large swings at its beginning and its small ones at its end.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
+from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
 
@@ -27,12 +28,12 @@ _LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembe
 
 
 def common_length(data: Data) -> int:
-    """The greatest length of driven runs, in blocks, with which all runs are within the limit for growth.
+    """The greatest length of driven runs, in blocks, with which all runs have as many readings as chosen.
 
-    Shorter runs and free decays stay whole. 0 where these alone exceed the limit.
+    Shorter runs and free decays stay whole. 0 where these alone have more.
     """
     free = sum(run.reading.size for run in data.runs if run.drive is None)
-    left, length = max(data.settings.search.grown_on - free, 0), 0
+    left, length = max(data.settings.search.begun_on - free, 0), 0
     sizes = sorted(run.reading.size for run in data.runs if run.drive is not None)
     for number, size in enumerate(sizes):
         length = left // (len(sizes) - number)
@@ -51,21 +52,20 @@ def beginnings(data: Data, length: int) -> Data:
 
 
 @dataclass(frozen=True, eq=False)
-class LongInput(WholeRuns):
-    """The beginnings of runs with a long input, in which sets are found and compared."""
+class Beginnings(WholeRuns):
+    """The beginnings of runs with a long input, in which sets are found."""
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """The first view of runs with an input that are longer than sets are grown on.
+        """The first view of runs with a long input.
 
         None where their beginnings would be short, the nominal model has a second mode, or the runs differ by a
         stated scatter.
         """
-        data = prepared.nominal.problem.data
-        length, driven = common_length(data), [run for run in data.runs if run.drive is not None]
-        longest = max((run.reading.size for run in driven), default=0)
-        cycles = length * REFERENCE_FREQUENCY * min((run.interval for run in driven), default=0.0)
-        if longest <= length or cycles < _LEAST:
+        data, chosen = prepared.nominal.problem.data, prepared.settings.search
+        length, driven = common_length(data), [run.interval for run in data.runs if run.drive is not None]
+        cycles = length * REFERENCE_FREQUENCY * min(driven, default=0.0)
+        if sum(run.reading.size for run in data.runs) <= chosen.long_input or cycles < _LEAST:
             return None
         view = super().after(prepared, known, clock)
         if view is None or view.first is not None or view.unscattered is not None:
@@ -92,7 +92,7 @@ class LongInput(WholeRuns):
         return weighing.steepness * more < weighing.set_price
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """The set fitted to whole runs.
+        """The set fitted to whole runs, with the forms that the beginnings free, if any.
 
         An effect with instants of its own is sought there again, since it may act at later ones, too.
         """
@@ -104,7 +104,7 @@ class LongInput(WholeRuns):
         found = [] if fitted is None else [Hypothesis(tuple(kept), fitted)]
         for kind in sought:
             found = sets_with_one_more(found, [kind])
-        return found[0] if found else None
+        return replace(found[0], plain=found[0].fit) if found else None
 
     def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set fitted to whole runs, with its forms of the beginnings and in the deepest minimum of these.
@@ -120,6 +120,42 @@ class LongInput(WholeRuns):
             whole = replace(whole, fit=replace(whole.fit, spread=spread[np.ix_(order, order)]))
         return self.with_differences(whole)
 
-    def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer, unchanged."""
-        return settled
+
+@dataclass(frozen=True, eq=False)
+class AfterBeginnings(View):
+    """Whole runs, in which the likely sets of the beginnings are compared.
+
+    Args:
+        known: the sets found in the beginnings.
+    """
+
+    known: Sets
+
+    may_be_noise: ClassVar[bool] = True
+
+    @classmethod
+    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+        """The view after that of the beginnings, where their answer holds in whole runs."""
+        del prepared, clock
+        if known is None or not isinstance(known.view, Beginnings) or not known.view.holds(known):
+            return None
+        return cls(known.view.prepared, known.view.prepared.nominal, known)
+
+    def sets(self, clock: Clock) -> Sets:
+        """The likely sets of the beginnings."""
+        least, known = self.base.settings.search.compared_from, self.known
+        likely = (known.fitted(one.effects) for one in known.weighed if one.probability > least)
+        with clock.step("effects"):
+            whole = [known.view.whole(one) for one in likely if one is not None]
+        return Sets(self, tuple(one for one in whole if one is not None), refused=known.refused)
+
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set, unchanged."""
+        return hypothesis
+
+    def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set with its forms of the beginnings."""
+        known, begun = self.known, self.known.fitted(hypothesis.names)
+        if known.settled is not None and known.settled.names == hypothesis.names:
+            return known.settled
+        return polish(hypothesis) if begun is None else known.view.settled(begun)
