@@ -323,6 +323,11 @@ def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...
     return tuple(form for form in forms if max(pull(name) ** 2 for name in form) > rise)
 
 
+def converged(fitted: Fit) -> Fit:
+    """The fit continued to convergence; itself where that fails."""
+    return try_fit(fitted.problem, fitted.point, tolerance=_POLISH) or fitted
+
+
 def polish(chosen: Hypothesis) -> Hypothesis:
     """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
 

@@ -17,7 +17,7 @@ from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import sets_with_one_more
-from diagnosis.search.hypothesis import Hypothesis, polish, restricted
+from diagnosis.search.hypothesis import Hypothesis, converged, polish, restricted
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
@@ -115,10 +115,11 @@ class Beginnings(WholeRuns):
         whole, spread = self.whole(begun), begun.fit.spread
         if whole is None:
             return None
+        fitted = converged(whole.fit)
         if spread is not None:
-            order = [begun.fit.problem.names.index(name) for name in whole.fit.problem.names]
-            whole = replace(whole, fit=replace(whole.fit, spread=spread[np.ix_(order, order)]))
-        return self.with_differences(whole)
+            order = [begun.fit.problem.names.index(name) for name in fitted.problem.names]
+            fitted = replace(fitted, spread=spread[np.ix_(order, order)])
+        return self.with_differences(replace(whole, fit=fitted))
 
 
 @dataclass(frozen=True, eq=False)
