@@ -61,9 +61,8 @@ class Ringing:
     root: complex
     responses: Sequence[Response] = ()
 
-    @np.errstate(
-        over="ignore", invalid="ignore"
-    )  # a ringing that grows without bound; the caller looks for it
+    # a ringing may grow without bound; the caller looks for it
+    @np.errstate(over="ignore", invalid="ignore")
     def added(self, angle: Angles, rate: Rates, interval: Seconds) -> tuple[Angles, Rates]:
         """Angle and rate of the slow motion, at equal intervals from the release, with the ringing."""
         size = abs(self.amplitude)
