@@ -18,6 +18,7 @@ from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosab
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.repeatability import AnswerWithout, Repeatability
+from diagnosis.model.choose import nominal_model
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
@@ -31,6 +32,8 @@ from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
+from identification import identify
+from identification.estimate import Estimate
 from identification.status import left_out_as_asked
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
@@ -149,7 +152,7 @@ def _assembled(
     lead = map(as_stated, study.model.lead_words(study.similarity))
     beyond = () if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)
     left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead, *beyond)
-    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds)
+    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds, _identified(study, chosen))
     noted = (
         *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),
         *hum_noted(study.campaign, study.prepared.hum, study.similarity),
@@ -162,6 +165,18 @@ def _assembled(
         data=chosen.examined,
     )
     return in_own_units(sized, study.similarity)
+
+
+def _identified(study: Study, chosen: Chosen) -> Estimate | None:
+    """The estimate of the same runs by `identify`; None where a cause acts, or it is of another model or other runs."""
+    scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
+    own_model = type(study.model) is not type(nominal_model(chosen.campaign, None))
+    if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
+        return None
+    try:
+        return identify(chosen.campaign, throw=False)
+    except TunnelError:  # the examination refuses what the diagnosis may still compare
+        return None
 
 
 def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
+from decimal import Decimal
+from math import hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.special import chdtri, ndtri, stdtrit
 from identification.estimate import Estimate, NoiseLevel, Quantity
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
 from identification.status import Remark
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.quantities import PerParameter, PerUnknown, Square, Vector
 from tunnel_sim.vocabulary.record import Array
 
@@ -269,6 +270,48 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     least = np.array([one.std for name in estimate.parameters if (one := wider[name]) is not None])
     covariance = widened_covariance(estimate.covariance_matrix, least)
     return replace(estimate, runs=tuple(runs), covariance=tuple(map(tuple, covariance.tolist())), **wider)
+
+
+_DENSITY_DECIMALS = 4  # from which a density is a computed value that was rounded, not a nominal one
+
+
+def density_rounding(runs: Sequence[Run]) -> float:
+    """Relative standard deviation of the stated air densities by their rounding, the largest of the wind-on runs.
+
+    Rounding is a rectangular distribution of half a unit of the last decimal (GUM 4.3.7). A density of fewer than
+    four decimals is a nominal value, taken as stated: its uncertainty is the user's to state.
+    """
+    found = 0.0
+    for run in runs:
+        if run.wind_on and run.air_density:
+            exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
+            decimals = -exponent if isinstance(exponent, int) else 0
+            if decimals >= _DENSITY_DECIMALS:
+                found = max(found, 0.5 * 10.0**-decimals / sqrt(3.0) / run.air_density)
+    return found
+
+
+def widened_by_rounding(estimate: Estimate, runs: Sequence[Run]) -> Estimate:
+    """Add the rounding of the stated air densities, common to all runs, to Cnβ and Cnr, in quadrature."""
+    share = density_rounding(runs)
+    names = [name for name in ("cn_beta", "cn_r") if getattr(estimate, name) is not None]
+    if share == 0.0 or not names:
+        return estimate
+    wider = {name: _wider(getattr(estimate, name), share) for name in names}
+    change = np.array(
+        [share * wider[n].value if n in wider else 0.0 for n in estimate.parameters], np.float64
+    )
+    covariance = estimate.covariance_matrix + np.outer(change, change)
+    return replace(estimate, covariance=tuple(map(tuple, covariance.tolist())), **wider)
+
+
+def _wider(found: Quantity, share: float) -> Quantity:
+    """A quantity with a further relative standard deviation."""
+    own, interval = share * found.value, found.interval
+    if interval is not None:
+        low, high = (hypot(end - found.value, float(ndtri(0.975)) * own) for end in interval)
+        interval = (found.value - low, found.value + high)
+    return replace(found, std=hypot(found.std, own), interval=interval)
 
 
 def _reaching(

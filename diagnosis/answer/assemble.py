@@ -10,7 +10,13 @@ from importlib.metadata import version
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
-from diagnosis.answer.coefficients import Answers, before_the_causes, coefficients, possible_answers
+from diagnosis.answer.coefficients import (
+    Answers,
+    as_identified,
+    before_the_causes,
+    coefficients,
+    possible_answers,
+)
 from diagnosis.answer.friction_curve import friction_curve
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
@@ -32,6 +38,7 @@ from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
+from identification.estimate import Estimate
 from tunnel_sim.effects import Effect, effect_class
 
 
@@ -74,6 +81,7 @@ def assemble(
     left_out: Sequence[Fact] = (),
     patched: PatchedModel | None = None,
     kinds: Sequence[type[Effect]] = (),
+    identified: Estimate | None = None,
 ) -> Diagnosis:
     """Compose the answer.
 
@@ -82,6 +90,7 @@ def assemble(
         left_out: caveats on runs and effects that were left out.
         patched: the given model with the causes written into it.
         kinds: the effects that may act unnamed beside those of an answer.
+        identified: the estimate of the same runs, where no cause but scatter acts.
     """
     chosen, settings, similarity = study.chosen, study.settings, study.similarity
     weighed = candidates(study, excess_base(study))
@@ -90,6 +99,8 @@ def assemble(
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)
     after = coefficients(answers, study.campaign)
+    if identified is not None:
+        after = as_identified(after, identified, study.campaign, similarity)
     before = before_the_causes(study.nominal, after) if study.causes else after
     found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,10 +22,13 @@ from diagnosis.answer.linear_theory import (
     wind_on_runs,
 )
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.model.similarity import Similarity
 from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import AnswerSettings
+from identification.estimate import Estimate, Quantity
+from identification.statistics import density_rounding
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
@@ -83,7 +85,7 @@ class Mixture:
 
 
 _SOURCES = (
-    "noise", "misfit", "small causes", "hidden effects", "air density", "unseen form", "freed form", "rivals",
+    "noise", "scatter", "misfit", "small causes", "air density", "unseen form", "freed form", "rivals",
 )  # fmt: skip
 
 
@@ -109,7 +111,7 @@ class Answers:
 
     Args:
         unknown: probability (a fraction) of ``unknown`` where an answer with named effects is chosen.
-        hidden: the effects that could hide beside the chosen answer.
+        hidden: upper limits on the effects that were not detected beside the chosen answer.
     """
 
     possible: tuple[Possible, ...]
@@ -185,22 +187,16 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         - the part of the causes' forms that no free decay shows;
         - half the change by freeing the forms, since another family of forms may change as much.
 
-        ``unknown`` also adds half the change from the nominal model. The effect that could hide and would move
-        the coefficient most (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size
-        is two standard deviations. The central interval is given where it is not that of a normal distribution
-        (`interval_beside`). No standard deviation is given at a bound, or where the runs do not determine the
-        coefficient.
+        ``unknown`` also adds half the change from the nominal model. The central interval is given where it is not
+        that of a normal distribution (`interval_beside`). No standard deviation is given at a bound, or where the
+        runs do not determine the coefficient. An effect that is too small to be detected adds nothing: its upper
+        limit stands beside the coefficients (`diagnosis.answer.hidden`).
     """
     fit, estimates, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
             continue  # fixed
-        move = max((hidden.moves[name].value for hidden in answers.hidden), default=0.0)
-        each = [
-            of
-            for one in answers.possible
-            if (of := _of_answer(one, campaign, name, move / chosen.hidden_stds)) is not None
-        ]
+        each = [of for one in answers.possible if (of := _of_answer(one, campaign, name)) is not None]
         _, first, parts = each[0]
         change = chosen.unknown_std * (first.mean - (_value(answers.nominal, name) or first.mean))
         if answers.unknown > 0.0:
@@ -224,6 +220,35 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         if estimates[name].std is not None:
             estimates[name] = replace(estimates[name], interval=interval_beside(whole, chosen))
     return estimates
+
+
+def as_identified(
+    found: Mapping[str, ParameterEstimate], estimate: Estimate, campaign: Campaign, similarity: Similarity
+) -> dict[str, ParameterEstimate]:
+    """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
+
+    Without a cause both fit the same model to the same readings, so there is one number for each coefficient. A
+    coefficient that the estimate does not state is unchanged; ωn and ζ are those of the only run.
+    """
+    runs = estimate.runs if len(estimate.runs) == 1 else ()
+    repeatability, same = estimate.repeatability, dict(found)
+    for name in found:
+        given = next((one for of in (estimate, *runs) if (one := getattr(of, name, None)) is not None), None)
+        if not isinstance(given, Quantity) or given.std <= 0.0:
+            continue
+        parts = {"scatter": 0.0, "air density": 0.0}
+        if name in estimate.parameters and repeatability is not None:
+            place = estimate.parameters.index(name)
+            parts["scatter"] = sum(one[place][place] for one in repeatability.covariances)
+        if name.startswith("cn_"):
+            parts["air density"] = (given.value * density_rounding(campaign.runs)) ** 2
+        shares = {source: min(part / given.std**2, 1.0) for source, part in parts.items()}
+        shares = {"noise": max(1.0 - sum(shares.values()), 0.0), **shares}
+        value, std = (similarity.similar(one, given.unit) for one in (given.value, given.std))
+        ends = given.interval and tuple(similarity.similar(end, given.unit) for end in given.interval)
+        interval = (ends[0], ends[1]) if ends else None
+        same[name] = ParameterEstimate(value, std, given.unit, shares=shares, interval=interval)
+    return same
 
 
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
@@ -267,12 +292,9 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
 
 
 def _of_answer(
-    answer: Possible, campaign: Campaign, name: str, hidden: float
+    answer: Possible, campaign: Campaign, name: str
 ) -> tuple[float, Mixture, dict[str, float]] | None:
-    """Probability, distribution and variances by source of a coefficient under one answer.
-
-    ``hidden`` is its standard deviation due to effects that could hide.
-    """
+    """Probability, distribution and variances by source of a coefficient under one answer."""
     fit, value = answer.fit, _value(answer.fit, name)
     if value is None:
         return None
@@ -283,12 +305,7 @@ def _of_answer(
         misfit = max(misfit, coefficient_move(replace(fit, residuals=small.left), name))
     rounding = unseen = 0.0
     if name.startswith("cn_"):
-        for run in campaign.runs:
-            if run.wind_on and run.air_density:
-                exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
-                digits = -exponent if isinstance(exponent, int) else 4
-                own = 0.5 * 10.0 ** -min(digits, 8) / math.sqrt(3.0) / run.air_density
-                rounding = max(rounding, own)
+        rounding = density_rounding(campaign.runs)
         runs, which = wind_on_runs(fit), 0 if name == "cn_beta" else 1
         effects = fit.problem.effects_at(fit.point.common)
         unseen = math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[which] for effect in effects))
@@ -296,7 +313,6 @@ def _of_answer(
     unfreed = None if answer.textbook is None else _value(answer.textbook, name)
     common = {
         "misfit": misfit**2,
-        "hidden effects": hidden**2,
         "air density": (value * rounding) ** 2,
         "unseen form": unseen**2,
         "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,

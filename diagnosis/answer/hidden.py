@@ -1,8 +1,12 @@
-"""Effects that could hide: the largest size of every effect that the runs do not exclude, and its influence.
+"""Upper limits on undetected effects: the largest size of every effect that the runs do not exclude.
 
-An effect too small to be named still moves the coefficients, since the fit absorbs a part of it. Most moves are
-small against the noise. A lag of the aerodynamic moment is not: to first order it is a change of Cnr, so only its
-second order, or the comparison of springs and speeds, limits it.
+An effect too small to be named still changes the coefficients, since the fit absorbs a part of it. The change at
+the largest size stands beside the coefficients and is not part of their intervals: Cnr without a named lag is the
+derivative in phase with the rate (decision 0004), to which a lag contributes, and an effect that the runs do not
+show is as likely to be absent.
+
+Linear theory proposes a size. A refit with the effect held at it confirms the limit or corrects it: a lag shows by
+its second order alone, and chance differences between the runs absorb a part of it that linear theory ignores.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from diagnosis.answer.linear_theory import (
     influences,
     size_range,
 )
-from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.starting_points import (
     StartingPoint,
     absorbed,
@@ -34,12 +38,12 @@ from tunnel_sim.vocabulary.record import Array
 
 
 def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
-    """The largest sizes of effects beside those of a fit, two standard deviations from the likeliest size.
+    """Upper limits on effects beside those of a fit, two standard deviations from the likeliest size.
 
     The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
     where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
     that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
-    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains.
+    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains. Refits confirm the size (`_confirmed`).
 
     Args:
         fit: with or without effects.
@@ -48,7 +52,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
             own; each of shape (n,).
 
     Returns:
-        In the given order, without those that the runs cannot show.
+        In the given order, without effects that the runs cannot limit.
     """
     chosen = fit.settings.answer
     total = fit.total if left is None else sum(float(r @ r) for r in left)
@@ -57,22 +61,103 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     names, influence = coefficients_of(fit), influences(fit)
     hidden, units = [], fit.problem.data.model.coefficient_units
     for kind, points in starts:
-        sizes: list[_Size] = []
+        sizes: list[tuple[_Size, StartingPoint]] = []
         with suppress(np.linalg.LinAlgError):
             for start in second_order_starts(fit, kind) or points[: kind.tries]:
                 one = _largest(fit, start, influence, reach)
-                sizes += [] if one is None else [one]
-        if sizes:
+                sizes += [] if one is None else [(one, start)]
+        sizes.sort(key=lambda one: -float(np.max(np.abs(one[0].moves))))
+        tried = (_confirmed(fit, start, one, reach) for one, start in sizes)
+        largest = next((one for one in tried if one is not None), None)
+        if largest is not None:
             severity = kind.parameters()[0]
-            largest = max(sizes, key=lambda one: float(np.max(np.abs(one.moves))))
             size = ParameterEstimate(largest.size, None, severity.unit)
             moves = {
                 name: ParameterEstimate(float(abs(move)), None, units[name])
                 for name, move in zip(names, largest.moves, strict=True)
             }
-            stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one in sizes) / reach))
+            stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one, _ in sizes) / reach))
             hidden.append(Hidden(kind.name, severity.name, size, moves, stds))
     return tuple(hidden)
+
+
+def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
+    """The size at which a refit is ``reach`` above the least −2 ln L, with its changes of the coefficients.
+
+    A refit within a quarter of the distance confirms a size. Elsewhere the size follows from the rise, which grows with
+    the square of the unabsorbed change, and from the sizes already refitted. A phase or an instant in every run is
+    left as linear theory has it: such a change is a sum of lines or steps, linear in its size.
+
+    Returns:
+        None where no refit confirms a size, or the runs exclude no size at all.
+    """
+    assert start.scaled is not None
+    if start.point.release.shape[1] > fit.point.release.shape[1]:
+        return found
+    size, limit = found.size, fit.unlikelihood - found.lowered
+    least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
+    inside = outside = 0.0  # sizes below and above the limit
+    along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
+    for _ in range(_REFITS):
+        again = _held(fit, start, size, fit.point.common + along * size)
+        if again is None:
+            return None
+        rise = again.unlikelihood - limit
+        if abs(rise - reach) <= _CONFIRMED * reach:
+            return replace(
+                found,
+                size=size,
+                moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
+            )
+        if rise < reach:
+            inside, along = size, (again.point.common[: along.size] - fit.point.common) / size
+        else:
+            outside = size
+        power = 0.25 if start.second_order else 0.5
+        further = size * float(np.clip((reach / max(rise, 1e-3 * reach)) ** power, 1.0 / _WIDEST, _WIDEST))
+        if inside and outside and not abs(inside) < abs(further) < abs(outside):
+            further = float(np.sign(size) * np.sqrt(inside * outside))
+        further = float(np.clip(further, least, greatest))
+        if further == size:  # the whole range is allowed
+            return None
+        size = further
+    return None
+
+
+def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | None:
+    """The fit with an effect held at a size, its other parameters free; None where it fails.
+
+    Args:
+        common: parameters of the given fit at which it starts, shape (common,).
+    """
+    assert start.scaled is not None
+    name, problem = start.problem.names[start.scaled], start.problem
+    problem = replace(problem, fixed=(*problem.fixed, (name, size)), scatter=fit.problem.scatter)
+    own = np.delete(start.point.common, start.scaled)[common.size :]
+    point = Point(np.concatenate([common, own]), fit.point.release.copy())
+    return try_fit(problem, point, base=fit, max_iterations=_STEPS)
+
+
+def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
+    """Changes of the coefficients from a fit to a refit, shape (coefficients,).
+
+    Args:
+        there: common parameters of the refit, with the size of the effect, shape (common,).
+    """
+    model, changes = fit.problem.data.model, []
+    for name in coefficients_of(fit):
+        before = model.coefficient(fit.problem.names, fit.point.common, name)
+        after = model.coefficient(start.problem.names, there, name)
+        changes.append(0.0 if before is None or after is None else after - before)
+    return np.array(changes, np.float64)
+
+
+_REFITS = 10
+_STEPS = 10  # of a refit, which starts at the fit
+_CONFIRMED = (
+    0.1  # greatest distance of a refit from the limit, as a share of that of the limit from the least
+)
+_WIDEST = 10.0  # greatest factor between two sizes that are refitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +167,7 @@ class _Size:
     size: float
     moves: Array  # of the coefficients there, shape (coefficients,)
     drop: float  # of χ² at the likeliest size, less the chance gain of parameters per run
+    lowered: float  # drop of χ² at the likeliest size
 
 
 def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
@@ -137,7 +223,7 @@ def _within(
     outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
     moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
     by_chance = own_gain(start.problem) - own_gain(fit.problem)
-    return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0))
+    return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0), max(-float(lowest), 0.0))
 
 
 def _real_roots(polynomial: Array) -> list[float]:

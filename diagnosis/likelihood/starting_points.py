@@ -263,7 +263,7 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
 
 
 def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
-    """Starts of an effect whose first order is absorbed, at the sizes of its trials, whatever the readings.
+    """Starts of an effect whose first order is absorbed, at the sizes of its passive trials, whatever the readings.
 
     Empty for other effects, and where the runs cannot show it.
     """
@@ -271,7 +271,7 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     if not kind.acts(wind_on=base.problem.data.wind_on):
         return found
     for trial in kind.trials(_circumstances(base)):
-        if trial.second_order and trial.scaled is not None:
+        if trial.second_order and trial.passive and trial.scaled is not None:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
             own = _own_parameters(problem, kind)
             sizes = np.array([trial.values.get(info.name, info.default) for info in own])

@@ -222,10 +222,6 @@ def remark(given: Figures, unit: str = "rad") -> Remark:
     return Remark(Outcome.NOTED, tuple(given["runs"]), said({given["kind"]: what}, given, unit), remedy)
 
 
-_AS_IDENTIFIED = (
-    "With no cause these agree with the values of identify, whose standard deviations allow neither for effects "
-    "that could hide, nor for the rounding of the stated air density or the spectrum of the noise."
-)
 _NO_DECAY = "no damping ratio and no derivative is stated, since no run is a free decay"
 
 
@@ -233,11 +229,10 @@ def coefficient_note(document: Document) -> str:
     """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
     if document["found"]["limit_cycles"]:
         return _NO_DECAY
-    before, causes = document["coefficients"]["before"], document["causes"]
-    caveats = [effect_class(name).caveat for name in causes if name != "unknown"]
+    before = document["coefficients"]["before"]
+    caveats = [effect_class(name).caveat for name in document["causes"] if name != "unknown"]
     beta = next((name for name in before if name.startswith("cn_beta")), "")
-    identified = _AS_IDENTIFIED if beta and not causes else ""
-    return " ".join(filter(None, (*caveats, identified, size_note(beta))))
+    return " ".join(filter(None, (*caveats, size_note(beta))))
 
 
 def size_note(beta: str) -> str:

@@ -20,6 +20,7 @@ from diagnosis.words.numbers import (
 from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
 from identification.printing import COEFFICIENTS, Document, significant, unit_mark
+from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.vocabulary.units import beside
 
 _MOST = 0.5  # of a variance: more than all its other sources together
@@ -77,6 +78,8 @@ def coefficients_line(document: Document) -> str:
             parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
     if not parts:
         return ""
+    if all(given.get("shares", {}).keys() <= {"noise", "scatter", "air density"} for given in after.values()):
+        return f"± is the ± of tunnel identify; it includes {listed(parts)}."
     return (
         f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
         "the misfit of its model, so it may be far smaller or larger."
@@ -84,23 +87,30 @@ def coefficients_line(document: Document) -> str:
 
 
 def hidden_line(document: Document) -> str:
-    """The effect that could hide and moves a coefficient most, in a sentence; empty where none moves it."""
-    hidden, after = document.get("hidden", ()), document["coefficients"]["after"]
-    if not hidden:
-        return ""
-    first, moved = hidden[0], []
-    for name, given in after.items():
-        move = first["moves"].get(name)
-        if move is not None and given.get("std") and move["value"] > given["std"]:
-            by = f"{significant(move['value'], 2)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}"
-            moved.append(f"{COEFFICIENTS.get(name, name)} by {by.strip()}")
-    if not moved:
-        return ""
-    size = f"{significant(abs(first['size']['value']), 2)}{unit_mark(beside(first['size']['unit']))}"
-    return (
-        f"What could hide: these runs do not exclude {plain(first['effect'])} of up to {size}"
-        f"{explained({first['size']['unit']})}. It would change {' and '.join(moved)}. The intervals allow for it."
-    )
+    """The undetected effects that would change a coefficient by more than its ±; empty where none would.
+
+    The one with the greatest change against the ±, and each that states how to read the coefficients without it.
+    """
+    after, general_form = document["coefficients"]["after"], Effect.undetected
+    clauses: list[tuple[bool, str]] = []
+    for one in document.get("hidden", ()):
+        moved = []
+        for name, given in after.items():
+            move = one["moves"].get(name)
+            if move is not None and given.get("std") and move["value"] > given["std"]:
+                by = f"{significant(move['value'], 2)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}"
+                moved.append((COEFFICIENTS.get(name, name), by.strip()))
+        own = next((kind.undetected for kind in known_effects() if kind.name == one["effect"]), general_form)
+        template = own if moved else ""
+        general = template == general_form
+        if not moved or (general and any(said for said, _ in clauses)):
+            continue
+        size = f"{significant(abs(one['size']['value']), 2)}{unit_mark(beside(one['size']['unit']))}"
+        changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
+        words = {"effect": plain(one["effect"]), "size": size + explained({one["size"]["unit"]})}
+        clause = template.format(changes=changes, **words)
+        clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
+    return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
 
 
 def patch_line(document: Document) -> str:

@@ -203,9 +203,9 @@ def _interval(given: Document) -> str:
 
 SOURCES = {
     "noise": "noise of the readings",
+    "scatter": "scatter between the runs",
     "misfit": "model error",
     "small causes": "small causes that are not named",
-    "hidden effects": "effects that could hide",
     "air density": "rounding of the stated air density",
     "unseen form": "form of the cause that free decays cannot show",
     "freed form": "freedom of the causes' forms",
@@ -215,16 +215,17 @@ SOURCES = {
 
 
 def hidden_table(document: Document) -> Table:
-    """The effects that could hide: the largest size that the runs do not exclude, and the moves it makes."""
+    """Upper limits on undetected effects, and the change of each coefficient at that size."""
     hidden, rows = document.get("hidden", ()), []
     names = [name for name in document["coefficients"]["after"] if hidden and name in hidden[0]["moves"]]
     for one in hidden:
         size = f"{significant(one['size']['value'], 2)}{unit_mark(beside(one['size']['unit']))}"
         moves = [significant(one["moves"][name]["value"], 2) for name in names]
         rows.append((plain(one["effect"]), size, *moves))
-    heads = [f"changes {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
-    title = f"What could hide{explained({one['size']['unit'] for one in hidden})}"
-    return Table(title, ("effect", "up to", *heads), tuple(rows), ("up to", *heads))
+    heads = [f"would change {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
+    units = explained({one["size"]["unit"] for one in hidden})
+    title = f"Upper limits on undetected effects (95 %), which ± does not include{units}"
+    return Table(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
 
 
 def patch_table(document: Document) -> Table:

@@ -103,6 +103,10 @@ class UnsteadyAeroLag(Effect):
         "With the lag, Cnr describes the damping term alone; the lag also damps the motion. In a slow oscillation "
         "both act as an effective Cnr − a Cnβ, the value of the nominal model (before)."
     )
+    undetected = (
+        "Cnr is the derivative in phase with the rate; its part due to the rate alone differs by up to {changes} "
+        "if a lag of {size} acts"
+    )
 
     lag: float = parameter("a", "l/V", "time constant in units of l/V", scale=0.5, lower=-20.0, upper=20.0)
 
@@ -111,7 +115,9 @@ class UnsteadyAeroLag(Effect):
         """First a phase lag, then a phase lead; to first order Cnr absorbs both."""
         del campaign
         scale = cls.parameters()[0].scale
-        return [Trial({"lag": size}, "lag", second_order=True) for size in (scale, -scale)]
+        return [
+            Trial({"lag": size}, "lag", second_order=True, passive=size > 0.0) for size in (scale, -scale)
+        ]
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """To first order a lag only changes Cnr by a·Cnβ; runs show only the second-order remainder.

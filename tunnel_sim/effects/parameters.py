@@ -196,6 +196,7 @@ class Trial:
     Args:
         at_most: greatest absolute value that linear theory may give it, in its unit.
         second_order: whether the nominal coefficients absorb its first order, so that its square shows.
+        passive: whether a passive part can have this sign; an upper limit is stated for such a sign alone.
     """
 
     values: Mapping[str, float]
@@ -203,6 +204,7 @@ class Trial:
     at_most: float = inf
     replaces: str | None = None
     second_order: bool = False
+    passive: bool = True
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,8 @@ class Traits:
     - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
     - ``caveat``: how to read the coefficients that are reported with it.
+    - ``undetected``: how to read them where it is not named, with ``{size}`` and ``{changes}`` at its upper
+      limit; a clause without its full stop.
     """
 
     name: ClassVar[str]
@@ -94,6 +96,7 @@ class Traits:
     size: ClassVar[str] = ""
     advice: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
+    undetected: ClassVar[str] = "{effect} of up to {size} is not excluded and would change {changes}"
 
     def __post_init__(self) -> None:
         """Refuse a parameter that is not a finite number within its bounds, or not whole where it selects cases."""

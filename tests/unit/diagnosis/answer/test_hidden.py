@@ -1,4 +1,4 @@
-"""The largest sizes that runs do not exclude, against refits at those sizes; intervals that hold an unseen lag."""
+"""Upper limits on undetected effects, against refits at those sizes, and intervals that do not depend on them."""
 
 from dataclasses import replace
 
@@ -12,14 +12,16 @@ from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from diagnosis.search.investigate import nominal_study
+from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.words.lines import hidden_line
 from diagnosis.words.sections import printed
 from diagnosis.words.tables import hidden_table
+from tests.reference.free_decays import damped_cosine
 from tests.support.diagnosis_document import document
-from tests.support.gap_campaigns import CN_R, NOISE, campaign, nominal, precise, studied
+from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal, studied
 from tests.unit.diagnosis.noise.test_colour import colour, with_zero
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from, known_effects
+from tunnel_sim.vocabulary.record import Record
 
 
 def found_beside(data, *names):
@@ -47,7 +49,11 @@ def test_a_refit_at_the_largest_size_is_four_units_above_the_least(name):
         Problem(base.problem.data, (effect_class(name),)),
         Point(np.append(base.point.common, 0.5 * found[name].size.value), base.point.release),
     )
-    assert again.total - min(free.total, base.total) == pytest.approx(4.0, abs=0.4)
+    likeliest = free.value(f"{name}.{found[name].parameter}")
+    least = (
+        free.total if likeliest * found[name].size.value > 0.0 else base.total
+    )  # of the sizes of that sign
+    assert again.total - least == pytest.approx(4.0, abs=1.0)
     for coefficient, move in found[name].moves.items():
         assert abs(again.value(coefficient) - base.value(coefficient)) == pytest.approx(
             move.value, rel=0.1, abs=0.02 * base.std(coefficient)
@@ -77,15 +83,61 @@ def test_an_offset_of_the_only_wind_speed_is_not_listed():
 
 
 @pytest.mark.parametrize("lag", [0.01, -0.01])
-def test_the_interval_of_cnr_holds_a_lag_that_is_not_seen(lag):
-    data = precise(campaign(effect_from("unsteady_aero_lag", {"lag": lag})))
+def test_cn_r_without_a_named_lag_is_the_derivative_in_phase_with_the_rate(lag):
+    """The lag is no error of Cnr, and its upper limit does not widen the interval."""
+    data = campaign(effect_from("unsteady_aero_lag", {"lag": lag}))
     base = nominal(data)
     study = studied(data, base)
     without = coefficients(Answers((Possible(1.0, base),), 0.0, base), data)["cn_r"]
     given = coefficients(possible_answers(study, ALL_EFFECTS), data)["cn_r"]
-    assert abs(without.value - CN_R) > 5.0 * without.std
-    assert abs(given.value - CN_R) < 2.0 * given.std
-    assert given.shares["hidden effects"] > 0.9
+    assert given.std == pytest.approx(without.std)
+    assert abs(given.value - (CN_R - lag * CN_BETA)) < 3.0 * given.std
+    assert abs(given.value - CN_R) > 5.0 * given.std
+    assert "hidden effects" not in given.shares
+
+
+def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
+    """Chance differences absorb the second order of a small lag; linear theory alone allows ten times as much."""
+    kind = effect_class("unsteady_aero_lag")
+    chosen = investigate(scattered(), [effect_class(name) for name in (*SCATTERED, kind.name)]).stated
+    assert chosen.problem.scatter
+    (lag,) = hidden_effects(chosen, starts_beside(chosen, [kind]))
+    assert lag.size.value > 0.0
+    rises = []
+    for factor in (1.0, 2.0):
+        problem = replace(
+            chosen.problem,
+            effects=(*chosen.problem.effects, kind),
+            fixed=(("unsteady_aero_lag.lag", factor * lag.size.value),),
+        )
+        start = chosen.point.common.copy()
+        start[chosen.problem.names.index("cn_r")] += factor * lag.size.value * CN_BETA
+        rises.append(
+            fit(problem, Point(start, chosen.point.release.copy())).unlikelihood - chosen.unlikelihood
+        )
+    assert 1.0 <= rises[0] + lag.significance**2 <= 7.0
+    assert rises[1] > 16.0
+
+
+SCATTERED = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter")
+
+
+def scattered():
+    """Twelve runs in closed form, with scatter of 0.3 % in speed, 0.05 % in stiffness and 1 % in damping."""
+    rng, time, runs = np.random.default_rng(5), np.arange(0.0, 10.0, 0.01), []
+    base = campaign(duration=0.1)
+    for number in range(12):
+        like = base.runs[number % len(base.runs)]
+        spring = like.spring_stiffness * (1.0 + 5e-4 * rng.standard_normal())
+        speed = like.wind_speed * (1.0 + 3e-3 * rng.standard_normal())
+        damper = DAMPING * (1.0 + 1e-2 * rng.standard_normal())
+        area = 0.5 * 1.2 * 0.036 * 0.625
+        stiffness = spring - area * speed**2 * CN_BETA
+        rate = damper - area * 0.625 * speed * CN_R
+        swing = damped_cosine(time, rate / INERTIA, stiffness / INERTIA, 0.35, 0.0)
+        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        runs.append(replace(like, id=f"r{number}", record=record))
+    return replace(base, runs=tuple(runs), sensor=replace(base.sensor, sample_rate=100.0))
 
 
 def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
@@ -102,10 +154,13 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     for name, std in (("cn_beta", 1e-3), ("cn_r", 3e-3)):
         given["coefficients"]["after"][name] = {"value": -0.17, "std": std, "unit": "1/rad"}
     line = hidden_line(given)
-    assert "unsteady aero lag of up to" in line
-    assert "up to 0.011 l/V" in line
-    assert "Cnr by 0.0061 1/rad" in line
+    assert "due to the rate alone differs by up to 0.0061 1/rad if a lag of 0.011 l/V" in line
     assert "Cnβ" not in line  # it moves far less than its standard deviation
+    drift = {**lag, "effect": "wind_speed_drift", "size": {"value": 2e-4, "std": None, "unit": "1"}}
+    both = hidden_line(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]})
+    assert both.endswith(
+        "Wind speed drift of up to 0.00020 is not excluded and would change Cnr by 0.0061 1/rad."
+    )
     (row,) = hidden_table(given).rows
     assert row[0] == "unsteady aero lag"
     assert "0.0061" in row[-1]

@@ -222,24 +222,30 @@ def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_sep
 
 def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_table(given: Document) -> None:
     after = given["coefficients"]["after"]
-    after["cn_beta"]["shares"] = {"noise": 0.2, "hidden effects": 0.8}
+    after["cn_beta"]["shares"] = {"noise": 0.2, "misfit": 0.8}
     after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
     line = coefficients_line(given)
     assert line == (
-        "± includes noise of the readings (most of the variance of Cnr), effects that could hide (most of the "
+        "± includes noise of the readings (most of the variance of Cnr), model error (most of the "
         "variance of Cnβ) and other answers, weighted by probability. The ± of tunnel identify includes the noise, "
         "the scatter between runs and the misfit of its model, so it may be far smaller or larger."
     )
     assert Paragraph(line) in printed(given)
     assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
+    for one in after.values():
+        one["shares"] = {"noise": 0.3, "scatter": 0.7, "air density": 0.0}
+    assert coefficients_line(given).startswith(
+        "± is the ± of tunnel identify; it includes noise of the readings and "
+    )
 
 
 def test_a_unit_of_this_field_is_explained_where_it_is_used(given: Document) -> None:
-    move = {"cn_beta": {"value": 0.1, "std": None, "unit": "1/rad"}}
+    move = {name: {"value": 0.1, "std": None, "unit": "1/rad"} for name in ("cn_beta", "cn_r")}
     lag = {"effect": "unsteady_aero_lag", "size": {"value": 0.014, "std": None, "unit": "l/V"}, "moves": move}
     meant = "l/V: the time in which the air passes the reference length"
-    assert f"of up to 0.014 l/V ({meant}). It would change" in hidden_line(given | {"hidden": [lag]})
-    assert hidden_table(given | {"hidden": [lag]}).title == f"What could hide ({meant})"
+    assert hidden_line(given | {"hidden": [lag]}).endswith(f"if a lag of 0.014 l/V ({meant}) acts.")
+    title = "Upper limits on undetected effects (95 %), which ± does not include"
+    assert hidden_table(given | {"hidden": [lag]}).title == f"{title} ({meant})"
 
 
 @pytest.mark.parametrize(
