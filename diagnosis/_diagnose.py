@@ -168,7 +168,7 @@ def _assembled(
 
 
 def _identified(study: Study, chosen: Chosen) -> Estimate | None:
-    """The estimate of the same runs by `identify`; None where a cause acts, or it is of another model or other runs."""
+    """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
     scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
     own_model = type(study.model) is not type(nominal_model(chosen.campaign, None))
     if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:

@@ -227,11 +227,17 @@ class Coefficients:
             ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or ``yaw_inertia``,
             ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
         after: by the same names, with the causes.
+        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate, which the runs determine
+            better than the coefficients of the law beside the lag; else empty.
+        covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
+            empty without a named lag.
         note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
     """
 
     before: Mapping[str, ParameterEstimate]
     after: Mapping[str, ParameterEstimate]
+    in_phase: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+    covariance: tuple[tuple[float, ...], ...] = ()
     note: str = ""
 
 

@@ -157,8 +157,8 @@ def _coefficients(cases: Sequence[Case]) -> dict[str, Any]:
             errors = [e for c in cases if (e := c.error(name, when)) is not None]
             if errors:
                 found[f"{name} {when}"] = {
-                    "within_2_std": Proportion.of([abs(stds) <= WITHIN for stds, _ in errors]).to_json_dict(),
-                    "median_relative_error": float(np.median([abs(share) for _, share in errors])),
+                    "within_2_std": Proportion.of([abs(e.stds) <= WITHIN for e in errors]).to_json_dict(),
+                    "median_relative_error": float(np.median([abs(e.share) for e in errors])),
                 }
     return found
 

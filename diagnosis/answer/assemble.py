@@ -15,6 +15,7 @@ from diagnosis.answer.coefficients import (
     as_identified,
     before_the_causes,
     coefficients,
+    in_phase,
     possible_answers,
 )
 from diagnosis.answer.friction_curve import friction_curve
@@ -101,8 +102,10 @@ def assemble(
     after = coefficients(answers, study.campaign)
     if identified is not None:
         after = as_identified(after, identified, study.campaign, similarity)
-    before = before_the_causes(study.nominal, after) if study.causes else after
-    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
+    phase, covariance = in_phase(study.stated)
+    before = before_the_causes(study.nominal, {**after, **phase}) if study.causes else after
+    sized = (sized_coefficients(one, rig) for one in (before, after, phase))
+    found = Coefficients(*sized, covariance)
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
     rivals = _rivals(study)
     fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]

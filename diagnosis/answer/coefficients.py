@@ -251,6 +251,51 @@ def as_identified(
     return same
 
 
+_STEP = 1e-3  # of a parameter, in standard deviations, for the derivatives of the coefficients in phase
+
+
+def in_phase(fit: Fit) -> tuple[dict[str, ParameterEstimate], tuple[tuple[float, ...], ...]]:
+    """Cnβ and Cnr in phase with angle and rate (decision 0004), and the covariance of all four coefficients.
+
+    The part of an effect's form that no free decay shows moves Cnr along the effect's own part, so it adds nothing
+    to the coefficients in phase.
+
+    Returns:
+        By name, and the covariance of Cnβ and Cnr of the fitted law and of both in phase, shape (4, 4); both empty
+        where no effect of the fit has a part in phase.
+    """
+    names = fit.problem.names
+    if not {"cn_beta", "cn_r"} <= set(names):
+        return {}, ()
+    runs, own = wind_on_runs(fit), [names.index("cn_beta"), names.index("cn_r")]
+
+    def both(common: Array) -> Array:
+        beta, rate = (float(common[place]) for place in own)
+        found = beta, rate
+        for effect in fit.problem.effects_at(common):
+            found = effect.in_phase(*found, runs)
+        return np.array([beta, rate, *found])
+
+    here = both(fit.point.common)
+    if np.array_equal(here[:2], here[2:]):
+        return {}, ()
+    covariance, slopes = fit.stated_covariance, []
+    for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+        step = np.zeros_like(fit.point.common)
+        step[place] = _STEP * (std or 1.0)
+        slopes.append((both(fit.point.common + step) - both(fit.point.common - step)) / (2.0 * step[place]))
+    jacobian = np.array(slopes).T
+    matrix = jacobian @ covariance @ jacobian.T
+    for effect in fit.problem.effects_at(fit.point.common):
+        unseen = np.array([*effect.unseen_form(here[0], runs), 0.0, 0.0])
+        matrix += np.diag(unseen**2)
+    estimates = {
+        name: ParameterEstimate(float(here[i]), math.sqrt(max(float(matrix[i, i]), 0.0)), "1/rad")
+        for i, name in ((2, "cn_beta"), (3, "cn_r"))
+    }
+    return estimates, tuple(map(tuple, matrix.tolist()))
+
+
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
     """The central interval of a mixture to be stated beside its mean and standard deviation.
 

@@ -84,9 +84,9 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
 def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
     """The size at which a refit is ``reach`` above the least −2 ln L, with its changes of the coefficients.
 
-    A refit within a quarter of the distance confirms a size. Elsewhere the size follows from the rise, which grows with
-    the square of the unabsorbed change, and from the sizes already refitted. A phase or an instant in every run is
-    left as linear theory has it: such a change is a sum of lines or steps, linear in its size.
+    A refit within a quarter of the distance confirms a size. Elsewhere the size follows from the rise, which grows
+    with the square of the unabsorbed change, and from the sizes already refitted. An effect with a phase or an
+    instant in every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
 
     Returns:
         None where no refit confirms a size, or the runs exclude no size at all.

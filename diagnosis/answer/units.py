@@ -90,7 +90,9 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     factor = similarity.own(1.0, reading)
     return replace(
         answer,
-        coefficients=replace(given, before=own(given.before), after=own(given.after)),
+        coefficients=replace(
+            given, before=own(given.before), after=own(given.after), in_phase=own(given.in_phase)
+        ),
         noise=replace(
             noise,
             std=similarity.own(noise.std, reading),

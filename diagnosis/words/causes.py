@@ -8,7 +8,7 @@ from typing import Any
 from diagnosis.settings import settings_of
 from diagnosis.words.numbers import for_people, listed, plain, probability
 from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
-from identification.printing import COEFFICIENTS, Document, significant, unit_mark
+from identification.printing import COEFFICIENTS, Document, estimated, significant, unit_mark
 from tunnel_sim.effects import known_effects
 
 
@@ -179,11 +179,12 @@ def consequence(document: Document) -> str:
 
     Empty where no coefficient is known before and after, or no cause is named.
     """
-    before, after, clauses = document["coefficients"]["before"], document["coefficients"]["after"], []
+    given, clauses = document["coefficients"], []
     if not document["causes"] or document["causes"] == ["unknown"]:
         return ""
-    for name, one in before.items():
-        two = after.get(name)
+    phase = given.get("in_phase", {})
+    for name, one in given["before"].items():
+        two = {**given["after"], **phase}.get(name)
         if two is None or not one["value"] or not all(g.get("determined", True) for g in (one, two)):
             continue
         label = COEFFICIENTS.get(name, name)
@@ -205,7 +206,18 @@ def consequence(document: Document) -> str:
         return ""
     text = listed(clauses)
     first = text[0].upper() if text[0].isascii() else text[0]  # a Greek letter is a symbol
-    return f"{first}{text[1:]}."
+    return f"{first}{text[1:]}.{_of_the_rate(given) if phase else ''}"
+
+
+def _of_the_rate(given: Document) -> str:
+    """The two parts of Cnr in phase with the rate, in a sentence."""
+    name = next(name for name in given["in_phase"] if name.startswith("cn_r"))
+    whole, own = given["in_phase"][name], given["after"][name]
+    lag = _digits(whole["value"] - own["value"], 3)
+    both = (estimated({**one, "interval": None}).replace("-", "−") for one in (whole, own))
+    return " Of Cnr in phase with the rate, {}, the lag contributes {lag} and the rate itself {}.".format(
+        *both, lag=lag
+    )
 
 
 _OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless

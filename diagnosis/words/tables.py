@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from diagnosis.settings import settings_of
 from diagnosis.words.answers import ranked, set_out
@@ -166,9 +167,8 @@ def coefficients_table(document: Document) -> Table:
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     named, rows = document["causes"] not in ([], ["unknown"]), []
     skewed = any(given.get("interval") for given in (after or before).values())
-    for name in dict.fromkeys([*before, *after]):
-        nominal, with_causes = before.get(name), after.get(name)
-        best = with_causes or before[name]
+    for label, nominal, with_causes in _rows(document):
+        best = with_causes or nominal or {}
         cells = [_without_interval(given) for given in ([nominal, with_causes] if named else [best])]
         interval = _interval(best)
         if skewed and best["std"]:
@@ -177,13 +177,30 @@ def coefficients_table(document: Document) -> Table:
         both = [given for given in (nominal, with_causes) if given and given.get("determined", True)]
         if len(both) == 2 and both[0]["value"]:
             change = size_change(*(given["value"] for given in both))
-        label = coefficient_label(name, (nominal or best)["unit"])
         rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
     causes = "with the causes" if document.get("decided", True) else f"with the {set_out(document)}"
     detail = () if skewed else ("95 % interval",)
     heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
     title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
     return Table(title, heads, tuple(rows), right=heads[1:], detail=detail)
+
+
+def _rows(document: Document) -> Iterator[tuple[str, Document | None, Document | None]]:
+    """Label of a coefficient, and its estimates by the nominal model and with the causes.
+
+    The nominal model has no lag, so with a named lag its coefficients compare with those in phase.
+    """
+    before, after = document["coefficients"]["before"], document["coefficients"]["after"]
+    phase = document["coefficients"].get("in_phase", {})
+    for name in dict.fromkeys([*before, *after]):
+        nominal, with_causes = before.get(name), after.get(name)
+        label = coefficient_label(name, (nominal or with_causes or {})["unit"])
+        if name in phase:
+            which = "angle" if name.startswith("cn_beta") else "rate"
+            yield f"{label}, in phase with the {which}", nominal, phase[name]
+            yield f"{label}, beside the lag", None, with_causes
+        else:
+            yield label, nominal, with_causes
 
 
 def _without_interval(given: Document | None) -> str:

@@ -51,6 +51,7 @@ class _Candidate(Part):
 class _Coefficients(Part):
     before: dict[OneLine, _Estimate]
     after: dict[OneLine, _Estimate]
+    in_phase: dict[OneLine, _Estimate] = Field(default_factory=dict)
 
 
 class _Run(Part):

@@ -101,7 +101,7 @@ class UnsteadyAeroLag(Effect):
     tries = 2
     caveat = (
         "With the lag, Cnr describes the damping term alone; the lag also damps the motion. In a slow oscillation "
-        "both act as an effective Cnr − a Cnβ, the value of the nominal model (before)."
+        "both act as Cnr − a Cnβ, the derivative in phase with the rate, which the nominal model shows."
     )
     undetected = (
         "Cnr is the derivative in phase with the rate; its part due to the rate alone differs by up to {changes} "
@@ -127,6 +127,15 @@ class UnsteadyAeroLag(Effect):
         """
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
+
+    def in_phase(self, cn_beta: float, cn_r: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """A lag of a l/V has the response 1/(1 + iωτ) to the angle, a lead 2 − 1/(1 + iωτ), with τ = |a| l/V."""
+        if not runs:
+            return cn_beta, cn_r
+        reduced = [self.lag * run.omega * run.per_cn_r / run.per_cn_beta for run in runs]
+        slow = sum(1.0 / (1.0 + one**2) for one in reduced) / len(reduced)
+        angle = slow if self.lag >= 0.0 else 2.0 - slow
+        return cn_beta * angle, cn_r - self.lag * cn_beta * slow
 
 
 @dataclass(frozen=True)

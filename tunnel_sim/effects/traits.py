@@ -332,3 +332,14 @@ class Traits:
         """
         del cn_beta, runs
         return 0.0, 0.0
+
+    def in_phase(self, cn_beta: float, cn_r: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """Cnβ and Cnr in phase with angle and rate, with the part of this effect, 1/rad.
+
+        Args:
+            cn_beta: Cnβ of the law beside the effect, 1/rad.
+            cn_r: Cnr of that law, 1/rad.
+            runs: the campaign's wind-on runs, whose frequencies count equally.
+        """
+        del runs
+        return cn_beta, cn_r

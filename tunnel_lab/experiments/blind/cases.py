@@ -18,6 +18,8 @@ from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
+LAG = "unsteady_aero_lag"
+"""The effect that changes what Cnβ and Cnr mean where it is named."""
 MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 noise variances."""
 
@@ -49,6 +51,7 @@ class _Truth(_Read):
     severity: float | None = None
     cn_beta: float = 1.0
     cn_r: float = 1.0
+    in_phase: dict[str, float] = {}
 
 
 class _Candidate(_Read):
@@ -59,6 +62,7 @@ class _Candidate(_Read):
 class _Coefficient(_Read):
     value: float
     std: Annotated[float, Field(ge=0.0)] | None  # none where the runs do not determine it
+    interval: tuple[float, float] | None = Field(None, strict=False)
 
 
 class _Coefficients(_Read):
@@ -116,6 +120,21 @@ class TrueScatter:
     stated: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class CoefficientError:
+    """An estimate minus the truth.
+
+    Args:
+        stds: in stated standard deviations.
+        share: of the truth.
+        covered: whether the stated 95 % interval holds the truth.
+    """
+
+    stds: float
+    share: float
+    covered: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """One campaign.
@@ -125,7 +144,8 @@ class Case:
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
         severity: excess of the nominal model as a ratio to the noise variance; None where the truth does not state
             it.
-        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad.
+        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad; those in phase with angle and rate where a lag of the
+            air acts that the answer does not name (decision 0004).
         answer: the diagnosis' document.
         small: effects that act but need not be found, sorted.
         time_scale: time over that of the standard rig, a ratio.
@@ -244,17 +264,15 @@ class Case:
         mentioned = {*(self.causes or ()), *self.answer.get("ambiguous_with", ())}
         return not self.right and set(self.truth) <= mentioned
 
-    def error(self, name: str, when: str) -> tuple[float, float] | None:
-        """Error of ``cn_beta`` or ``cn_r``, ``before`` or ``after`` the causes are added; None where there is none.
-
-        Estimate minus truth, in standard deviations and as a share of the truth.
-        """
+    def error(self, name: str, when: str) -> CoefficientError | None:
+        """Error of ``cn_beta`` or ``cn_r``, ``before`` or ``after`` the causes are added; None if not stated."""
         found = self.answer.get("coefficients", {}).get(when, {}).get(name)
         truth = self.coefficients.get(name)
         if found is None or not truth or not (found["std"] or 0.0) > 0.0:
             return None
-        error = found["value"] - truth
-        return error / found["std"], error / abs(truth)
+        error, reach = found["value"] - truth, 1.96 * found["std"]
+        low, high = found.get("interval") or (found["value"] - reach, found["value"] + reach)
+        return CoefficientError(error / found["std"], error / abs(truth), low <= truth <= high)
 
 
 def case(
@@ -272,12 +290,13 @@ def case(
     _Answer.model_validate(answer)
     effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
+    meant = truth if LAG in (answer["causes"] or ()) else {**truth, **stated.in_phase}
     return Case(
         name=name,
         truth=UNKNOWN if withheld else effects,
         withheld=withheld,
         severity=stated.severity,
-        coefficients={key: float(truth[key]) for key in NAMES if key in truth},
+        coefficients={key: float(meant[key]) for key in NAMES if key in meant},
         answer=answer,
         small=tuple(sorted(stated.small)),
         time_scale=stated.scale.time,

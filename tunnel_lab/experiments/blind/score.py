@@ -30,7 +30,6 @@ from tunnel_sim.vocabulary.record import Array
 
 BINS = 10
 _CLOSED = 0.95  # of the gap, from which a case counts as closed: a convention
-_WITHIN = 3.0  # standard deviations within which errors of coefficients are counted: a convention
 
 
 @dataclass(frozen=True)
@@ -178,14 +177,16 @@ class CoefficientErrors:
         group: of campaigns.
         name: ``cn_beta`` or ``cn_r``.
         when: ``before`` or ``after`` the causes are added.
-        within: number within 3 standard deviations of the truth.
+        covered: number of 95 % intervals that hold the truth.
+        spread: root mean square of the errors in stated standard deviations, 1 where these are right.
         median: median absolute error as a share of the truth.
     """
 
     group: str
     name: str
     when: str
-    within: Proportion
+    covered: Proportion
+    spread: float
     median: float
 
 
@@ -319,9 +320,10 @@ class Score:
                 for when in ("before", "after"):
                     errors = [e for c in cases if (e := c.error(name, when)) is not None]
                     if errors:
-                        within = Proportion.of([abs(stds) <= _WITHIN for stds, _ in errors])
-                        median = float(np.median([abs(share) for _, share in errors]))
-                        found.append(CoefficientErrors(group, name, when, within, median))
+                        covered = Proportion.of([e.covered for e in errors])
+                        spread = float(np.sqrt(np.mean([e.stds**2 for e in errors])))
+                        median = float(np.median([abs(e.share) for e in errors]))
+                        found.append(CoefficientErrors(group, name, when, covered, spread, median))
         return found
 
     def seconds(self) -> tuple[float, float, float]:
@@ -355,8 +357,8 @@ class Score:
             "rivals_named": as_json(self.rivals()),
             "closure": {"at_least_0.95": share.to_json_dict(), "median": median, "percentile_5": low},
             "coefficients": [
-                {"group": e.group, "name": e.name, "when": e.when, "within_3_std": e.within.to_json_dict(),
-                 "median_relative_error": e.median}
+                {"group": e.group, "name": e.name, "when": e.when, "covered": e.covered.to_json_dict(),
+                 "rms_z": e.spread, "median_relative_error": e.median}
                 for e in self.coefficients()
             ],
             "seconds": dict(zip(("median", "percentile_90", "largest"), times, strict=True)),

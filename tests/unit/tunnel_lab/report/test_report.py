@@ -78,7 +78,9 @@ def document(data):
         next_run={
             "spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0, "separation": 9.0,
         },
-        coefficients=Coefficients({"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, "A note."),
+        coefficients=Coefficients(
+            {"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, note="A note."
+        ),
         confirmation=Confirmation(True, 1.2e-5, "r2", 6e-6, 4e-5),
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
         blind_spots=("an error of the clock",),

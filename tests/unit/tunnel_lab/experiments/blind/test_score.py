@@ -106,11 +106,27 @@ def test_wilsons_interval_is_the_published_one():
 def test_errors_of_coefficients_are_in_standard_deviations():
     said = document(["free_play"], cn=(0.4525, -0.124), std=(0.001, 0.001))
     one = case("c", {**TRUTH, "effects": ["free_play"]}, said)
-    assert np.allclose(one.error("cn_beta", "after"), (2.5, 0.0025 / 0.45))
-    assert np.allclose(one.error("cn_r", "before"), (-4.0, -0.004 / 0.12))
-    found = {(e.group, e.name, e.when): e.within for e in Score((one,), (), "", "", {}, False).coefficients()}
-    assert found["named rightly", "cn_beta", "after"] == Proportion(1, 1)
-    assert found["named rightly", "cn_r", "after"] == Proportion(0, 1)
+    beta, rate = one.error("cn_beta", "after"), one.error("cn_r", "before")
+    assert (beta.stds, beta.share) == pytest.approx((2.5, 0.0025 / 0.45))
+    assert (rate.stds, rate.share) == pytest.approx((-4.0, -0.004 / 0.12))
+    found = {(e.group, e.name, e.when): e for e in Score((one,), (), "", "", {}, False).coefficients()}
+    assert found["named rightly", "cn_beta", "after"].covered == Proportion(0, 1)
+    assert found["named rightly", "cn_beta", "after"].spread == pytest.approx(2.5)
+    said["coefficients"]["after"]["cn_beta"]["interval"] = [0.4499, 0.46]
+    assert case("c", {**TRUTH, "effects": ["free_play"]}, said).error("cn_beta", "after").covered
+
+
+@pytest.mark.parametrize(("named", "cn_r"), [([], -0.21), (["unsteady_aero_lag"], -0.12)])
+def test_without_a_named_lag_the_truth_is_the_derivative_in_phase(named, cn_r):
+    """A lag of 0.2 l/V: Cnr − 0.2 Cnβ = −0.12 − 0.09."""
+    truth = {
+        **TRUTH,
+        "effects": [],
+        "small": ["unsteady_aero_lag"],
+        "in_phase": {"cn_beta": 0.449, "cn_r": -0.21},
+    }
+    one = case("c", truth, document(named, cn=(0.45, cn_r), std=(0.001, 0.001)))
+    assert one.error("cn_r", "after").stds == pytest.approx(0.0)
 
 
 def test_a_rival_is_named_where_the_truth_is_among_those_not_distinguished():

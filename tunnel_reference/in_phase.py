@@ -1,0 +1,58 @@
+"""The derivatives in phase with angle and rate, which an oscillation shows where no lag of the air is named.
+
+A lag with the response H(iω) to the angle gives the moment Ka H β, so that
+
+    Cnβ in phase with the angle: Cnβ Re H,        Cnr in phase with the rate: Cnr + Cnβ Im H V/(ω l).
+
+To first order in the reduced frequency a lag of a l/V is −a Cnβ of Cnr.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunnel_reference import moments
+from tunnel_reference.conditions import REFERENCE_LENGTH, Array
+from tunnel_reference.draw import CampaignDraw
+from tunnel_reference.integrator import Term
+from tunnel_reference.severity import bind_effects
+
+
+def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
+    """Cnβ and Cnr in phase, 1/rad, means over the wind-on runs at their natural frequencies.
+
+    Returns:
+        By ``cn_beta`` and ``cn_r``; None where no lag of the air acts.
+    """
+    c, bound = bind_effects(draw)
+    laws = [term for term in bound if isinstance(term, Term) and term.law in _RESPONSES]
+    if not laws or not np.any(c.wind_on):
+        return None
+    stiffness = np.maximum(c.true_stiffness - c.air_stiffness, 1e-9)
+    omega = np.sqrt(stiffness / c.yaw_inertia)[c.wind_on]
+    (term,) = laws
+    params = {name: np.broadcast_to(value, (c.runs,))[c.wind_on] for name, value in term.params.items()}
+    response = _RESPONSES[term.law](omega, params)
+    speed = c.true_speed[c.wind_on]
+    rate = c.cn_beta * response.imag * speed / (omega * REFERENCE_LENGTH)
+    return {
+        "cn_beta": float(c.cn_beta * np.mean(response.real)),
+        "cn_r": float(c.cn_r + np.mean(rate)),
+    }
+
+
+def _one(omega: Array, p: dict[str, Array]) -> np.ndarray:
+    return 1.0 - p["w1"] + p["w1"] / (1.0 + 1j * omega * p["tau1"])
+
+
+def _two(omega: Array, p: dict[str, Array]) -> np.ndarray:
+    parts = [(p["w1"], p["tau1"]), (p["w2"], p["tau2"])]
+    return 1.0 - p["w1"] - p["w2"] + sum(w / (1.0 + 1j * omega * tau) for w, tau in parts)
+
+
+def _cascade(omega: Array, p: dict[str, Array]) -> np.ndarray:
+    return (1.0 + 0.5j * omega * p["tau1"]) ** -2
+
+
+_RESPONSES = {moments.lag_one: _one, moments.lag: _two, moments.lag_cascade: _cascade}
+"""The response to the angle, by the law of the motion."""
