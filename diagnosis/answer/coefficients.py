@@ -173,12 +173,12 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         campaign: gives the digits to which the air density is stated.
 
     Returns:
-        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. The
-        value is the mean over the answers and over the sets of small causes beside them
-        (`diagnosis.answer.linear_theory`), with their probabilities. The variance is the sum of those within and
-        between them (the law of total variance).
+        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. Their
+        distribution is a mixture over the answers and over the sets of small causes beside them
+        (`diagnosis.answer.linear_theory`), with their probabilities; value and deviation are those of its centre
+        (`Central`).
 
-        The variance within is the sum of
+        The variance within an answer is the sum of
 
         - the fit's own;
         - the scatter of the runs where it exceeds chance, or half the difference between two halves of the data
@@ -187,10 +187,9 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         - the part of the causes' forms that no free decay shows;
         - half the change by freeing the forms, since another family of forms may change as much.
 
-        ``unknown`` also adds half the change from the nominal model. The central interval is given where it is not
-        that of a normal distribution (`interval_beside`). No standard deviation is given at a bound, or where the
-        runs do not determine the coefficient. An effect that is too small to be detected adds nothing: its upper
-        limit stands beside the coefficients (`diagnosis.answer.hidden`).
+        ``unknown`` also adds half the change from the nominal model. No standard deviation is given at a bound, or
+        where the runs do not determine the coefficient. An effect that is too small to be detected adds nothing:
+        its upper limit stands beside the coefficients (`diagnosis.answer.hidden`).
     """
     fit, estimates, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
@@ -209,16 +208,11 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
             np.concatenate([m.means for _, m, _ in each]),
             np.concatenate([m.variances for _, m, _ in each]),
         )
-        shares = {
-            source: float(probability @ [given.get(source, 0.0) for _, _, given in each])
-            for source in _SOURCES
-            if any(source in given for _, _, given in each)
-        }
-        between = float(probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each])
-        shares["rivals"] = shares.get("rivals", 0.0) + between
-        estimates[name] = _estimate(fit, name, whole.mean, whole.std, shares)
+        centre = Central.of(whole, chosen)
+        shares = _budget(parts, centre.std**2)
+        estimates[name] = _estimate(fit, name, centre.value, centre.std, shares)
         if estimates[name].std is not None:
-            estimates[name] = replace(estimates[name], interval=interval_beside(whole, chosen))
+            estimates[name] = replace(estimates[name], interval=centre.interval)
     return estimates
 
 
@@ -296,23 +290,32 @@ def in_phase(fit: Fit) -> tuple[dict[str, ParameterEstimate], tuple[tuple[float,
     return estimates, tuple(map(tuple, matrix.tolist()))
 
 
-def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
-    """The central interval of a mixture to be stated beside its mean and standard deviation.
+@dataclass(frozen=True)
+class Central:
+    """The centre of a mixture.
 
-    Rivals too improbable to reach the interval may still contribute most of the variance, where their means are
-    distant. The interval is then shorter than value ± one standard deviation, and depends on whether each rival
-    has more or less than half the probability outside it, which is not known that precisely.
+    An improbable rival with a distant mean may contribute most of a variance, and move the mean by more than the
+    deviation of the answer. The quantiles hold it only as far as its probability reaches.
 
-    Returns:
-        Its ends; None where value and standard deviation give the interval, as for a normal distribution.
+    Args:
+        value: the median.
+        std: half the length of the central interval over that of a standard normal distribution.
+        interval: the ends of the interval where it is not the one of a normal distribution; else None.
     """
-    tail = 0.5 * (1.0 - chosen.coefficient_interval)
-    low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
-    reach = float(ndtri(1.0 - tail)) * whole.std
-    skew = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
-    if skew <= chosen.skewed_from * whole.std or high - low < chosen.interval_from * whole.std:
-        return None
-    return low, high
+
+    value: float
+    std: float
+    interval: tuple[float, float] | None
+
+    @classmethod
+    def of(cls, whole: Mixture, chosen: AnswerSettings) -> Central:
+        """The centre of a mixture, in its unit."""
+        tail = 0.5 * (1.0 - chosen.coefficient_interval)
+        low, middle, high = (whole.quantile(share) for share in (tail, 0.5, 1.0 - tail))
+        reach = 0.5 * (high - low)
+        std = reach / float(ndtri(1.0 - tail))
+        skew = max(abs(low - middle + reach), abs(high - middle - reach))
+        return cls(middle, std, (low, high) if skew > chosen.skewed_from * std else None)
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
@@ -334,6 +337,17 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
             parts |= {source: share * given.std**2 for source, share in given.shares.items()}
         found[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
     return found
+
+
+def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
+    """Variances by source: those within the answer, and the rest by the other answers.
+
+    The answer's own are scaled where another answer narrows the interval.
+    """
+    within = sum(parts.values())
+    scale = min(1.0, variance / within) if within > 0.0 else 0.0
+    shares = {source: scale * parts.get(source, 0.0) for source in _SOURCES if source in parts}
+    return {**shares, "rivals": max(variance - scale * within, 0.0)}
 
 
 def _of_answer(

@@ -151,14 +151,6 @@ class AnswerSettings:
         "judgement",
         unit="std",
     )
-    interval_from: float = setting(
-        2.0,
-        "Minimum length of a stated interval; otherwise the interval is value ± 1.96 std.",
-        "convention",
-        "As long as value ± one standard deviation. A shorter interval excludes rare rivals, which cause most of "
-        "the variance.",
-        unit="std",
-    )
     small_causes: int = setting(
         3,
         "Maximum number of unnamed small causes considered together.",

@@ -13,11 +13,11 @@ from scipy.stats import norm
 
 from diagnosis.answer.coefficients import (
     Answers,
+    Central,
     Mixture,
     Possible,
     before_the_causes,
     coefficients,
-    interval_beside,
     possible_answers,
 )
 from diagnosis.answer.linear_theory import beside, starts_beside
@@ -89,40 +89,46 @@ def test_the_digits_of_the_density_count(data, best):
         assert found.std == pytest.approx(np.hypot(best.std("cn_beta"), rounding), rel=1e-3)
 
 
-def test_the_value_and_the_variance_are_those_of_the_law_of_total_variance(data, base, best):
+def test_two_probable_answers_have_the_quantiles_of_their_mixture(data, base, best):
     answers = Answers((Possible(0.7, best), Possible(0.3, base)), 0.0, base)
     found = coefficients(answers, precise(data))["cn_r"]
     one, two = (only(fitted, precise(data))["cn_r"] for fitted in (best, base))
-    between = 0.7 * 0.3 * (one.value - two.value) ** 2
-    assert found.value == pytest.approx(0.7 * one.value + 0.3 * two.value)
-    assert found.std == pytest.approx(np.sqrt(0.7 * one.std**2 + 0.3 * two.std**2 + between))
-    assert found.shares["rivals"] == pytest.approx(between / found.std**2)
+    whole = Mixture(np.array([0.7, 0.3]), *np.array([(r.value, r.std**2) for r in (one, two)]).T)
+    low, middle, high = (whole.quantile(share) for share in (0.025, 0.5, 0.975))
+    assert found.value == pytest.approx(middle)
+    assert found.std == pytest.approx(0.5 * (high - low) / norm.ppf(0.975))
+    assert found.interval == pytest.approx((low, high))
     assert sum(found.shares.values()) == pytest.approx(1.0)
-    low, high = found.interval
+    assert found.shares["rivals"] > 0.5
     assert low < min(one.value, two.value)
     assert max(one.value, two.value) < high
-    assert found.to_json_dict()["interval"] == [low, high]
+    assert found.to_json_dict()["interval"] == list(found.interval)
 
 
-def test_no_stated_interval_is_shorter_than_a_standard_deviation_on_both_sides(data, base, best):
+def test_a_rival_outside_the_interval_does_not_widen_it(data, base, best):
+    """Its distant mean would be most of a variance, and move a mean by more than the answer's own deviation."""
     answers = Answers((Possible(0.985, best), Possible(0.015, base)), 0.0, base)
     found = coefficients(answers, precise(data))["cn_r"]
     alone = only(best, precise(data))["cn_r"]
-    assert found.std > 3.0 * alone.std  # the rare rival is most of the variance
-    assert found.interval is None  # and the central interval of 0.95 would be that of the likely answer alone
+    whole = Mixture(
+        np.array([0.985, 0.015]), *np.array([(f.value("cn_r"), f.std("cn_r") ** 2) for f in (best, base)]).T
+    )
+    assert whole.std > 3.0 * alone.std
+    assert abs(found.value - alone.value) < 0.1 * alone.std
+    assert alone.std <= found.std < 1.5 * alone.std
 
 
 @given(PARTS)
 @settings(max_examples=50)
-def test_the_interval_stated_or_meant_holds_95_per_cent_and_the_standard_deviation(parts):
+def test_the_interval_stated_or_meant_holds_95_per_cent_from_both_sides(parts):
     weights, means, variances = np.array(parts).T
     whole = Mixture(weights / weights.sum(), means, variances)
-    stated = interval_beside(whole, AnswerSettings())
-    low, high = stated or (whole.mean - 1.96 * whole.std, whole.mean + 1.96 * whole.std)
-    assert high - low >= 2.0 * whole.std
+    found = Central.of(whole, AnswerSettings())
+    low, high = found.interval or (found.value - 1.96 * found.std, found.value + 1.96 * found.std)
+    assert high - low == pytest.approx(2.0 * 1.96 * found.std, rel=1e-4)
     stds = np.sqrt(variances)
     held = whole.weights @ (norm.cdf(high, means, stds) - norm.cdf(low, means, stds))
-    assert held > 0.9  # an end may be a tenth of a standard deviation inside the central interval
+    assert 0.9 < held < 0.98  # an end may be a tenth of a standard deviation from the central interval's
 
 
 def test_an_unlikely_rival_makes_the_interval_one_sided(data, base, best):
@@ -137,8 +143,14 @@ def test_an_unlikely_rival_makes_the_interval_one_sided(data, base, best):
 def test_unknown_leaves_the_value_and_adds_half_the_change_from_the_nominal_model(data, base, best):
     found = coefficients(Answers((Possible(0.9, best),), 0.1, base), precise(data))["cn_r"]
     change = Settings().answer.unknown_std * (best.value("cn_r") - base.value("cn_r"))
+    whole = Mixture(
+        np.array([0.9, 0.1]),
+        np.full(2, best.value("cn_r")),
+        best.std("cn_r") ** 2 + np.array([0.0, change**2]),
+    )
     assert found.value == pytest.approx(best.value("cn_r"))
-    assert found.std == pytest.approx(np.sqrt(best.std("cn_r") ** 2 + 0.1 * change**2))
+    assert found.std == pytest.approx(Central.of(whole, AnswerSettings()).std, rel=1e-4)
+    assert found.std > best.std("cn_r")
 
 
 def test_the_nominal_model_s_coefficients_are_as_uncertain_as_they_are_wrong(data, base, best):
