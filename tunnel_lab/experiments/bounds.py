@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.vocabulary.plan import (
@@ -109,8 +111,38 @@ def nominal_oscillation(condition: Condition, truth: Truth, rig: Rig) -> dict[st
     return {"omega_n": omega_n, "zeta": damping / (2.0 * truth.yaw_inertia * omega_n)}
 
 
+def in_phase(
+    truth: Truth, effects: Sequence[Effect], conditions: Sequence[tuple[float, float, float]], rig: Rig
+) -> Truth:
+    """The truth that an estimator should recover: Cnβ and Cnr in phase with angle and rate (decision 0004).
+
+    Args:
+        effects: those that act, a lag of the air among them or not.
+        conditions: spring stiffness (N m/rad), wind speed (m/s) and air density (kg/m³) of every run.
+    """
+    runs = []
+    for spring, speed, density in conditions:
+        air = rig.body.flow(density, speed)
+        loads = aerodynamic_stiffness(1.0, **air), aerodynamic_damping(1.0, **air)
+        stiffness = spring - loads[0] * truth.cn_beta
+        if speed > 0.0 and stiffness > 0.0:
+            omega, still = (float(np.sqrt(one / truth.yaw_inertia)) for one in (stiffness, spring))
+            runs.append(WindOnRun(spring, omega, still, *loads))
+    found = truth.cn_beta, truth.cn_r
+    for effect in effects:
+        found = effect.in_phase(*found, runs)
+    return replace(truth, cn_beta=found[0], cn_r=found[1])
+
+
+def recovered(plan: CampaignPlan, rig: Rig) -> Truth:
+    """The truth of a planned campaign as `in_phase` states it."""
+    conditions = [(one.spring_stiffness, one.wind_speed, one.air_density) for one in plan.conditions]
+    effects = [effect_from(one.name, one.parameters) for one in plan.effects]
+    return in_phase(plan.truth, effects, conditions, rig)
+
+
 def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> PlanBounds:
-    """The bounds of a planned campaign of free decays, without regard to its effects.
+    """The bounds of a planned campaign of free decays, at the truth of `recovered`, without its other effects.
 
     Args:
         widths: relative standard deviations between runs by name, as in `Repeatability`; zero: none.
@@ -118,7 +150,8 @@ def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> Pl
     from tunnel_sim.engine.virtual_campaign import stated_run  # only here: loads MuJoCo
 
     noise, rate = reading_deviation(plan.sensor), plan.sensor.sample_rate
-    nominal = [nominal_oscillation(one, plan.truth, rig) for one in plan.conditions]
+    truth = recovered(plan, rig)
+    nominal = [nominal_oscillation(one, truth, rig) for one in plan.conditions]
     times = [np.arange(max(2, round(one.duration * rate))) / rate for one in plan.conditions]
     runs = tuple(
         {} if found is None else decay_bound(time, one.release_angle, **found, noise=noise)
@@ -133,4 +166,4 @@ def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> Pl
     campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(plan.sensor), bare)
     scatter = Repeatability(**{name: width for name, width in widths.items() if width})
     releases = [one.release_angle for one in plan.conditions]
-    return PlanBounds(runs, coefficients_bound(campaign, plan.truth, releases, noise, scatter))
+    return PlanBounds(runs, coefficients_bound(campaign, truth, releases, noise, scatter))

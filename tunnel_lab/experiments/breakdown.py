@@ -29,6 +29,7 @@ from tunnel_lab.plotting.style import figure, styled
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
+from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 from tunnel_sim.effects import ALL_EFFECTS
@@ -81,6 +82,7 @@ class BiasCase:
         reached: excess after the reference simulator's nominal refit, in noise variances (a ratio).
         realisation: number of the realisation, from 0.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
+        truth: by quantity, SI; with a lag of the air Cnβ and Cnr are those in phase with angle and rate.
     """
 
     effect: str
@@ -89,6 +91,7 @@ class BiasCase:
     realisation: int
     campaign: Campaign
     bound: dict[str, float]
+    truth: dict[str, float]
 
 
 def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
@@ -160,6 +163,7 @@ def make_cases(
                 realisation=i % realisations,
                 campaign=campaign,
                 bound={name: bound.std(name) for name in QUANTITIES},
+                truth=TRUTH | (in_phase(draw) or {}),
             )
         )
     return cases
@@ -221,7 +225,7 @@ def case_name(case: BiasCase) -> str:
 def _estimate_case(estimators: Sequence[str], case: BiasCase) -> Done:
     rows, failed = [], []
     for name in estimators:
-        answer, failure = answer_rows(name, case.campaign, TRUTH, case.bound)
+        answer, failure = answer_rows(name, case.campaign, case.truth, case.bound)
         rows += [(case.effect, case.severity, case.reached, case.realisation, *row) for row in answer]
         failed += failure
     columns = {**_CASE_COLUMNS, **ANSWER_COLUMNS, "message": pl.String}

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from identification.estimators import free_decay_estimators
-from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound
+from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound, in_phase
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.chain import read_motion
@@ -301,6 +301,8 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
         scatter = Repeatability(
             **{one.scatters: one.severity for one in effects_of(cell.effect) if one.scatters}
         )
+        density = rig.air.density
+        truth = in_phase(truth, effects_of(cell.effect), [(k, v, density) for k, v, _ in runs], rig)
         bound = coefficients_bound(campaign, truth, [release for *_, release in runs], noise, scatter)
         return Trial(campaign, dict(vars(truth)), bound)
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))

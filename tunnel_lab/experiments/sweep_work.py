@@ -20,7 +20,7 @@ from tunnel_lab.experiments.answers import (
     counted_failures,
     quantity_rows,
 )
-from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds
+from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds, recovered
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class, effect_from
@@ -190,7 +190,7 @@ def case_rows(
         {condition.release_angle for condition in conditions},
     )
     common = (None, *(next(iter(kind)) if len(kind) == 1 else None for kind in kinds))
-    injected = {**vars(truth), "sensor_zero": sensor.zero}
+    injected = {**vars(recovered(plan, case.rig)), "sensor_zero": sensor.zero}
     found = answer.status.name.lower() if answer else status
     for row in quantity_rows(answer, CAMPAIGN_QUANTITIES, injected, bounds.campaign, found):
         yield (*head, *common, *row, message)
