@@ -1,4 +1,4 @@
-"""The truth of scores with a lag: the derivatives in phase, as the reference simulator derives them independently."""
+"""The truth of scores with a lag: the derivatives in phase, against those of the reference simulator."""
 
 import numpy as np
 import pytest
