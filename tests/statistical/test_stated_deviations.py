@@ -1,7 +1,7 @@
 """Stated deviations of the coefficients of a diagnosis, from both sides: neither too small nor too large.
 
-z is the error over the stated standard deviation. Over n campaigns n times its mean square follows χ²(n), so both ends
-have a stated false-alarm rate. Deviations of half or twice the size must fail.
+z is the error over the stated standard deviation. Over n campaigns, n times its mean square follows χ²(n), so both
+ends have a stated false-alarm rate. Deviations of half or twice the size must fail.
 """
 
 import numpy as np
