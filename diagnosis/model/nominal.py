@@ -399,8 +399,11 @@ class NominalModel:
             )
         if data.wind_on and all(run.wind_on for run in data.runs):
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
+        common = [one for one in self.parameters(data) if one.owner == "common" and one.name != "zero"]
         if len(data.runs) == 1:
             found.append("how well runs repeat: a single run shows no scatter between runs")
+        elif _OF_A_DECAY * len(data.runs) <= len(common) and not data.driven:
+            found.append("how well runs repeat: no run tests another one, and ± is for runs that repeat exactly")
         last = (_OF_WIND,) if data.wind_on else ()
         if data.driven:
             found.append("a lag of the sensor as opposed to a delay of the input: only their sum is visible")
@@ -436,6 +439,7 @@ def _program(text: str, spring: float) -> tuple[float, ...]:
     return _expression(text).program({"Kr": spring}, {"b": "angle", "r": "rate"})
 
 
+_OF_A_DECAY = 2  # numbers that a run determines: its frequency and its damping
 _PHASES = 64  # of a cycle, for its mean
 _FACTORS = (0.5, 1.0, 2.0)  # on the stiffnesses of the campaign's springs
 ALWAYS_BLIND = (
