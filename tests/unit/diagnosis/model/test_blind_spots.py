@@ -13,7 +13,6 @@ SPRING = 16.12
     [
         (((SPRING, 0.0), (SPRING, 15.0)), False),
         (((SPRING, 0.0), (SPRING, 15.0), (SPRING, 15.0)), True),
-        (((SPRING, 0.0), (44.84, 0.0)), True),
     ],
 )
 def test_as_many_numbers_as_coefficients_show_no_scatter(conditions, tested):
