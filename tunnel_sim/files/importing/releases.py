@@ -247,8 +247,8 @@ def _piece(
 def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
     """The decays that are runs, and with a doubt those that are the motion of something else.
 
-    A brief motion is not a run if it swings at another frequency than the longest one; nor if it is small and beside
-    the centre of the longest one, where a hand holds the body.
+    A brief motion is not a run if it swings at another frequency than the longest one; nor if it is small, beside
+    the centre of the longest one and just before a release: a hand holds the body there.
     """
     if len(found) < 2:
         return list(found)
@@ -261,7 +261,8 @@ def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list
     brief = lasts < _BRIEF * lasts[most]
     other = (halves > _OTHER * halves[most]) | (halves < halves[most] / _OTHER)
     small = sizes < _SMALL * sizes[most]
-    beside = np.abs(centres - centres[most]) > sizes
+    following = np.append([found[k + 1].hand <= found[k].until for k in range(len(found) - 1)], [False])
+    beside = (np.abs(centres - centres[most]) > sizes) & following
     judged = []
     for k, decay in enumerate(found):
         if brief[k] and small[k] and (beside[k] or other[k]):
