@@ -23,6 +23,9 @@ _RESTARTS = 0.01  # share of backward steps, up to which the clock restarts and 
 _FEW_RESTARTS = 3  # in a short record
 _FEW = 0.1  # share of rows out of order that a logger may mix up; more of them are several runs
 _SMOOTH = 0.1  # white noise in a smooth reading, relative to its swing
+_ROUNDED = 1e-9  # of the range: readings that differ by less are equal
+_FLAT = 3  # samples: a shorter peak may be flat by chance
+_FLATTER = 5  # times as many samples as on the level below: a parabola has at most 2.4 times as many
 _GAP = 1.75  # usual steps: samples are missing
 _LEVELS_OF = 200_000  # samples of each run that are inspected
 _MOST_LEVELS = 20_000
@@ -219,3 +222,22 @@ def resolution(readings: Sequence[PerSample]) -> float | None:
     step, first = np.polyfit(place, levels, 1)
     away = float(np.abs(levels - first - step * place).max())
     return float(step) if step > 0.0 and away <= _ON_LEVEL * step else None
+
+
+def clipped(reading: PerSample) -> list[tuple[float, NDArray[np.intp]]]:
+    """The limits of a sensor that cuts off the peaks of a swing: each with the samples at it.
+
+    A reading that turns freely is not longer at its last level than at the one before, a few times at most.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        heights = sign * reading
+        at = heights >= heights.max() - _ROUNDED * float(np.ptp(heights))
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(np.int8)))
+        lengths = edges[1::2] - edges[::2]
+        below = heights[~at].max(initial=-np.inf)
+        beside = np.count_nonzero(heights[~at] >= below - _ROUNDED * float(np.ptp(heights)))
+        flat = lengths[lengths >= _FLAT]
+        if flat.size >= 2 and flat.sum() > _FLATTER * beside:
+            found.append((sign * float(heights.max()), np.flatnonzero(at)))
+    return found

@@ -38,6 +38,8 @@ _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 _FALLING = 0.75  # share of swings smaller than the one before: half of them at random
 _GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped the body
 _CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
+_OVER = 0.3  # of the expected swing: what follows is not the same motion
+_DIED_OUT = 0.1  # of the largest swing
 _OTHER = 1.5  # ratio of half periods: the motion of something else
 _SMALL = 0.2  # of the swing of the longest run
 _BRIEF = 0.5  # of the duration of the longest run: a knock is over sooner
@@ -113,15 +115,23 @@ class _Decay:
 
     def stopped(self, swings: Swings) -> int | None:
         """The last extreme before something ends the motion, which would still swing; None if it dies out."""
-        ends = self.until >= swings.size.size
-        sizes = swings.size[self.start : self.until]
+        size, until = swings.size, self.until
+        usual = float(np.median(swings.usual[self.start : self.start + self.count]))
+        rests = swings.stay[until] > _RESTED * usual
         # The last swing of a record that ends in motion is not whole.
-        sizes = sizes[:-1] if ends and not swings.held[-1] else np.append(sizes, 0.0)
-        for k in range(max(2, self.count - 2), min(self.count + 1, sizes.size)):
+        shown = size[self.start : until] if until < size.size or rests else size[self.start : -1]
+        sizes = np.append(shown, [0.0] if until < size.size or rests else [])
+        # Where nothing follows, a motion that has almost died out may rest.
+        least = _DIED_OUT * float(shown.max()) if until >= size.size else 0.0
+        for k in range(max(2, self.count - 2), sizes.size):
             expected = 2.0 * sizes[k - 1] - sizes[k - 2]
-            if sizes[k - 1] > _VISIBLE * swings.least and expected > _GOING_ON * sizes[k - 1]:
-                if sizes[k] < _CUT_SHORT * expected:
-                    return self.start + k
+            if sizes[k - 1] <= max(_VISIBLE * swings.least, least):
+                break
+            if self.start + k == until < size.size and not rests and size[until] < _GROWN * expected:
+                sizes[k] = size[until]  # something was seen there, and the motion goes on
+            ends_here = sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            if ends_here and expected > _GOING_ON * sizes[k - 1]:
+                return self.start + k
         return None
 
     def lasts(self, swings: Swings) -> float:
