@@ -263,7 +263,10 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
 
 @styled
 def import_picture(imported: Imported) -> bytes:
-    """Draw imported records as PNG: left-out samples are grey, vertical lines mark the beginning of runs."""
+    """Draw imported records as PNG: left-out samples are grey, vertical lines mark the beginning and end of runs.
+
+    Samples that are not part of a free decay, although they might be taken for one, are shaded.
+    """
     raws = {id(part.raw): part.raw for part in imported.parts}
     shown = list(raws)[:MOST_PANELS]
     columns = min(_COLUMNS, len(shown))
@@ -277,12 +280,17 @@ def import_picture(imported: Imported) -> bytes:
         kept = 0
         for number, part in enumerate(parts):
             if part.run is None:
+                _shade(axes, time[part.piece.first], time[part.piece.last - 1])
                 continue
             kept += 1
             piece = slice(part.piece.first, part.piece.last)
             colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
             axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
             axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
+            if part.piece.held > 0.0:
+                _shade(axes, time[part.piece.first] - part.piece.held, time[part.piece.first])
+            if part.piece.stopped:
+                axes.axvline(time[part.piece.last - 1], color=VERMILION, linewidth=0.8, linestyle=":")
         if raw.input is not None:
             name, values = raw.input
             beside = axes.twinx()
@@ -299,12 +307,16 @@ def import_picture(imported: Imported) -> bytes:
         axes.remove()
     more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
     picture.suptitle(
-        figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey{more}"),
+        figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey, doubtful ones shaded{more}"),
         fontsize=9,
     )
     stream = io.BytesIO()
     picture.savefig(stream, format="png", dpi=120)
     return stream.getvalue()
+
+
+def _shade(axes: Axes, start: float, end: float) -> None:
+    axes.axvspan(start, end, color=VERMILION, alpha=0.15, linewidth=0.0)
 
 
 def thinned(time: Array, reading: Array) -> tuple[Array, Array]:

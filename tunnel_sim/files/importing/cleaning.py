@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, log10
@@ -10,6 +11,7 @@ from math import floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.files.importing.tables import LEAST_ROWS
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
@@ -18,6 +20,13 @@ _COARSE = 0.1  # share of samples with the stamp of the previous one, above whic
 _UNEVEN = 0.01  # of a step
 _FINEST = 1e-12  # s
 _RESTARTS = 0.01  # share of backward steps, up to which the clock restarts and the rows are not out of order
+_FEW_RESTARTS = 3  # in a short record
+_FEW = 0.1  # share of rows out of order that a logger may mix up; more of them are several runs
+_SMOOTH = 0.1  # white noise in a smooth reading, relative to its swing
+_ROUNDED = 1e-9  # of the range: readings that differ by less are equal
+_FLAT = 3  # samples: a shorter peak may be flat by chance
+_FLATTER = 5  # times as many samples as on the level below: a parabola has at most 2.4 times as many
+_GAP = 1.75  # usual steps: samples are missing
 _LEVELS_OF = 200_000  # samples of each run that are inspected
 _MOST_LEVELS = 20_000
 _ON_LEVEL = 0.2  # of a level's height
@@ -46,20 +55,40 @@ class Cleaned:
 
 
 def restarts(time: Times) -> list[int]:
-    """Indices where the times restart because another run follows; empty: nowhere."""
-    with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
-        back = np.flatnonzero(np.diff(time) < 0.0) + 1
-    if not back.size or back.size > max(1.0, _RESTARTS * time.size):
+    """Indices where the times restart because another run follows; empty: nowhere.
+
+    Rows without a time, such as a blank line or a repeated heading between two runs, do not hide a restart.
+    """
+    known = np.flatnonzero(np.isfinite(time))
+    clock = time[known]
+    back = np.flatnonzero(np.diff(clock) < 0.0) + 1
+    if not back.size or back.size > max(_FEW_RESTARTS, _RESTARTS * clock.size):
         return []
-    starts = [0, *back.tolist(), time.size]
-    parts = [time[a:b] for a, b in itertools.pairwise(starts)]
+    starts = [0, *back.tolist(), clock.size]
+    parts = [clock[a:b] for a, b in itertools.pairwise(starts)]
     # Another run begins near the time at which the first one began, and not slightly before the previous row.
-    early = [part[0] - time[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:]]
-    return back.tolist() if all(early) else []
+    early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
+    if not early and not _interleaved(clock, starts):
+        return []
+    return known[back].tolist()
+
+
+def _interleaved(clock: Times, starts: Sequence[int]) -> bool:
+    """Whether sorting would mix the rows of parts that are long enough for runs."""
+    part = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    long = np.isin(part, np.flatnonzero(np.diff(starts) >= LEAST_ROWS))
+    order = np.argsort(clock[long], kind="stable")
+    changes = np.count_nonzero(np.diff(part[long][order]))
+    shared = np.count_nonzero(np.diff(clock[long][order]) == 0.0)  # rows that two parts repeat
+    return bool(changes > len(starts) + 2 * shared)
 
 
 def cleaned(time: Times, reading: Readings) -> Cleaned:
-    """Times and readings as recorded in the form of a campaign."""
+    """Times and readings as recorded in the form of a campaign.
+
+    Raises:
+        TunnelError: where the rows are in no order of one run, which sorting would invent.
+    """
     remarks: list[str] = []
     rows = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
     if rows.size < time.size:
@@ -67,19 +96,24 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         if inside:
             remarks.append(f"{counted(inside, 'sample')} without a number left out")
         time, reading = time[rows], reading[rows]
-    if (np.diff(time) < 0.0).any():
-        order = np.argsort(time, kind="stable")
+    ordered = not (np.diff(time) < 0.0).any()
+    if not ordered:
+        moved, order = _out_of_order(time), np.argsort(time, kind="stable")
+        if moved > _FEW * time.size and not _of_one_run(time[order], reading[order]):
+            what = f"the times of {moved} of {counted(time.size, 'row')} are out of order"
+            remedy = "sort the rows if they are one run; write each run into a file of its own if they are several"
+            raise TunnelError(what, remedy=remedy)
         rows, time, reading = rows[order], time[order], reading[order]
         remarks.append("rows out of order sorted by time")
     same = np.diff(time) == 0.0
     repeated = same & (np.diff(reading) == 0.0)
     differing = np.count_nonzero(same & ~repeated)
-    if differing > _COARSE * time.size and time[0] < time[-1]:
+    if ordered and differing > _COARSE * time.size and time[0] < time[-1]:
         remarks.append(
             f"{differing} time stamps repeat although the readings differ: the stamps are coarser than the "
             "sampling, and evenly spaced times are used instead"
         )
-        time = np.linspace(time[0], time[-1], time.size)
+        time = _spread(time, rows)
     elif same.any():
         keep = np.concatenate([[True], ~same])
         further = (
@@ -94,10 +128,16 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
             "campaign every run starts at 0 s"
         )
     time = from_zero(time)
+    return Cleaned(time, reading, rows, (*remarks, *_of_clock(time)), first)
+
+
+def _of_clock(time: Times) -> list[str]:
+    """Remarks on missing samples and uneven steps."""
+    remarks = []
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size > 1 else 0.0
     if usual > 0.0:  # else below the resolution of floating-point numbers; the run is refused later
-        gaps = steps > 1.75 * usual
+        gaps = steps > _GAP * usual
         if gaps.any():
             missing = int(np.round(steps[gaps] / usual - 1.0).sum())
             where = f"in {counted(int(gaps.sum()), 'gap')}, up to {steps.max():.4g} s long"
@@ -106,7 +146,36 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         if spread > _UNEVEN * usual:
             share = f"{100.0 * spread / usual:.0f} % of a step"
             remarks.append(f"time stamps differ from an even clock by up to {share}; kept")
-    return Cleaned(time, reading, rows, tuple(remarks), first)
+    return remarks
+
+
+def _out_of_order(time: Times) -> int:
+    """The least number of rows that are moved if the rows are sorted."""
+    tails: list[float] = []
+    for value in time.tolist():
+        place = bisect_right(tails, value)
+        tails[place : place + 1] = [value]
+    return time.size - len(tails)
+
+
+def _of_one_run(time: Times, reading: Readings) -> bool:
+    """Whether sorted rows are one run, however mixed up they were: an even clock, and a reading without jumps."""
+    steps = np.diff(time)
+    even = np.abs(steps - np.median(steps)).max() <= _UNEVEN * np.median(steps)
+    jumps = np.diff(reading, 4)  # of two runs between each other: as large as their distance
+    return bool(even and jumps.size and np.sqrt(np.mean(jumps**2) / 70.0) <= _SMOOTH * reading.std())
+
+
+def _spread(time: Times, rows: NDArray[np.intp]) -> Times:
+    """Evenly spaced times from each gap in coarse stamps to the next one; a missing row keeps its time."""
+    firsts = np.concatenate([[0], np.flatnonzero(np.diff(time)) + 1])
+    coarse = np.diff(time[firsts])
+    gaps = firsts[1:][coarse > _GAP * np.median(coarse)]
+    even = np.empty(time.size)
+    for a, b in itertools.pairwise([0, *gaps.tolist(), time.size]):
+        span = max(int(rows[b - 1] - rows[a]), 1)
+        even[a:b] = np.linspace(time[a], time[b - 1], span + 1)[rows[a:b] - rows[a]]
+    return even
 
 
 def clock_text(time: Seconds) -> str:
@@ -153,3 +222,22 @@ def resolution(readings: Sequence[PerSample]) -> float | None:
     step, first = np.polyfit(place, levels, 1)
     away = float(np.abs(levels - first - step * place).max())
     return float(step) if step > 0.0 and away <= _ON_LEVEL * step else None
+
+
+def clipped(reading: PerSample) -> list[tuple[float, NDArray[np.intp]]]:
+    """The limits of a sensor that cuts off the peaks of a swing: each with the samples at it.
+
+    A reading that turns freely is not longer at its last level than at the one before, a few times at most.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        heights = sign * reading
+        at = heights >= heights.max() - _ROUNDED * float(np.ptp(heights))
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(np.int8)))
+        lengths = edges[1::2] - edges[::2]
+        below = heights[~at].max(initial=-np.inf)
+        beside = np.count_nonzero(heights[~at] >= below - _ROUNDED * float(np.ptp(heights)))
+        flat = lengths[lengths >= _FLAT]
+        if flat.size >= 2 and flat.sum() > _FLATTER * beside:
+            found.append((sign * float(heights.max()), np.flatnonzero(at)))
+    return found

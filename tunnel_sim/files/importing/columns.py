@@ -84,7 +84,9 @@ def find_columns(
     for pair in find_pairs(table, choices, where):
         said = [*pair.said]
         time = in_seconds(pair.time, pair.reading.values.size, table.facts, choices, said, where)
-        counted = replace(pair.reading, values=without_overflow(pair.reading.values, said))
+        # A row without a time is not a sample: a heading between two runs may hold other numbers.
+        timed = np.where(np.isfinite(time), pair.reading.values, np.nan)
+        counted = replace(pair.reading, values=without_overflow(timed, said))
         reading, quantity, unit = in_radians(counted, choices, calibration, said, where)
         driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where)
         found.append(RunColumns(pair, time, reading, quantity, unit, driven, tuple(said)))

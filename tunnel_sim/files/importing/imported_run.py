@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.cleaning import clock_text, from_rest, from_zero
+from tunnel_sim.files.importing.cleaning import clipped, clock_text, from_rest, from_zero
 from tunnel_sim.files.importing.condition_names import Hint
 from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import Unstated, check_wind, conditions_of
@@ -19,7 +19,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import INPUTS
-from tunnel_sim.vocabulary.quantities import Readings
+from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
 
 _JUDGED = 500_000  # samples for counting the cycles of a long record
@@ -77,18 +77,12 @@ def imported_run(
     piece = stated_piece(raw.cleaned.file_time_s, piece, stretch, where)
     if name in choices.leave_out:
         return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
+    if piece.doubt:
+        return ImportedRun(name, raw, piece, None, (f"left out: {piece.doubt}",), None, {})
     kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
-    remarks, clock = [], raw.cleaned.file_time_s[kept]
-    if piece.first:
-        at = (
-            "at the largest rate after the release"
-            if raw.quantity == "rate"
-            else "where the body is released"
-        )
-        remarks.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
-    if piece.last < raw.cleaned.time_s.size:
-        remarks.append(f"ends at {clock_text(float(clock[-1]))} s, with the motion or before the next run")
+    clock = raw.cleaned.file_time_s[kept]
+    remarks = _on_the_cut(raw, piece, clock, reading, sensor.unit)
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
         reading = from_rest(reading, rest, sensor.unit, remarks, where)
@@ -123,6 +117,30 @@ def imported_run(
         return ImportedRun(name, raw, piece, None, (*remarks, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
+
+
+def _on_the_cut(
+    raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readings, unit: str
+) -> list[str]:
+    """Remarks on the first and the last sample of a run, and on peaks that its sensor cuts off."""
+    remarks = []
+    if piece.first:
+        at = "where the body is released"
+        if raw.quantity == "rate":
+            at = "at the largest rate after the release"
+        elif piece.held > 0.0:
+            at = f"from where on the motion is free: the {piece.held:.3g} s before it are not part of a free decay"
+        remarks.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
+    if piece.last < raw.cleaned.time_s.size:
+        why = "where something stops the body" if piece.stopped else "with the motion or before the next run"
+        remarks.append(f"ends at {clock_text(float(clock[-1]))} s, {why}")
+    for level, samples in clipped(reading):
+        until = clock_text(float(clock[samples[-1]]))
+        remarks.append(
+            f"the peaks are cut off at {level:.4g} {unit}: {samples.size} samples until {until} s; a later start "
+            "leaves them out"
+        )
+    return remarks
 
 
 def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:

@@ -123,7 +123,10 @@ def _records(
     if len(starts) > 2:
         remarks.append(f"the clock restarts {counted(len(starts) - 2, 'time')}: a new run each time")
     for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
-        clean = cleaned(time[a:b], readings[a:b])
+        try:
+            clean = cleaned(time[a:b], readings[a:b])
+        except TunnelError as error:
+            raise TunnelError(error.what, where=where, remedy=error.remedy) from None
         rows = np.flatnonzero(kept)[a:b]
         if columns.quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
             raise HoldsTurningPoints(

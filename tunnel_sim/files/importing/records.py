@@ -124,8 +124,7 @@ def read_records(
         find = _FINDERS.get(raw.quantity)
         cut = choices.cut and not raw.whole and raw.input is None
         pieces = find(time, reading) if cut and find is not None else [RecordPiece(0, time.size)]
-        for number, piece in enumerate(pieces, 1):
-            run = label if len(pieces) == 1 else f"{label}-{number}"
+        for run, piece in zip(_names(label, pieces), pieces, strict=True):
             parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
     names = {*(part.id for part in parts), *(path.name for path in files)}
     for left in (left for left in choices.leave_out if left not in names):
@@ -156,6 +155,14 @@ def read_records(
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
     return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
+
+
+def _names(label: str, pieces: Sequence[RecordPiece]) -> list[str]:
+    """The names of the runs of a record: its own for the only one; what is not a run is counted separately."""
+    kept = sum(not piece.doubt for piece in pieces)
+    runs = iter([label] if kept == 1 else [f"{label}-{k}" for k in range(1, kept + 1)])
+    others = iter(f"{label}-other-{k}" for k in range(1, len(pieces) - kept + 1))
+    return [next(others if piece.doubt else runs) for piece in pieces]
 
 
 _WITH_DENSITY = ("frontal_area", "reference_length")

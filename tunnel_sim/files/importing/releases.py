@@ -1,41 +1,65 @@
 """The start and end of runs in a record.
 
-A free decay crosses its centre every half cycle and never grows much from one half cycle to the next. If a
-crossing takes longer and the excursions after it are larger than before, a hand has moved or held the body. Any
-other record is one run.
+A run is a free decay: a series of swings, none much larger than the one before. It begins where a hand has held or
+pulled the body, or where a tap has made the swings grow at once. Every candidate is judged by its own largest
+swing and by the noise, never by the largest swing of the record. A record without a release is one run.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.choices import Stretch
+from tunnel_sim.files.importing.free_motion import free_from, free_until
+from tunnel_sim.files.importing.swings import Swings, noise_of, swings_of
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.quantities import Angles, PerSample, Rates, Times
 
-_BAND = 0.05  # of the largest excursion: a smaller one counts as rest
+_BAND = 0.05  # of the largest excursion of a run: a smaller one counts as rest
 _NOISES = 5.0  # standard deviations: smaller excursions are noise
-_NOISE_OF = 200_000  # samples for the estimate of the noise
 _CENTRED = 2  # estimates of the centre
 _LONGER = 1.8  # usual half cycles: no free motion takes as long from crossing to crossing
-_SLOWER = 1.25  # times the way back: a pull at the start of a record takes longer
-_GROWN = 1.5  # times the previous excursion: no free decay grows as much within half a cycle
-_STILL_GROWING = 1.1  # times the previous excursion: the hand has not let go
+_RESTED = 3.0  # usual half cycles: a rest, a hold or a pull, whatever the swings after it
+_GROWN = 1.5  # times the previous swings: no free decay grows as much within half a cycle
+_TAPPED = 2.0  # times the largest of the swings before: growth without a pause that is not chance
+_BEFORE = 10  # swings before a release, to which it is compared
+_GROWS_FOR = 3  # swings: a tap acts no longer
+_STILL_GROWING = 1.1  # times the previous swing: the hand has not let go
 _LEAST_HALVES = 6  # half cycles: a shorter motion is not a run
+_VISIBLE = 2.0  # times the least swing: noise alone does not reach it
+_ROUGH = 0.25  # median second difference of the logarithms of swings: a free decay is smoother
 _AT_TURN = 0.005  # of an excursion: the reading stays as near the turning point while the body is held
 _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
+_FALLING = 0.75  # share of swings smaller than the one before: half of them at random
+_GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped the body
+_CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
+_OVER = 0.3  # of the expected swing: what follows is not the same motion
+_DIED_OUT = 0.1  # of the largest swing
+_OTHER = 1.5  # ratio of half periods: the motion of something else
+_SMALL = 0.2  # of the swing of the longest run
+_BRIEF = 0.5  # of the duration of the longest run: a knock is over sooner
 
 
 @dataclass(frozen=True)
 class RecordPiece:
-    """A run in a record: the index of its first sample, and the index after its last one."""
+    """A run in a record: the index of its first sample, and the index after its last one.
+
+    Args:
+        doubt: why it is left out, although the motion decays; empty: it is a run.
+        held: by which a hand held the body after the largest reading, s; these samples are left out.
+        stopped: whether something ends the motion before the record ends.
+    """
 
     first: int
     last: int
+    doubt: str = ""
+    held: float = 0.0
+    stopped: bool = False
 
 
 def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[RecordPiece]:
@@ -44,67 +68,227 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
     Args:
         drift: greatest drift of its centre, in the unit of the reading.
     """
-    whole = [RecordPiece(0, reading.size)]
-    noise = max(_noise_of(reading), drift)
+    noise = max(_NOISES * noise_of(reading), drift)
     centred = _centred(reading, noise)
-    if centred is None:
-        return whole
-    away, starts, ends = centred
-    clear = noise <= _BAND * float(np.abs(away).max())
-    peaks = np.array([np.abs(away[a:b]).max() for a, b in zip(starts, ends, strict=True)])
-    middle = 0.5 * (time_s[ends[:-1] - 1] + time_s[starts[1:]])
-    crossings = np.concatenate([[time_s[0]], middle, [time_s[-1]]])
-    lengths = np.diff(crossings)
-    usual = float(np.median(lengths[:-1]))
-    turn = time_s[starts[0] + int(np.argmax(np.abs(away[starts[0] : ends[0]])))]
-    if turn - time_s[0] > _SLOWER * (crossings[1] - turn) + (time_s[1] - time_s[0]):
-        lengths[0] = np.inf  # pulled aside: a free swing takes no longer out than back
-    # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
-    moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
-    # the excursions in which a hand moves the body, each with the one from which on the motion is free
-    spans: list[tuple[int, int]] = []
-    for k in np.flatnonzero(lengths[:-1] > _LONGER * usual).tolist():
-        before = peaks[k - 1] if k else 0.0
-        if max(peaks[k], peaks[k + 1]) <= _GROWN * before:
+    half, end = 0.0, reading.size
+    if centred is not None:
+        away, starts, ends = centred
+        crossings = 0.5 * (time_s[ends[:-1] - 1] + time_s[starts[1:]])
+        half = float(np.median(np.diff(crossings)))
+        # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
+        moved = starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * half else ends[-1]
+        if noise <= _BAND * float(np.abs(away).max()):  # else the motion continues in the noise
+            end = _without_long_rest(time_s, 0, int(moved))
+    swings = swings_of(time_s, reading, half, drift)
+    found = [] if swings is None else _judged(_decays(swings), swings, reading)
+    if swings is None or not found or (len(found) == 1 and found[0].goes_on(swings)):
+        return [RecordPiece(0, end)]
+    return [_piece(time_s, reading, swings, *pair) for pair in zip(found, [*found[1:], None], strict=True)]
+
+
+@dataclass(frozen=True)
+class _Decay:
+    """A series of swings that decay, by the indices of extremes.
+
+    Args:
+        hand: the extreme at which a hand begins to act before it.
+        start: the extreme of the release.
+        count: number of swings that exceed the noise and a share of the largest one.
+        until: the extreme at which something else begins, or the last one.
+        doubt: why it is not a run; empty: it is one.
+    """
+
+    hand: int
+    start: int
+    count: int
+    until: int
+    doubt: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether no hand acts before it."""
+        return self.hand < 0
+
+    def goes_on(self, swings: Swings) -> bool:
+        """Whether nothing acts on the body before and during the motion."""
+        return self.whole and self.stopped(swings) is None
+
+    def stopped(self, swings: Swings) -> int | None:
+        """The last extreme before something ends the motion, which would still swing; None if it dies out."""
+        size, until = swings.size, self.until
+        usual = float(np.median(swings.usual[self.start : self.start + self.count]))
+        rests = swings.stay[until] > _RESTED * usual
+        # The last swing of a record that ends in motion is not whole.
+        shown = size[self.start : until] if until < size.size or rests else size[self.start : -1]
+        sizes = np.append(shown, [0.0] if until < size.size or rests else [])
+        # Where nothing follows, a motion that has almost died out may rest.
+        least = _DIED_OUT * float(shown.max()) if until >= size.size else 0.0
+        for k in range(max(2, self.count - 2), sizes.size):
+            expected = 2.0 * sizes[k - 1] - sizes[k - 2]
+            if sizes[k - 1] <= max(_VISIBLE * swings.least, least):
+                break
+            if self.start + k == until < size.size and not rests and size[until] < _GROWN * expected:
+                sizes[k] = size[until]  # something was seen there, and the motion goes on
+            ends_here = sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            if ends_here and expected > _GOING_ON * sizes[k - 1]:
+                return self.start + k
+        return None
+
+    def lasts(self, swings: Swings) -> float:
+        """Duration of its visible swings, s."""
+        return float(swings.lasts[self.start : self.start + self.count].sum())
+
+
+def _decays(swings: Swings) -> list[_Decay]:
+    """Every series of swings that decay, in their order."""
+    size, count = swings.size, swings.size.size
+    breaks: list[tuple[int, int]] = []
+    since, k = 0, 0
+    while k < count:
+        released = _release_at(swings, k, since)
+        if released is None:
+            k += 1
             continue
-        at = k
-        while at + 1 < peaks.size and peaks[at + 1] > _STILL_GROWING * peaks[at]:
-            at += 1
-        if not spans or at > spans[-1][1]:
-            spans.append((k, at))
-    if spans and spans[0][0] >= _LEAST_HALVES:  # the record begins in free motion
-        spans.insert(0, (0, 0))
-    until = [*(k for k, _ in spans), peaks.size][1:]
-    spans = [
-        (k, at)
-        for (k, at), end in zip(spans, until, strict=True)
-        if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
-    ]
-    if not spans:
-        return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
-    pieces = []
-    for place, (_, released) in enumerate(spans):
+        breaks.append((k - 1 if k - 1 > since and swings.slow[k - 1] else k, released))
+        since = released
+        k = released + 1
+    if not breaks or breaks[0][0] > 0:
+        breaks.insert(0, (0, 0) if swings.begins_late else (-1, 0))
+    found = []
+    for (hand, start), until in zip(breaks, [*(k for k, _ in breaks[1:]), count], strict=True):
+        sizes = size[start:until]
+        if not sizes.size:
+            continue
+        still = np.flatnonzero(sizes <= max(_BAND * float(sizes.max()), swings.least))
+        moving = int(still[0]) if still.size else sizes.size
+        if moving >= _LEAST_HALVES and _is_decay(sizes[:moving], sizes, swings, start):
+            found.append(_Decay(hand, start, moving, until))
+    return found
+
+
+def _release_at(swings: Swings, k: int, since: int) -> int | None:
+    """The extreme of a release, if something other than a free motion acts at an extreme; None if not.
+
+    Args:
+        since: the extreme of the previous release.
+    """
+    size, stay, usual = swings.size, swings.stay, swings.usual
+    pulled = swings.across[k - 1] / usual[k - 1] if k > since else 0.0
+    paused = bool(swings.held[k]) or (k > since and bool(swings.slow[k - 1]))
+    rested = stay[k] > _RESTED * usual[k] or pulled > _RESTED or (k == 1 and bool(swings.slow[0]))
+    begins = swings.begins_between and since == 0  # the first swing is not a whole one
+    earlier = size[max(since, k - _BEFORE) : k].max(initial=0.0)
+    latest = size[max(since, k - 2) : k].max(initial=0.0)
+    if begins and k <= 2:
+        earlier = latest = max(earlier, size[: k + 1].max())
+    at, most = k, size.size if paused or rested else k + _GROWS_FOR
+    while at + 1 < min(size.size, most) and size[at + 1] > _STILL_GROWING * swings.sampled * size[at]:
+        at += 1
+    # Random motion pauses by chance; a swing that decays does not.
+    if k and size[at] <= _TAPPED * _random_before(swings, k):
+        return None
+    if rested or (paused and size[at] > _GROWN * earlier):
+        return at
+    after = size[at + 1 : at + 3]
+    tapped = k > since and size[k] > _GROWN * swings.sampled * latest and size[at] > _TAPPED * earlier
+    return at if tapped and after.size == 2 and after.min() > size[at] / _TAPPED else None
+
+
+def _random_before(swings: Swings, k: int) -> float:
+    """The largest of the swings before an extreme, if they vary at random; 0 if they decay, or a hand acts."""
+    part = slice(max(0, k - _BEFORE), k)
+    sizes = swings.size[part][~swings.slow[part]]
+    if sizes.size < _LEAST_HALVES or _bend(sizes) <= _ROUGH or np.mean(np.diff(sizes) < 0.0) >= _FALLING:
+        return 0.0
+    return float(sizes.max())
+
+
+def _bend(sizes: PerSample) -> float:
+    """The median second difference of the logarithms of successive swings: 0 for an exponential decay."""
+    return float(np.median(np.abs(np.diff(np.log(sizes), 2))))
+
+
+def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -> bool:
+    """Whether swings decay evenly, and none after them is larger than the first one."""
+    first = max(moving[:2]) if start == 0 else moving[0]
+    return bool(
+        sizes.max() <= _STILL_GROWING * swings.sampled * first
+        and first > _VISIBLE * swings.least
+        and _bend(moving) <= _ROUGH + swings.least / np.median(moving)
+    )
+
+
+def _piece(
+    time_s: Times, reading: PerSample, swings: Swings, decay: _Decay, following: _Decay | None
+) -> RecordPiece:
+    """The samples of a decay, from the release until something else acts, the body rests, or the record ends."""
+    noise, usual = noise_of(reading), float(np.median(swings.usual[decay.start : decay.start + decay.count]))
+    turns = swings.at[decay.start : decay.start + decay.count + 1]
+    first, held = 0, 0.0
+    if not decay.whole:
         # From the first sample of the largest reading, or from the last one of a hold.
-        size = np.abs(away[starts[released] : ends[released]])
-        near = int(starts[released]) + np.flatnonzero(size >= (1.0 - _AT_TURN) * size.max())
-        held = time_s[near[-1]] - time_s[near[0]] > _HELD * usual
-        first = int(near[-1]) if held else int(starts[released]) + int(np.argmax(size))
-        if place + 1 < len(spans):
-            hand = spans[place + 1][0]
-            last = max(int(ends[hand - 1]), int(np.searchsorted(time_s, time_s[starts[hand]] - usual)))
-            halves = hand - released
-        else:
-            last = _without_long_rest(time_s, first, moved, clear=clear)
-            halves = peaks.size - released
-        if halves >= _LEAST_HALVES:
-            pieces.append(RecordPiece(first, last))
-    return pieces or whole
+        turn, size = int(turns[0]), 0.5 * float(swings.size[decay.start])
+        part = slice(int(swings.reached[decay.start]), int(swings.left[decay.start]) + 1)
+        near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= _AT_TURN * size)
+        still = near.size and time_s[near[-1]] - time_s[near[0]] > _HELD * usual
+        first = max(turn, int(near[-1])) if still else turn
+        free = free_from(time_s, reading, first, turns[1:], noise)
+        first, held = free, float(time_s[free] - time_s[first])
+    moved = int(turns[-1])
+    if (stop := decay.stopped(swings)) is not None:
+        last = int(swings.reached[min(stop + 1, swings.at.size - 1)]) + 1
+        before = swings.at[decay.start + 1 : stop + 1]
+        last = free_until(time_s, reading, max(last, int(before[-1]) + 1), before, noise)
+        return RecordPiece(first, last, decay.doubt, held, stopped=True)
+    last = reading.size
+    if noise * _NOISES <= _BAND * 0.5 * swings.size[decay.start]:  # else the motion continues in the noise
+        last = _without_long_rest(time_s, first, moved + 1)
+    if following is not None:
+        # The hand acts from the first extreme on, from which it moves the body noticeably.
+        after = slice(decay.until, following.start + 1)
+        acts = np.flatnonzero(swings.size[after] > _BAND * swings.size[following.start])
+        at = int(swings.left[decay.until + int(acts[0])])
+        last = min(last, max(moved + 1, int(np.searchsorted(time_s, time_s[at] - usual))))
+        if decay.start + decay.count >= decay.until - 1:  # it still swings when the hand acts
+            last = free_until(time_s, reading, last, swings.at[decay.start + 1 : decay.until], noise)
+    return RecordPiece(first, last, decay.doubt, held)
+
+
+def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
+    """The decays that are runs, and with a doubt those that are the motion of something else.
+
+    A brief motion is not a run if it swings at another frequency than the longest one; nor if it is small, beside
+    the centre of the longest one and just before a release: a hand holds the body there.
+    """
+    if len(found) < 2:
+        return list(found)
+    lasts = np.array([decay.lasts(swings) for decay in found])
+    halves = lasts / [decay.count for decay in found]
+    sizes = np.array([swings.size[decay.start] for decay in found])
+    at = [reading[swings.at[decay.start : decay.start + decay.count + 1]] for decay in found]
+    centres = np.array([float(np.median(0.5 * (turns[1:] + turns[:-1]))) for turns in at])
+    most = int(np.argmax(lasts))
+    brief = lasts < _BRIEF * lasts[most]
+    other = (halves > _OTHER * halves[most]) | (halves < halves[most] / _OTHER)
+    small = sizes < _SMALL * sizes[most]
+    following = np.append([found[k + 1].hand <= found[k].until for k in range(len(found) - 1)], [False])
+    beside = (np.abs(centres - centres[most]) > sizes) & following
+    judged = []
+    for k, decay in enumerate(found):
+        if brief[k] and small[k] and (beside[k] or other[k]):
+            continue
+        if brief[k] and other[k]:
+            own, usual = 0.5 / halves[k], 0.5 / halves[most]
+            what = f"it swings at {own:.3g} Hz for {lasts[k]:.3g} s, and the longest run at {usual:.3g} Hz"
+            decay = replace(decay, doubt=what)
+        judged.append(decay)
+    return judged
 
 
 def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
     """The runs of a record of rates: from the largest rate after each release, which cannot be due to a hand."""
     whole = [RecordPiece(0, rate.size)]
-    noise = _noise_of(rate)
+    noise = _NOISES * noise_of(rate)
     centred = _centred(rate, noise)
     if centred is None:
         return whole
@@ -119,7 +303,8 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
     drift = noise * sqrt(float(time_s[-1] - time_s[0]) * float(np.median(np.diff(time_s))))  # of summed noise
     found = []
     for piece in find_runs(time_s, angle, drift):
-        inside = np.flatnonzero((ends > piece.first) & (starts < piece.last))
+        let_go = piece.first if piece.first == 0 else _let_go(angle, piece, max(_NOISES * noise_of(angle), drift))
+        inside = np.flatnonzero((ends > let_go) & (starts < piece.last))
         peaks = np.array([np.abs(rate[starts[i] : ends[i]]).max() for i in inside])
         if piece.first == 0 or peaks.size < _LEAST_HALVES:
             found.append(piece)
@@ -127,8 +312,23 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
         later = np.append(np.maximum.accumulate(peaks[::-1])[::-1][1:], 0.0)
         free = int(inside[np.flatnonzero(later <= _STILL_GROWING * peaks)[0]])
         first = int(starts[free]) + int(np.argmax(np.abs(rate[starts[free] : ends[free]])))
-        found.append(RecordPiece(first, piece.last))
+        found.append(replace(piece, first=first, held=0.0))
     return found
+
+
+def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
+    """The first largest angle from which on the excursions no longer grow."""
+    centred = _centred(angle[: piece.last], noise)
+    if centred is None:
+        return piece.first
+    away, starts, ends = centred
+    tops = [int(a) + int(np.argmax(np.abs(away[a:b]))) for a, b in zip(starts, ends, strict=True)]
+    tops = [top for top, end in zip(tops, ends, strict=True) if end > piece.first]
+    growing = (
+        abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in zip(tops, tops[1:], strict=False)
+    )
+    free = next((k for k, grows in enumerate(growing) if not grows), 0)
+    return max(piece.first, tops[free]) if tops else piece.first
 
 
 def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
@@ -163,12 +363,6 @@ def _without_drift(time_s: Times, angle: Angles, starts: NDArray[np.intp], ends:
     return drifted
 
 
-def _noise_of(reading: PerSample) -> float:
-    """A bound of the noise, by fourth differences, which hardly contain a swing."""
-    some = np.abs(np.diff(reading[:_NOISE_OF], 4))
-    return _NOISES * (float(np.median(some)) / (0.6745 * sqrt(70.0))) if some.size else 0.0
-
-
 def _centred(reading: PerSample, noise: float) -> tuple[PerSample, NDArray[np.intp], NDArray[np.intp]] | None:
     """A reading relative to its centre, and its excursions; None if it has too few."""
     away: PerSample = reading - np.median(reading)
@@ -193,8 +387,6 @@ def _excursions(away: PerSample, noise: float) -> tuple[NDArray[np.intp], NDArra
     return outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
 
 
-def _without_long_rest(time_s: Times, first: int, end: int, *, clear: bool) -> int:
+def _without_long_rest(time_s: Times, first: int, end: int) -> int:
     """The end of a record that rests for longer than it moves: as much rest as motion is kept."""
-    if not clear:  # the motion continues in the noise
-        return time_s.size
     return int(np.searchsorted(time_s, 2.0 * time_s[end - 1] - time_s[first], side="right"))

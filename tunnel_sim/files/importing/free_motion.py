@@ -1,0 +1,110 @@
+"""Where the motion near a release is free: from where on the nominal model, a free decay about a centre, holds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.vocabulary.quantities import PerSample, Times
+from tunnel_sim.vocabulary.record import Array
+
+_HALVES = 7  # half cycles to which the model is fitted
+_LEAST = 5  # extremes
+_SAMPLES = 300
+_STEPS = 12
+_SETTLED = 1e-9
+_NOISES = 6.0  # standard deviations that a sample of a free motion does not exceed
+_ERRORS = 3.0  # times the error half a cycle later: a nonlinearity grows with the swing
+_CLEARLY = 2.0  # times that: below it nothing is left out
+_OF_SWING = 0.01  # of the amplitude: slight nonlinearities change a half cycle by less
+
+
+def free_from(
+    time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float
+) -> int:
+    """The first sample from which on the motion is free; ``first`` itself, or later.
+
+    A free decay is fitted to the half cycles after the first extreme that is certainly free, and extended back.
+
+    Args:
+        turns: indices of the extremes after ``first``, the certain one first; at least four.
+        noise: standard deviation of the reading's noise.
+    """
+    turns = turns[: _HALVES + 1]
+    if turns.size <= _LEAST:
+        return first
+    return _from(time_s, reading, first, turns, noise)
+
+
+def free_until(
+    time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float
+) -> int:
+    """The index after the last sample of a free motion that something ends; ``last`` itself, or earlier.
+
+    Args:
+        turns: indices of the extremes before ``last``, the latest one last; at least four.
+    """
+    end = reading.size - 1
+    mirrored = (end - turns)[::-1][: _HALVES + 1]
+    if mirrored.size <= _LEAST:
+        return last
+    return reading.size - _from(-time_s[::-1], reading[::-1], reading.size - last, mirrored, noise)
+
+
+def _from(time: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float) -> int:
+    """The first sample of a free motion: the model extended back is as far off as one half cycle later, or less."""
+    away = _away(time, reading, first, turns[:-1])
+    later = _away(time, reading, int(turns[0]), turns[1:])
+    if away is None or later is None:
+        return first
+    swing = 0.5 * float(np.ptp(reading[turns[:2]]))
+    error = float(np.abs(later).max(initial=0.0))
+    most = max(_NOISES * noise, _ERRORS * error, _OF_SWING * swing)
+    if np.abs(away).max(initial=0.0) <= _CLEARLY * most:
+        return first
+    return first + int(np.flatnonzero(np.abs(away) > most)[-1]) + 1
+
+
+def _away(time: Times, reading: PerSample, first: int, turns: NDArray[np.intp]) -> PerSample | None:
+    """Readings before some turning points less the free decay that is fitted between these."""
+    a, b = int(turns[0]), int(turns[-1]) + 1
+    stride = max(1, (b - a) // _SAMPLES)
+    halves_per_s = (turns.size - 1) / float(time[b - 1] - time[a])
+    fitted = _Fit.of(time[a:b:stride] - time[a], reading[a:b:stride], halves_per_s)
+    return None if fitted is None else reading[first:a] - fitted.at(time[first:a] - time[a])
+
+
+class _Fit:
+    """A free decay about a centre, fitted by least squares."""
+
+    def __init__(self, rates: Array, state: Array) -> None:
+        self.rates, self.state = rates, state
+
+    @classmethod
+    def of(cls, time: Array, values: Array, halves_per_s: float) -> _Fit | None:
+        """The fit; None where it does not converge."""
+        rates = np.array([0.0, np.pi * halves_per_s])  # decay rate and angular frequency
+        for _ in range(_STEPS):
+            rows = _rows(time, rates)
+            state = np.linalg.lstsq(rows, values, rcond=None)[0]
+            residual = values - rows @ state
+            motion = rows[:, 1:] @ state[1:]
+            turned = rows[:, 1] * state[2] - rows[:, 2] * state[1]
+            tangent = np.column_stack([rows, -time * motion, time * turned])
+            step = np.linalg.lstsq(tangent, residual, rcond=None)[0][3:]
+            if not np.isfinite(step).all() or abs(step[1]) > 0.5 * rates[1]:
+                return None
+            rates = rates + step
+            if np.abs(step).max() <= _SETTLED * rates[1]:
+                break
+        return cls(rates, np.linalg.lstsq(_rows(time, rates), values, rcond=None)[0])
+
+    def at(self, time: Array) -> Array:
+        """The reading of the decay."""
+        with np.errstate(over="ignore"):
+            return np.asarray(_rows(time, self.rates) @ self.state)
+
+
+def _rows(time: Array, rates: Array) -> Array:
+    fading = np.exp(-rates[0] * time)
+    return np.column_stack([np.ones_like(time), fading * np.cos(rates[1] * time), fading * np.sin(rates[1] * time)])
