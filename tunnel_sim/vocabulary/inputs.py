@@ -20,7 +20,7 @@ InputColumn = Literal[
 ]
 """The columns of a run file that may hold its input, as `INPUTS` describes them."""
 
-_MOMENTS = ("nm", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
+_MOMENTS = ("nm", "n m", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
 _BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
 _SHAKEN = re.compile(r"(?<![a-z])(base|root|table|floor|ground|shaker|platform)(?![a-z])", re.IGNORECASE)
 _ACCELERATION = re.compile(r"(?<![a-z])(acc|accel|acceleration|beschleunigung)(?![a-z])", re.IGNORECASE)

@@ -60,9 +60,11 @@ def is_time(channel: Channel) -> bool:
 def named(channels: Sequence[Channel], wanted: str) -> list[Channel]:
     """The columns of a name, with or without its unit as written in the file, or of a number from 1 on."""
     found = [channel for channel in channels if matches(channel, wanted)]
-    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(channels):
-        found = [channels[int(wanted) - 1]]
-    return found
+    if found or not wanted.isdigit():
+        return found
+    if any(channel.place for channel in channels):
+        return [channel for channel in channels if channel.place == int(wanted)]
+    return list(channels[int(wanted) - 1 : int(wanted)]) if int(wanted) > 0 else []
 
 
 def matches(channel: Channel, wanted: str) -> bool:

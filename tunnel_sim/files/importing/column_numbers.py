@@ -33,8 +33,9 @@ _RATE_FACTS = re.compile(
     r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval)|wf_increment)($|[^a-z])"
+    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
+_OWN_STEP = re.compile(r"(?i)wf_increment|delta_x")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
 
@@ -79,7 +80,8 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     """The interval of samples without times, s, None if it is not stated; and its source."""
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
-    for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
+    # First the step of the very columns, then numbers that describe the whole file.
+    for pattern, is_rate in ((_OWN_STEP, False), (_RATE_FACTS, True), (_STEP_FACTS, False)):
         least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
             if pattern.search(name) and least <= value <= most:

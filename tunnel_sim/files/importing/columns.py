@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import NoReturn
 
 import numpy as np
 
@@ -27,12 +29,12 @@ from tunnel_sim.files.importing.column_numbers import (
     without_overflow,
 )
 from tunnel_sim.files.importing.condition_names import condition_of
-from tunnel_sim.files.importing.inputs import RunInput, find_input, stated_input
+from tunnel_sim.files.importing.inputs import RunInput, find_input, names_input, stated_input
 from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
-from tunnel_sim.vocabulary.quantities import Rows
+from tunnel_sim.vocabulary.quantities import Readings, Rows
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
 _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
@@ -87,8 +89,59 @@ def find_columns(
         counted = replace(pair.reading, values=without_overflow(pair.reading.values, said))
         reading, quantity, unit = in_radians(counted, choices, calibration, said, where)
         driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where)
+        if table.native:
+            said += _apart(table, pair.reading, driven, choices, where)
+            reading = reading if driven is None else _within(reading, driven, said)
         found.append(RunColumns(pair, time, reading, quantity, unit, driven, tuple(said)))
     return found
+
+
+def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -> list[Table]:
+    """The tables of a file without those on the clocks of columns beside the angle.
+
+    Args:
+        tables: in their order; those of a part with several clocks follow one another.
+    """
+    kept = []
+    for _, group in groupby(tables, key=lambda table: (table.part, bool(table.native))):
+        part = list(group)
+        if part[0].native:
+            block = [c for table in part for c in table.channels if c.name in table.native and not is_time(c)]
+            found = _readings(block, None, choices, [], where)
+            if not found:
+                _refuse_without_angle(block, where)
+            part = [table for table in part if any(c.name in table.native for c in found)]
+        kept += part
+    return kept
+
+
+def _apart(
+    table: Table, reading: Channel, driven: RunInput | None, choices: ImportChoices, where: str
+) -> list[str]:
+    """The columns that cannot be aligned with the reading; refused where one of them may be the input."""
+    remarks = []
+    for name, unit, why in table.apart:
+        column = Channel(name, np.empty(0), unit)
+        stated = choices.input is not None and matches(column, choices.input)
+        if stated or (choices.input is None and driven is None and names_input(column)):
+            what = f"'{one_line(name, 40)}' cannot be aligned with '{one_line(reading.name, 40)}': {why}"
+            remedy = "record both on one clock, or give --input none if it is a free decay"
+            raise TunnelError(what, where=where, remedy=remedy)
+        remarks.append(f"'{one_line(name, 40)}' is left out: {why}")
+    return remarks
+
+
+def _within(reading: Readings, driven: RunInput, said: list[str]) -> Readings:
+    """The reading while the input is recorded, NaN before and after; the samples there are counted."""
+    known = np.flatnonzero(np.isfinite(driven.values))
+    outside = np.ones(reading.size, dtype=bool)
+    if known.size:
+        outside[known[0] : known[-1] + 1] = False
+    lost = int(np.count_nonzero(outside & np.isfinite(reading)))
+    if not lost:
+        return reading
+    said.append(f"'{one_line(driven.channel.name, 40)}' has no sample at {lost} of {reading.size}: left out")
+    return np.where(outside, np.nan, reading)
 
 
 def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
@@ -101,16 +154,21 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
         ends = [*starts[1:], len(table.channels)]
         blocks = [table.channels[start:end] for start, end in zip(starts, ends, strict=True)]
     pairs = []
+    if table.native:  # the reading has the clock of the table
+        own = (
+            name for name in choices.angle if any(c.name in table.native for c in named(table.channels, name))
+        )
+        choices = choices.model_copy(update={"angle": tuple(own)})
     for block in blocks:
         remarks: list[str] = []
-        named = [channel for channel in block if is_time(channel)]
+        clocks = [channel for channel in block if is_time(channel)]
         time = None  # where the samples follow at a stated rate
         if choices.time is not None:
             time = _chosen(block, choices.time, "--time", where)[0]
-        elif named:
-            time = named[0]
-            if len(named) > 1:
-                remarks.append(f"times from '{time.name}', the first of {len(named)} columns of times")
+        elif clocks:
+            time = clocks[0]
+            if len(clocks) > 1:
+                remarks.append(f"times from '{time.name}', the first of {len(clocks)} columns of times")
         elif choices.rate is None:
             for channel in _unconditional(block, choices):
                 numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
@@ -126,16 +184,21 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
                     )
                     remarks.append(f"times from '{time.name}': {why}")
                     break
-        readings = _readings(block, time, choices, remarks, where)
+        own_clock = [c for c in block if not table.native or c.name in table.native]
+        readings = _readings(own_clock, time, choices, remarks, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
             run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
             pairs.append(ColumnPair(run, time, reading, tuple(remarks)))
     if not pairs:
-        what = f"no column of angles (columns found: {listed(table.channels)})"
-        refuse_without_unit(table.channels, where)
-        raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
+        _refuse_without_angle(table.channels, where)
     return pairs
+
+
+def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:
+    refuse_without_unit(channels, where)
+    what = f"no column of angles (columns found: {listed(channels)})"
+    raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
@@ -158,14 +221,14 @@ def _readings(
     others = [c for c in free if not is_input(c) and c is not driving]
     levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
     for c in others:
-        kind, named = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
+        kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
         if not _span(c) > 0.0:
             continue
-        if kind == "angle" or (named and kind in ("counts", "voltage")):
+        if kind == "angle" or (by_name and kind in ("counts", "voltage")):
             levels[0].append(c)
-        elif c.unit == "" and named:
+        elif c.unit == "" and by_name:
             levels[1].append(c)
-        elif c.unit and kind == "" and named:  # in an unknown unit, which the user is asked for
+        elif c.unit and kind == "" and by_name:  # in an unknown unit, which the user is asked for
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)

@@ -53,6 +53,12 @@ def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel
     return found[0] if found else None
 
 
+def names_input(channel: Channel) -> bool:
+    """Whether a column may be an input by its name and unit, and is not a condition."""
+    plausible = is_input(channel) or _claimed(channel) is not None or _NAMES.search(channel.name) is not None
+    return plausible and condition_of(channel.name, channel.unit) is None
+
+
 def find_input(
     channels: Sequence[Channel],
     beside: Sequence[Channel | None],
@@ -85,9 +91,7 @@ def find_input(
     candidates = exact
     for channel in () if exact else others:
         good = np.isfinite(channel.values) & np.isfinite(reading)
-        plausible = _claimed(channel) or _NAMES.search(channel.name)
-        conditional = condition_of(channel.name, channel.unit) is not None
-        if conditional or not plausible or np.count_nonzero(good) < 16:
+        if not names_input(channel) or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
         with suppress(TunnelError):  # it is not the motion itself

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
 from tunnel_sim.files.importing.column_numbers import Calibration
-from tunnel_sim.files.importing.columns import RunColumns, find_columns
+from tunnel_sim.files.importing.columns import RunColumns, find_columns, with_readings
 from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
@@ -75,7 +75,7 @@ def raw_records(
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
-    for table in long or source.tables:
+    for table in with_readings(long or source.tables, choices, shown(source.path)):
         where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
         for columns in find_columns(table, choices, calibration, where):
             said = [*columns.said]

@@ -42,8 +42,10 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
     values = (np.frombuffer(array) for array in arrays)
     tables = []
     for table in found["tables"]:
-        channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
-        tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
+        channels = tuple(Channel(name, next(values), *more) for name, *more in table["channels"])
+        listed = {key: tuple(table[key]) for key in ("said", "native")}
+        apart = tuple(tuple(column) for column in table["apart"])
+        tables.append(Table(**table | listed | {"channels": channels, "apart": apart}))
     return tables
 
 
@@ -56,7 +58,7 @@ def _read(request: dict[str, str], contents: list[bytes]) -> Message:
     tables = pkgutil.resolve_name(request["reader"]).read_tables(contents.pop(), request["where"])
     described = [
         {field.name: getattr(table, field.name) for field in fields(Table)}
-        | {"channels": [(channel.name, channel.unit) for channel in table.channels]}
+        | {"channels": [(channel.name, channel.unit, channel.place) for channel in table.channels]}
         for table in tables
     ]
     columns = [np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels]

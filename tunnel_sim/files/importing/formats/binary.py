@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
 from tunnel_sim.files.importing.formats.text import facts_in
+from tunnel_sim.files.importing.formats.waveforms import Waveform, aligned_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import FileTable, Reader, faults
@@ -22,6 +24,12 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library, one_line
 
 _REMEDY = "write the file again, as Parquet or as text"
+_TDMS_UNITS = ("unit_string", "NI_UnitDescription")
+_TDMS_CLOCK = (
+    "wf_start_time", "wf_start_offset", "wf_increment", "wf_samples", "wf_xname", "wf_xunit_string",
+    "wf_time_pref",
+)  # fmt: skip
+"""Properties of a channel that state its unit, and its clock."""
 
 
 def _read_run(content: bytes, where: str, most: int) -> FileTable:
@@ -189,25 +197,38 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
         check_count(len(channels), limits.COLUMNS, "channels", where, remedy)
         check_size(sum(len(channel) for channel in channels), where)
         for group in groups:
-            numeric = [c for c in group.channels() if len(c) and np.dtype(c.dtype).kind in "iufb"]
-            for length in dict.fromkeys(len(channel) for channel in numeric):
-                facts = _tdms_numbers(file.properties) | _tdms_numbers(group.properties)
-                columns = []
-                for channel in numeric:
-                    if len(channel) == length:
-                        name, unit = split_unit(channel.name)
-                        stated = str(channel.properties.get("unit_string", ""))
-                        facts |= _tdms_numbers(channel.properties)
-                        values = channel[:].astype(np.float64)
-                        columns.append(Channel(name, values, known_unit(stated) or unit))
-                part = group.name if len(groups) > 1 else ""
-                size = f"{counted(len(columns), 'channel')} of {counted(length, 'sample')}"
-                said = (f"TDMS file: group '{group.name}', {size}",)
-                tables.append(Table(tuple(columns), part, facts, said))
+            part = group.name if len(groups) > 1 else ""
+            waves = [
+                _tdms_wave(place, channel)
+                for place, channel in enumerate(group.channels(), 1)
+                if len(channel) and np.dtype(channel.dtype).kind in "iufb"
+            ]
+            stated = file.properties | group.properties
+            texts = _tdms_texts(stated)
+            for table in aligned_tables(waves, f"TDMS file: group '{group.name}'", "wf_increment"):
+                facts = {**_tdms_numbers(stated), **table.facts}
+                tables.append(replace(table, part=part, facts=facts, texts={**texts, **table.texts}))
     return tables
 
 
-def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
+def _tdms_wave(place: int, channel: Any) -> Waveform:
+    """A channel with the clock and the unit that its properties state."""
+    properties = channel.properties
+    name, unit = split_unit(channel.name)
+    stated = next((str(properties[key]).strip() for key in _TDMS_UNITS if properties.get(key)), "")
+    clock = {key: properties[key] for key in _TDMS_CLOCK if key in properties}
+    offset, increment = (
+        float(value) if isinstance(value := clock.get(key), int | float | np.number) else 0.0
+        for key in ("wf_start_offset", "wf_increment")
+    )
+    start = clock.get("wf_start_time")
+    since = int(start.astype("datetime64[ns]").astype(np.int64)) if isinstance(start, np.datetime64) else None
+    others = {key: value for key, value in properties.items() if key not in (*_TDMS_CLOCK, *_TDMS_UNITS)}
+    column = Channel(name, channel[:].astype(np.float64), known_unit(stated) or stated or unit, place)
+    return Waveform(column, increment, offset, since, _tdms_numbers(others), _tdms_texts(others))
+
+
+def _tdms_numbers(properties: Mapping[str, object]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, value in properties.items():
         if isinstance(value, int | float | np.number):
@@ -215,6 +236,14 @@ def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
         elif isinstance(value, str):  # such as "12 m/s"
             found |= facts_in([f"{name}: {value}"])
     return found
+
+
+def _tdms_texts(properties: Mapping[str, object]) -> dict[str, str]:
+    return {
+        name: value
+        for name, value in properties.items()
+        if isinstance(value, str) and value.strip() and not facts_in([f"{name}: {value}"])
+    }
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)

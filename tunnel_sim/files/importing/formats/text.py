@@ -326,7 +326,7 @@ def tables_of(
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
         if number.null_count() < number.len():
-            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit))
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1))
     table = replace(table, channels=tuple(channels), headed=layout.headed)
     tables = [table]
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
