@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.formats.labview import MAGIC, read_labview_tables
 from tunnel_sim.files.importing.formats.text import TEXT, read_text_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.readers import load_reader, reader_place
@@ -104,7 +105,9 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
             remedy = "give the file the ending of its format, or export it again"
             raise TunnelError(what, where=where, remedy=remedy)
     known: dict[str, str] = {}
-    if place is None:
+    if place is None and content.startswith(MAGIC):
+        tables, known = read_labview_tables(content, where)
+    elif place is None:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
