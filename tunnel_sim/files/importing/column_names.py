@@ -13,7 +13,7 @@ RUN_MARK = re.compile(
     r"[\s_,;.#(\[-]*(?:run|trial|test|swing|rep|versuch|messung|lauf)[\s_#.-]*(\d+)[)\]]?\s*$", re.IGNORECASE
 )
 _TIME = re.compile(
-    r"(?<![a-z])(t|time|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
+    r"(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
     re.IGNORECASE,
 )
 ANGLE = re.compile(
@@ -42,6 +42,16 @@ def named_kind(name: str) -> str:
     if _ACCELERATION.search(words):
         return "acceleration"
     return "rate" if _RATE.search(words) else ""
+
+
+_VOLTAGE = re.compile(
+    r"(?i).*(?<![a-z])(voltage|spannung|v_?out|u_?out)(?![a-z]).*|(.*/)?(ai|ch|channel|kanal|adc)[ _]?\d+"
+)
+
+
+def names_voltage(name: str) -> bool:
+    """Whether a name is that of a voltage, or of a channel of a converter or an oscilloscope."""
+    return _VOLTAGE.fullmatch(_JOINED.sub("_", name)) is not None
 
 
 def stem(name: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.column_names import listed, named_kind
+from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
@@ -31,7 +31,8 @@ _LONGEST_FORMULA = 200  # characters
 _NUMBER = r"([+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 _VARIABLE = r"(?:[VvXxUu]|volts?)"
 _LINE = re.compile(
-    rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*{_VARIABLE}\s*(?:/\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
+    rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*{_VARIABLE}\s*"
+    rf"(?:/\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
 )
 """``a + b*V``, ``b*V + a`` or ``V/d``: offset, factor or its sign, divisor and offset behind."""
 _BRACKET = re.compile(
@@ -43,9 +44,9 @@ _RATE_FACTS = re.compile(
     r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(ts|dt|delta_?t|increment|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
+    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
-_OWN_STEP = re.compile(r"(?i)wf_increment|delta_x")
+_OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
 
@@ -210,6 +211,10 @@ def in_radians(
         if calibration is None:
             _ask_for_unit(reading, kinds, "--unit", where)
             refuse_without_unit([reading], where)
+            if names_voltage(reading.name):
+                what = f"'{one_line(reading.name, 40)}' may be a voltage by its name, and nothing states its unit"
+                remedy = 'give --calibration "a + b*V", or --unit if it is an angle'
+                raise TunnelError(what, where=where, remedy=remedy)
         unit, swing = guessed_angle_unit(values)
         said.append(
             f"the file states no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit "
@@ -229,7 +234,7 @@ def in_radians(
 
 
 def _straight_line(text: str) -> tuple[float, float] | None:
-    """Offset and factor of a formula such as ``0.1 + 20*V``, ``12*(V - 2.5)`` or ``(V - 2.5)/0.08``; None: not one."""
+    """Offset and factor of a formula such as ``0.1 + 20*V``, ``12*(V - 2.5)`` or ``(V - 2)/0.08``; None: not one."""
     text = text[:_LONGEST_FORMULA]
     found, bracket = _LINE.fullmatch(text), _BRACKET.fullmatch(text)
     if found is not None:

@@ -28,16 +28,28 @@ from tunnel_sim.files.importing.column_numbers import (
     refuse_without_unit,
     without_overflow,
 )
-from tunnel_sim.files.importing.condition_names import condition_of
-from tunnel_sim.files.importing.inputs import RunInput, find_input, names_input, stated_input
+from tunnel_sim.files.importing.condition_names import condition_of, resembles
+from tunnel_sim.files.importing.inputs import (
+    RunInput,
+    find_input,
+    moves_before,
+    names_command,
+    names_input,
+    stated_input,
+)
 from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.inputs import without_command
 from tunnel_sim.vocabulary.quantities import Readings, Rows
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
 _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
+_JUDGED = 200_000  # samples of a column that is not used, for its effect on the angle
+_MOST_JUDGED = 8  # columns
+_LEAST_JUDGED = 16  # samples
+_UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is that of an angle
 _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
@@ -88,12 +100,45 @@ def find_columns(
         time = in_seconds(pair.time, pair.reading.values.size, table.facts, choices, said, where)
         counted = replace(pair.reading, values=without_overflow(pair.reading.values, said))
         reading, quantity, unit = in_radians(counted, choices, calibration, said, where)
-        driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where)
+        driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where, unit)
         if table.native:
             said += _apart(table, pair.reading, driven, choices, where)
             reading = reading if driven is None else _within(reading, driven, said)
         found.append(RunColumns(pair, time, reading, quantity, unit, driven, tuple(said)))
+    if len(found) == 1:  # beside several runs, other columns are those of other runs
+        found = [replace(found[0], said=(*found[0].said, *_unused(table, found[0], choices)))]
     return found
+
+
+def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
+    """The columns that are not used, and those of them that move before or with the reading."""
+    named_before = " ".join(columns.said)
+    others = [
+        channel
+        for channel in _unconditional(table.channels, choices)
+        if not any(channel is one for one in columns.used)
+        and not is_time(channel)
+        and f"'{one_line(channel.name, 40)}'" not in named_before
+        and resembles(channel.name, channel.unit) is None
+        and _span(channel) > 0.0
+    ]
+    reading = columns.reading[:_JUDGED]
+    moving = []
+    for channel in others[:_MOST_JUDGED]:
+        values = channel.values[:_JUDGED]
+        good = np.isfinite(values) & np.isfinite(reading)
+        if np.count_nonzero(good) >= _LEAST_JUDGED and moves_before(values[good], reading[good]):
+            moving.append(channel)
+    remarks = [
+        f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; "
+        "--input uses it if it drives the body"
+        for c in moving
+        if columns.input is None
+    ]
+    rest = [channel for channel in others if channel not in moving or columns.input is not None]
+    if rest:
+        remarks.append(f"columns that are not used: {listed(rest)}")
+    return remarks
 
 
 def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -> list[Table]:
@@ -219,26 +264,16 @@ def _readings(
     free = [c for c in _unconditional(block, choices) if c is not time]
     driving = stated_input(block, choices)
     others = [c for c in free if not is_input(c) and c is not driving]
-    levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
-    for c in others:
-        kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
-        if not _span(c) > 0.0:
-            continue
-        if kind == "angle" or (by_name and kind in ("counts", "voltage")):
-            levels[0].append(c)
-        elif c.unit == "" and by_name:
-            levels[1].append(c)
-        elif c.unit and kind == "" and by_name:  # in an unknown unit, which the user is asked for
-            levels[2].append(c)
-        elif kind == "counts":
-            levels[3].append(c)
-        elif c.unit == "" and not OTHER.search(c.name) and not named_kind(c.name):
-            levels[4].append(c)
-        elif kind == "voltage":
-            levels[5].append(c)
-        elif kind in ("rate", "acceleration"):
-            levels[6].append(c)
-    found = next((level for level in levels if level), [])
+    measured = [c for c in others if not names_command(c)]
+    level, found = _likeliest(measured)
+    if level >= _UNNAMED and len(measured) < len(others):
+        twins = {without_command(c.name) for c in others if c not in measured}
+        own = [c for c in measured if c.name.strip().lower() in twins]
+        if found and not own:
+            command = next(one_line(c.name, 40) for c in others if c not in measured)
+            what = f"'{command}' is a command by its name, and no column beside it is named as the angle"
+            raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
+        found = own or _likeliest(others)[1]
     widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
     still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
     said += [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
@@ -252,6 +287,30 @@ def _readings(
         raise TunnelError(what, where=where, remedy=f'give --angle "{found[0].name}", or another of them')
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
+
+
+def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
+    """The columns that are most likely angles, and how they show it: from 0, most certain, to 7, not at all."""
+    levels: list[list[Channel]] = [[] for _ in range(7)]
+    for c in channels:
+        kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
+        if not _span(c) > 0.0:
+            continue
+        if kind == "angle" or (by_name and kind in ("counts", "voltage")):
+            levels[0].append(c)
+        elif c.unit == "" and by_name:
+            levels[1].append(c)
+        elif c.unit and kind == "" and by_name:  # in an unknown unit, which the user is asked for
+            levels[2].append(c)
+        elif kind == "counts":
+            levels[3].append(c)
+        elif c.unit == "" and not OTHER.search(c.name) and not named_kind(c.name):
+            levels[_UNNAMED].append(c)
+        elif kind == "voltage":
+            levels[5].append(c)
+        elif kind in ("rate", "acceleration"):
+            levels[6].append(c)
+    return next(((at, level) for at, level in enumerate(levels) if level), (len(levels), []))
 
 
 def _unconditional(block: Sequence[Channel], choices: ImportChoices) -> list[Channel]:

@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (LVM): text with a header for each segment, which states units and clocks of its columns."""
+"""LabVIEW measurement files (LVM): text in segments, whose headers state the units and clocks of the columns."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def read_labview_tables(content: bytes, where: str) -> tuple[list[Table], dict[s
 
 def _header(content: bytes, dialect: Dialect | None) -> _Header:
     lines = content.decode(errors="replace").splitlines()
-    cells = {}
+    cells: dict[str, Sequence[str]] = {}
     for line in lines:
         key, *rest = dialect.split(line) if dialect else re.split(r"[\t,;]", line)
         if key:
@@ -190,23 +190,22 @@ def _by_clocks(
         clock = before[-1] if before else None
         place = labels[channel.place - 1]
         step, offset = (header.number(key, place) for key in ("Delta_X", "X0"))
-        values, times = channel.values, None
+        values = channel.values
         known = np.flatnonzero(np.isfinite(values))
         if clock is not None and len(clocks) > 1:  # a column of times for each reading
             times = clock.values[known]
             offset = float(times[0]) if times.size else offset
-            step = float(np.median(np.diff(times))) if times.size > 1 else step
+            steps = np.diff(times)
+            usual = float(np.median(steps)) if steps.size else 0.0
+            step = usual if steps.size and float(np.ptp(steps)) < _NEAR * usual else 0.0  # else not even
         count = int(known[-1]) + 1 if known.size else 0
         since = header.since(place) if not offset > _SINCE_1904 else None
         step, offset = (number if np.isfinite(number) else 0.0 for number in (step, offset))
         waves.append(Waveform(replace(channel, values=values[:count]), step, offset, since))
     pairs = zip(readings, waves, strict=True)
     if clocks and all(_agree(clocks, channel, wave, waves[0], readings[0]) for channel, wave in pairs):
-        first, rows = clocks[0], readings[0].values.size
-        said = (
-            f"{kind}, {counted(len(readings), 'column')} of {counted(rows, 'sample')} beside their times",
-        )
-        return [Table((first, *readings), said=said)]
+        size = f"{counted(len(readings), 'column')} of {counted(clocks[0].values.size, 'sample')}"
+        return [Table((clocks[0], *readings), said=(f"{kind}, {size} beside their times",))]
     tables = aligned_tables(waves, kind, "Delta_X")
     if len(tables) > 1 or not waves or not waves[0].timed:
         return tables
