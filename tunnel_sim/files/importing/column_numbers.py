@@ -87,6 +87,11 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
     return unit
 
 
+def describes_samples(name: str) -> bool:
+    """Whether a number of a file is the rate or the step of its samples, by its name."""
+    return any(pattern.search(name) for pattern in (_OWN_STEP, _RATE_FACTS, _STEP_FACTS))
+
+
 def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
     """The interval of samples without times, s, None if it is not stated; and its source."""
     if choices.rate is not None:
@@ -234,7 +239,7 @@ def in_radians(
 
 
 def _straight_line(text: str) -> tuple[float, float] | None:
-    """Offset and factor of a formula such as ``0.1 + 20*V``, ``12*(V - 2.5)`` or ``(V - 2)/0.08``; None: not one."""
+    """Offset and factor of a formula such as ``0.1 + 20*V``, ``12*(V - 2.5)`` or ``(V - 2)/3``; None: not one."""
     text = text[:_LONGEST_FORMULA]
     found, bracket = _LINE.fullmatch(text), _BRACKET.fullmatch(text)
     if found is not None:

@@ -19,6 +19,7 @@ from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_sh
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
+from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 from tunnel_sim.vocabulary.inputs import InputColumn
@@ -83,7 +84,7 @@ def raw_records(
             stated = find_conditions(table, columns.used, choices, said, where).of_rows(kept)
             stated = replace(stated, named=named, hints=(*stated.hints, *short))
             run = columns.pair.run
-            file = source.path.stem if several or not (table.part or run) else ""
+            file = stem_of(source.path) if several or not (table.part or run) else ""
             name = one_line("-".join(part for part in (file, table.part, run) if part))
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
             found += _records(name, source.path, table, columns, kept, stated, choices, said, where)

@@ -79,6 +79,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
         datasets: dict[str, Any] = {}
         attributes: dict[str, NDArray[np.generic]] = {}
         runs: dict[str, str] = {}
+        texts: dict[str, str] = {}
 
         def visit(path: str, item: Any) -> None:
             remedy = "leave out datasets that are not needed"
@@ -100,7 +101,10 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 elif group and name == "drive_hold" and isinstance(stated := item.attrs[name], str):
                     attributes[f"{path}/{name}"] = np.array(hold_order(stated))
                 elif group and isinstance(stated := item.attrs[name], str):
-                    attributes.update(_number_in(path, name, stated))
+                    if found := _number_in(path, name, stated):
+                        attributes.update(found)
+                    elif stated.strip():
+                        texts[f"{path}/{name}".lstrip("/")] = stated
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
@@ -115,7 +119,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
             elif item.dtype.kind in "iufb":
                 arrays[path] = item[()]
         units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
-    return tables_of_arrays(arrays, "HDF5 file", units, runs)
+    return tables_of_arrays(arrays, "HDF5 file", units, runs, texts)
 
 
 def _hdf5_unit(item: Any) -> str:
@@ -148,7 +152,7 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
         check_size(total // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know only paths
     arrays: dict[str, NDArray[np.generic]] = {}
-    runs = {}
+    runs, texts = {}, {}
     for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
         group, below, name = path.rpartition("/")
         if not isinstance(value, str):
@@ -157,9 +161,11 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
             runs[group] = value
         elif below and name == "drive_hold":
             arrays[path] = np.array(hold_order(value))
-        else:
-            arrays |= _number_in(group, name, value)
-    return tables_of_arrays(arrays, "MAT file", runs=runs)
+        elif found := _number_in(group, name, value):
+            arrays |= found
+        elif value.strip():
+            texts[path] = value
+    return tables_of_arrays(arrays, "MAT file", runs=runs, texts=texts)
 
 
 def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:

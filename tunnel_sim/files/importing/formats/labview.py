@@ -210,7 +210,7 @@ def _by_clocks(
     if len(tables) > 1 or not waves or not waves[0].timed:
         return tables
     first, table = waves[0], tables[0]
-    clock = Channel(_X, first.offset + first.step * np.arange(first.size), "s")
+    clock = Channel(_X, first.offset + first.step * np.arange(first.size, dtype=np.float64), "s")
     remarks = (f"{table.said[0]}, at the times X0 + i Delta_X of the header", *table.said[1:])
     return [replace(table, channels=(clock, *table.channels), said=remarks)]
 

@@ -13,6 +13,7 @@ from typing import Any
 import polars as pl
 
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.condition_names import mentions_wind
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
@@ -284,7 +285,12 @@ def read_text_tables(
     if layout.runs is not None:  # the name of a run is kept, even if it is "nan"
         labels = frame_of(content, dialect, layout, text_at, layout.runs, where).to_series()
     frame = frame_of(content, dialect, layout, text_at | {layout.runs}, None, where)
-    table = Table((), said=(remark,), facts=layout.facts)
+    texts = {
+        f"line {i}": line.strip()
+        for i, line in enumerate(head[: layout.first], 1)
+        if len(line) <= _LONG_LINE and mentions_wind(line) and not facts_in([line])
+    }
+    table = Table((), said=(remark,), facts=layout.facts, texts=texts)
     return tables_of(frame, layout, dialect.decimal, labels, table), known
 
 
