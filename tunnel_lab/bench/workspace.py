@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tunnel_lab.bench.work import work_of
+from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
@@ -124,11 +125,11 @@ def common_name(file_names: Sequence[str]) -> str:
     """A name for a campaign of files: their folder's, or the common beginning of their names, or the first name."""
     paths = [re.split(r"[/\\]", unicodedata.normalize("NFKC", name)) for name in file_names]
     if len(paths) == 1:
-        return safe_name(Path(safe_name(paths[0][-1])).stem)
+        return safe_name(stem_of(Path(safe_name(paths[0][-1]))))
     folders = {tuple(path[:-1]) for path in paths}
     if len(folders) == 1 and (folder := folders.pop()) and folder[-1].strip("."):
         return safe_name(folder[-1])
-    stems = [Path(safe_name(path[-1])).stem for path in paths]
+    stems = [stem_of(Path(safe_name(path[-1]))) for path in paths]
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
     shared = "".join(letters[0] for letters in alike)
     # Part of a number, or a letter before differing numbers, is not a name.

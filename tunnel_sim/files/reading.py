@@ -11,6 +11,7 @@ import io
 import json
 import os
 import stat
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from difflib import get_close_matches
@@ -159,6 +160,36 @@ def check_lines(content: bytes, where: str, remedy: str) -> None:
             remedy = "write one sample on each line"
             raise TunnelError(what, where=where, remedy=remedy)
         start = end + 1
+
+
+PACKED = ".gz"
+"""Ending of files compressed by gzip, after the ending of their content: ``log.csv.gz``."""
+
+
+def stem_of(path: Path) -> str:
+    """The name of a file without its ending, and without that of its content where it is compressed."""
+    return Path(path.stem).stem if path.suffix.lower() == PACKED else path.stem
+
+
+def unpacked(content: bytes, limit: int, where: str) -> bytes:
+    """The content of a file compressed by gzip, unpacked piece by piece up to a limit in bytes."""
+    parts, size, rest = [], 0, content
+    try:
+        while rest:
+            inflate = zlib.decompressobj(wbits=31)
+            while not inflate.eof:
+                part = inflate.decompress(rest, _CHUNK)
+                rest = inflate.unconsumed_tail
+                size += len(part)
+                check_count(size, limit, "bytes once unpacked", where, "split the file")
+                parts.append(part)
+                if not part and not rest and not inflate.eof:
+                    raise zlib.error("it ends too early")
+            rest = inflate.unused_data.lstrip(b"\0")  # another member, or padding
+    except zlib.error as error:
+        what = f"is not a file compressed by gzip ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy="compress it again, or give it as it is") from None
+    return b"".join(parts)
 
 
 def is_blank(content: bytes) -> bool:

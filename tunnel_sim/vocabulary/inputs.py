@@ -20,7 +20,7 @@ InputColumn = Literal[
 ]
 """The columns of a run file that may hold its input, as `INPUTS` describes them."""
 
-_MOMENTS = ("nm", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
+_MOMENTS = ("nm", "n m", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
 _BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
 _SHAKEN = re.compile(r"(?<![a-z])(base|root|table|floor|ground|shaker|platform)(?![a-z])", re.IGNORECASE)
 _ACCELERATION = re.compile(r"(?<![a-z])(acc|accel|acceleration|beschleunigung)(?![a-z])", re.IGNORECASE)
@@ -28,6 +28,16 @@ _ANGLES: Mapping[str, float] = {
     "rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0, "turns": 2.0 * pi,
 }  # fmt: skip
 _TURNING: Mapping[str, float] = {"rad/s2": 1.0, "deg/s2": pi / 180.0}
+_COMMAND = re.compile(
+    r"(?i)(?<![a-z])(goal|target|set[ _]?point|soll(wert|winkel|position|lage)?|desired|des|ref|reference|"
+    r"demand(ed)?|commanded|(command|cmd)(?=[ _]*[a-zθψφβ])|(?<=[a-zθψφβ][ _])(command|cmd|sp|set))(?![a-z])"
+    r"|^(goal|target|desired|ref|cmd)(pos|position|angle|yaw|theta|q)(?![a-z])|(?<![a-z])q(des|ref|cmd)(?![a-z])"
+)
+_NOT_ANGLE = re.compile(
+    r"(?i)vel|speed|rate|gyro|omega|dot|acc|torque|moment|effort|tau|current|force|volt|pwm|duty|power|wind|tunnel|"
+    r"temp|press|flow|fan|load|kp|kd|ki|gain|time|mass"
+)
+_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _G = 9.80665  # m/s², standard gravity, the unit of accelerometers
 _ALONG: Mapping[str, float] = {"m/s2": 1.0, "mm/s2": 1e-3, "cm/s2": 1e-2, "g": _G, "mg": 1e-3 * _G}
 _PLAIN = str.maketrans({"²": "2", "^": None, "_": "/", " ": None})
@@ -211,6 +221,14 @@ class Command(_OfSpring):
     noun = "command"
     keys = ("servo_kv",)
 
+    def holds(self, name: str, unit: str) -> bool:
+        """An angle that a name calls a goal, a target, a reference or the like; also in the unit of the reading."""
+        if super().holds(name, unit):
+            return True
+        words = _JOINED.sub("_", name)
+        angle = unit in ("", "counts", *_ANGLES) and _NOT_ANGLE.search(words) is None
+        return angle and _COMMAND.search(words) is not None
+
 
 class BaseRotation(Input):
     """The angular acceleration α of a base that turns about the yaw axis; moment = −Izz α.
@@ -272,6 +290,16 @@ class BaseTranslation(_OfGain):
     def factor(self, unit: str) -> float:
         """From a unit of length over time squared, or from g."""
         return _ALONG.get(_plain(unit), 1.0)
+
+
+def without_command(name: str) -> str:
+    """The name of a command without the word that calls it one, in lower case: ``q`` of ``q_ref``."""
+    words = _JOINED.sub("_", name)
+    joined = re.sub(
+        r"(?i)^(goal|target|desired|ref|cmd)(?=pos|angle|yaw|theta|q)|(?<=^q)(des|ref|cmd)$", "", words
+    )
+    rest = joined if joined != words else _COMMAND.sub("", words)
+    return re.sub(r"^[\s_]+|[\s_]+$", "", rest).lower()
 
 
 def _plain(unit: str) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
-from tunnel_sim.files.importing.condition_names import Conditions
+from tunnel_sim.files.importing.condition_names import Conditions, in_si, units_of
+from tunnel_sim.files.importing.units import known_unit
 from tunnel_sim.files.toml_input import (
     OneLine,
     Positive,
@@ -19,7 +21,7 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary.drive import Hold
-from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
 
 
@@ -107,8 +109,26 @@ def read_recipe(path: Path) -> ImportChoices:
     return read_document(Recipe, path, missing=missing).choices
 
 
+_WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*)")
+
+
+def _factor(key: str, unit: str, where: str) -> float:
+    """The factor to SI of a condition in a unit as a user writes it."""
+    factor = in_si(key, known_unit(unit) or unit)
+    if factor is None:
+        allowed = units_of(key)
+        what = f"'{one_line(unit, 20)}' is not a unit of {key}"
+        remedy = f"use one of {allowed}" if allowed != "1" else f"give {key} as a number without a unit"
+        raise TunnelError(what, where=where, remedy=remedy)
+    return factor
+
+
 def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
-    """Conditions from ``key=value``, separated by commas; a value is a number, or a name in the files."""
+    """Conditions from ``key=value``, separated by commas; a value is a number, a number and its unit, or a name.
+
+    Raises:
+        TunnelError: for a text of another form, or a unit that does not measure the condition.
+    """
     numbers: dict[str, float] = {}
     names: dict[str, str] = {}
     for part in text.split(","):
@@ -120,5 +140,9 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
                 what = f"'{part.strip()}' is not of the form key=number"
                 remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
                 raise TunnelError(what, where=where, remedy=remedy) from None
-            names[key] = value
+            number = _WITH_UNIT.fullmatch(value)
+            if number is None or key not in Conditions.model_fields:
+                names[key] = value
+            else:
+                numbers[key] = float(number[1]) * _factor(key, number[2], where)
     return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))

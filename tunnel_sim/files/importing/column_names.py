@@ -13,7 +13,7 @@ RUN_MARK = re.compile(
     r"[\s_,;.#(\[-]*(?:run|trial|test|swing|rep|versuch|messung|lauf)[\s_#.-]*(\d+)[)\]]?\s*$", re.IGNORECASE
 )
 _TIME = re.compile(
-    r"(?<![a-z])(t|time|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
+    r"(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
     re.IGNORECASE,
 )
 ANGLE = re.compile(
@@ -44,6 +44,16 @@ def named_kind(name: str) -> str:
     return "rate" if _RATE.search(words) else ""
 
 
+_VOLTAGE = re.compile(
+    r"(?i).*(?<![a-z])(voltage|spannung|v_?out|u_?out)(?![a-z]).*|(.*/)?(ai|ch|channel|kanal|adc)[ _]?\d+"
+)
+
+
+def names_voltage(name: str) -> bool:
+    """Whether a name is that of a voltage, or of a channel of a converter or an oscilloscope."""
+    return _VOLTAGE.fullmatch(_JOINED.sub("_", name)) is not None
+
+
 def stem(name: str) -> str:
     """The name of a column without the number of its run."""
     return RUN_MARK.sub("", name)
@@ -60,9 +70,11 @@ def is_time(channel: Channel) -> bool:
 def named(channels: Sequence[Channel], wanted: str) -> list[Channel]:
     """The columns of a name, with or without its unit as written in the file, or of a number from 1 on."""
     found = [channel for channel in channels if matches(channel, wanted)]
-    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(channels):
-        found = [channels[int(wanted) - 1]]
-    return found
+    if found or not wanted.isdigit():
+        return found
+    if any(channel.place for channel in channels):
+        return [channel for channel in channels if channel.place == int(wanted)]
+    return list(channels[int(wanted) - 1 : int(wanted)]) if int(wanted) > 0 else []
 
 
 def matches(channel: Channel, wanted: str) -> bool:

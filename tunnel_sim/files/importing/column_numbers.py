@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.column_names import listed, named_kind
+from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
@@ -27,14 +27,26 @@ _NEARLY = 0.75  # of a counter's range: a step this long between two samples is 
 _SMALL = 0.25  # of the range: no other step is longer
 _SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
 _HALF_TURN = pi  # half the span of an angle: a greater one is in degrees
-_NUMBER = r"([+-]?\s*\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)"
-_FORMULA = re.compile(rf"^\s*(?:{_NUMBER}\s*(?=[+-]))?\s*{_NUMBER}?\s*\*?\s*[VvXx]\s*(?:{_NUMBER})?\s*$")
+_LONGEST_FORMULA = 200  # characters
+_NUMBER = r"([+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+_VARIABLE = r"(?:[VvXxUu]|volts?)"
+_LINE = re.compile(
+    rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*{_VARIABLE}\s*"
+    rf"(?:/\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
+)
+"""``a + b*V``, ``b*V + a`` or ``V/d``: offset, factor or its sign, divisor and offset behind."""
+_BRACKET = re.compile(
+    rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*\(([^()]*)\)\s*"
+    rf"(?:([*/])\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
+)
+"""``a + b*(…)`` or ``(…)/d + a``."""
 _RATE_FACTS = re.compile(
     r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval)|wf_increment)($|[^a-z])"
+    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
+_OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
 
@@ -75,11 +87,17 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
     return unit
 
 
+def describes_samples(name: str) -> bool:
+    """Whether a number of a file is the rate or the step of its samples, by its name."""
+    return any(pattern.search(name) for pattern in (_OWN_STEP, _RATE_FACTS, _STEP_FACTS))
+
+
 def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
     """The interval of samples without times, s, None if it is not stated; and its source."""
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
-    for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
+    # First the step of the very columns, then numbers that describe the whole file.
+    for pattern, is_rate in ((_OWN_STEP, False), (_RATE_FACTS, True), (_STEP_FACTS, False)):
         least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
             if pattern.search(name) and least <= value <= most:
@@ -198,6 +216,10 @@ def in_radians(
         if calibration is None:
             _ask_for_unit(reading, kinds, "--unit", where)
             refuse_without_unit([reading], where)
+            if names_voltage(reading.name):
+                what = f"'{one_line(reading.name, 40)}' may be a voltage by its name, and nothing states its unit"
+                remedy = 'give --calibration "a + b*V", or --unit if it is an angle'
+                raise TunnelError(what, where=where, remedy=remedy)
         unit, swing = guessed_angle_unit(values)
         said.append(
             f"the file states no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit "
@@ -216,20 +238,43 @@ def in_radians(
     return values, quantity, unit
 
 
+def _straight_line(text: str) -> tuple[float, float] | None:
+    """Offset and factor of a formula such as ``0.1 + 20*V``, ``12*(V - 2.5)`` or ``(V - 2)/3``; None: not one."""
+    text = text[:_LONGEST_FORMULA]
+    found, bracket = _LINE.fullmatch(text), _BRACKET.fullmatch(text)
+    if found is not None:
+        before, factor, sign, divisor, behind = found.groups()
+        offset, slope, product = 0.0, 1.0, "/"
+    elif bracket is not None:
+        before, factor, sign, inside, product, divisor, behind = bracket.groups()
+        inner = _straight_line(inside) if "(" not in inside else None
+        if inner is None:
+            return None
+        offset, slope = inner
+    else:
+        return None
+    number = [
+        None if part is None else float(part.replace(" ", "")) for part in (before, factor, divisor, behind)
+    ]
+    if None not in (number[0], number[3]) or (number[2] == 0.0 and product == "/"):
+        return None
+    scale = (-1.0 if sign == "-" else 1.0) if number[1] is None else number[1]
+    scale *= 1.0 if number[2] is None else number[2] if product == "*" else 1.0 / number[2]
+    return scale * offset + (number[0] or number[3] or 0.0), scale * slope
+
+
 def read_calibration(text: str | None) -> Calibration | None:
     """The calibration: a formula such as ``0.1 + 20*V``, or from a text file of volts and angle."""
     if text is None:
         return None
-    formula = _FORMULA.match(text)
-    if formula:
-        before, factor, behind = (part and float(part.replace(" ", "")) for part in formula.groups())
-        if not (before is not None and behind is not None):
-            return float(before or behind or 0.0), float(1.0 if factor is None else factor)
+    line = _straight_line(text)
+    if line is not None:
+        return line
     path = Path(text)
-    if formula or not path.is_file():
+    if not path.is_file():
         raise TunnelError(
             "is not a formula", where=f"--calibration {one_line(text, 40)}",
-            remedy="give 'a + b*V' with numbers for a and b, or the name of a table of two columns",
+            remedy="give 'a + b*V' or 'b*(V - c)' with numbers, or the name of a table of two columns",
         )  # fmt: skip
     channels = read_source(path, ImportChoices()).tables[0].channels
     if len(channels) != 2 or channels[0].values.size < 2:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import NoReturn
 
 import numpy as np
 
@@ -26,16 +28,28 @@ from tunnel_sim.files.importing.column_numbers import (
     refuse_without_unit,
     without_overflow,
 )
-from tunnel_sim.files.importing.condition_names import condition_of
-from tunnel_sim.files.importing.inputs import RunInput, find_input, stated_input
+from tunnel_sim.files.importing.condition_names import condition_of, resembles
+from tunnel_sim.files.importing.inputs import (
+    RunInput,
+    find_input,
+    moves_before,
+    names_command,
+    names_input,
+    stated_input,
+)
 from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
-from tunnel_sim.vocabulary.quantities import Rows
+from tunnel_sim.vocabulary.inputs import without_command
+from tunnel_sim.vocabulary.quantities import Readings, Rows
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
 _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
+_JUDGED = 200_000  # samples of a column that is not used, for its effect on the angle
+_MOST_JUDGED = 8  # columns
+_LEAST_JUDGED = 16  # samples
+_UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is that of an angle
 _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
@@ -88,9 +102,93 @@ def find_columns(
         timed = np.where(np.isfinite(time), pair.reading.values, np.nan)
         counted = replace(pair.reading, values=without_overflow(timed, said))
         reading, quantity, unit = in_radians(counted, choices, calibration, said, where)
-        driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where)
+        driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where, unit)
+        if table.native:
+            said += _apart(table, pair.reading, driven, choices, where)
+            reading = reading if driven is None else _within(reading, driven, said)
         found.append(RunColumns(pair, time, reading, quantity, unit, driven, tuple(said)))
+    if len(found) == 1:  # beside several runs, other columns are those of other runs
+        found = [replace(found[0], said=(*found[0].said, *_unused(table, found[0], choices)))]
     return found
+
+
+def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
+    """The columns that are not used, and those of them that move before or with the reading."""
+    named_before = " ".join(columns.said)
+    others = [
+        channel
+        for channel in _unconditional(table.channels, choices)
+        if not any(channel is one for one in columns.used)
+        and not is_time(channel)
+        and f"'{one_line(channel.name, 40)}'" not in named_before
+        and resembles(channel.name, channel.unit) is None
+        and _span(channel) > 0.0
+    ]
+    reading = columns.reading[:_JUDGED]
+    moving = []
+    for channel in others[:_MOST_JUDGED]:
+        values = channel.values[:_JUDGED]
+        good = np.isfinite(values) & np.isfinite(reading)
+        if np.count_nonzero(good) >= _LEAST_JUDGED and moves_before(values[good], reading[good]):
+            moving.append(channel)
+    remarks = [
+        f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; "
+        "--input uses it if it drives the body"
+        for c in moving
+        if columns.input is None
+    ]
+    rest = [channel for channel in others if channel not in moving or columns.input is not None]
+    if rest:
+        remarks.append(f"columns that are not used: {listed(rest)}")
+    return remarks
+
+
+def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -> list[Table]:
+    """The tables of a file without those on the clocks of columns beside the angle.
+
+    Args:
+        tables: in their order; those of a part with several clocks follow one another.
+    """
+    kept = []
+    for _, group in groupby(tables, key=lambda table: (table.part, bool(table.native))):
+        part = list(group)
+        if part[0].native:
+            block = [c for table in part for c in table.channels if c.name in table.native and not is_time(c)]
+            found = _readings(block, None, choices, [], where)
+            if not found:
+                _refuse_without_angle(block, where)
+            part = [table for table in part if any(c.name in table.native for c in found)]
+        kept += part
+    return kept
+
+
+def _apart(
+    table: Table, reading: Channel, driven: RunInput | None, choices: ImportChoices, where: str
+) -> list[str]:
+    """The columns that cannot be aligned with the reading; refused where one of them may be the input."""
+    remarks = []
+    for name, unit, why in table.apart:
+        column = Channel(name, np.empty(0), unit)
+        stated = choices.input is not None and matches(column, choices.input)
+        if stated or (choices.input is None and driven is None and names_input(column)):
+            what = f"'{one_line(name, 40)}' cannot be aligned with '{one_line(reading.name, 40)}': {why}"
+            remedy = "record both on one clock, or give --input none if it is a free decay"
+            raise TunnelError(what, where=where, remedy=remedy)
+        remarks.append(f"'{one_line(name, 40)}' is left out: {why}")
+    return remarks
+
+
+def _within(reading: Readings, driven: RunInput, said: list[str]) -> Readings:
+    """The reading while the input is recorded, NaN before and after; the samples there are counted."""
+    known = np.flatnonzero(np.isfinite(driven.values))
+    outside = np.ones(reading.size, dtype=bool)
+    if known.size:
+        outside[known[0] : known[-1] + 1] = False
+    lost = int(np.count_nonzero(outside & np.isfinite(reading)))
+    if not lost:
+        return reading
+    said.append(f"'{one_line(driven.channel.name, 40)}' has no sample at {lost} of {reading.size}: left out")
+    return np.where(outside, np.nan, reading)
 
 
 def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
@@ -103,16 +201,21 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
         ends = [*starts[1:], len(table.channels)]
         blocks = [table.channels[start:end] for start, end in zip(starts, ends, strict=True)]
     pairs = []
+    if table.native:  # the reading has the clock of the table
+        own = (
+            name for name in choices.angle if any(c.name in table.native for c in named(table.channels, name))
+        )
+        choices = choices.model_copy(update={"angle": tuple(own)})
     for block in blocks:
         remarks: list[str] = []
-        named = [channel for channel in block if is_time(channel)]
+        clocks = [channel for channel in block if is_time(channel)]
         time = None  # where the samples follow at a stated rate
         if choices.time is not None:
             time = _chosen(block, choices.time, "--time", where)[0]
-        elif named:
-            time = named[0]
-            if len(named) > 1:
-                remarks.append(f"times from '{time.name}', the first of {len(named)} columns of times")
+        elif clocks:
+            time = clocks[0]
+            if len(clocks) > 1:
+                remarks.append(f"times from '{time.name}', the first of {len(clocks)} columns of times")
         elif choices.rate is None:
             for channel in _unconditional(block, choices):
                 numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
@@ -128,16 +231,21 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
                     )
                     remarks.append(f"times from '{time.name}': {why}")
                     break
-        readings = _readings(block, time, choices, remarks, where)
+        own_clock = [c for c in block if not table.native or c.name in table.native]
+        readings = _readings(own_clock, time, choices, remarks, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
             run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
             pairs.append(ColumnPair(run, time, reading, tuple(remarks)))
     if not pairs:
-        what = f"no column of angles (columns found: {listed(table.channels)})"
-        refuse_without_unit(table.channels, where)
-        raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
+        _refuse_without_angle(table.channels, where)
     return pairs
+
+
+def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:
+    refuse_without_unit(channels, where)
+    what = f"no column of angles (columns found: {listed(channels)})"
+    raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
@@ -158,26 +266,16 @@ def _readings(
     free = [c for c in _unconditional(block, choices) if c is not time]
     driving = stated_input(block, choices)
     others = [c for c in free if not is_input(c) and c is not driving]
-    levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
-    for c in others:
-        kind, named = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
-        if not _span(c) > 0.0:
-            continue
-        if kind == "angle" or (named and kind in ("counts", "voltage")):
-            levels[0].append(c)
-        elif c.unit == "" and named:
-            levels[1].append(c)
-        elif c.unit and kind == "" and named:  # in an unknown unit, which the user is asked for
-            levels[2].append(c)
-        elif kind == "counts":
-            levels[3].append(c)
-        elif c.unit == "" and not OTHER.search(c.name) and not named_kind(c.name):
-            levels[4].append(c)
-        elif kind == "voltage":
-            levels[5].append(c)
-        elif kind in ("rate", "acceleration"):
-            levels[6].append(c)
-    found = next((level for level in levels if level), [])
+    measured = [c for c in others if not names_command(c)]
+    level, found = _likeliest(measured)
+    if level >= _UNNAMED and len(measured) < len(others):
+        twins = {without_command(c.name) for c in others if c not in measured}
+        own = [c for c in measured if c.name.strip().lower() in twins]
+        if found and not own:
+            command = next(one_line(c.name, 40) for c in others if c not in measured)
+            what = f"'{command}' is a command by its name, and no column beside it is named as the angle"
+            raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
+        found = own or _likeliest(others)[1]
     widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
     still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
     said += [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
@@ -191,6 +289,30 @@ def _readings(
         raise TunnelError(what, where=where, remedy=f'give --angle "{found[0].name}", or another of them')
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
+
+
+def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
+    """The columns that are most likely angles, and how they show it: from 0, most certain, to 7, not at all."""
+    levels: list[list[Channel]] = [[] for _ in range(7)]
+    for c in channels:
+        kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
+        if not _span(c) > 0.0:
+            continue
+        if kind == "angle" or (by_name and kind in ("counts", "voltage")):
+            levels[0].append(c)
+        elif c.unit == "" and by_name:
+            levels[1].append(c)
+        elif c.unit and kind == "" and by_name:  # in an unknown unit, which the user is asked for
+            levels[2].append(c)
+        elif kind == "counts":
+            levels[3].append(c)
+        elif c.unit == "" and not OTHER.search(c.name) and not named_kind(c.name):
+            levels[_UNNAMED].append(c)
+        elif kind == "voltage":
+            levels[5].append(c)
+        elif kind in ("rate", "acceleration"):
+            levels[6].append(c)
+    return next(((at, level) for at, level in enumerate(levels) if level), (len(levels), []))
 
 
 def _unconditional(block: Sequence[Channel], choices: ImportChoices) -> list[Channel]:

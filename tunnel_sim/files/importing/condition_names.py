@@ -53,9 +53,28 @@ _KEYS = {key: re.compile(f"(?i)({names})") for key, names in _NAMES.items()}
 _SYMBOL = re.compile(r"(?i)[vu](_?(0|inf|∞))?|wind|speed")
 _LIKE = {
     "wind_speed": re.compile(rf"{_SYMBOL.pattern}|velocity|geschwindigkeit|wind\W.*"),
-    "spring_stiffness": re.compile(r"(?i)k|spring|feder"),
+    "spring_stiffness": re.compile(
+        r"(?i)k|spring|feder|k[ _]?(spring|theta|[θrst])|"
+        r"(.*[ _])?(spring|feder|stiffness|steifigkeit)[ _]?(k|const\w*|rate)?"
+    ),
 }
 """Names without a unit that may be those of a condition, and of other things."""
+_WINDY = re.compile(
+    r"(?i)(?<![a-z])(wind|air|flow|free_?stream|tunnel|pitot|anemometer|prandtl|fan|blower|gebl[äa]se|str[öo]mung|"
+    r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
+    r"tunnel|ref|fs)(?![a-z])|(?<![a-z])(speed|velocity|geschwindigkeit)(?![a-z])"
+)
+"""Words of a name that suggest a speed of the wind."""
+_NOT_WINDY = re.compile(
+    r"(?i)ang|winkel|dreh|omega|motor|shaft|servo|joint|wheel|yaw|gyro|temp|press(ure)?$|druck$|humid|feucht|density|"
+    r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light"
+)
+_FAN = re.compile(r"(?i)(?<![a-z])(fan|blower|gebl[äa]se|tunnel|wind|windkanal)(?![a-z])")
+_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_DYNAMIC = re.compile(
+    r"(?i)dynamic[ _]?press|staudruck|pitot|prandtl|(?<![a-z])(q[ _]?inf|dp|delta[ _]?p)(?![a-z])"
+)
+_PRESSURES = ("pa", "hpa", "kpa", "mbar", "mmh2o", "inh2o", "")
 _KINDS = {
     "wind_speed": "speed",
     "air_density": "density",
@@ -69,6 +88,18 @@ _SIZES = {
     "width": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
 }
 """Factors to SI of the units of sizes: they name no column, and are not among `UNITS`."""
+
+
+SPEED_IN_TEXT = re.compile(
+    r"(?i)(?<![\w.])(\d+(?:[.,]\d+)?)\s*(m/s|m/sec|ms-1|km/h|kmh|kph|mph|ft/s|fps|knots?|kts?)(?![\w/])"
+)
+WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
+"""A speed in a text, and the words that a wind is on."""
+
+
+def mentions_wind(text: str) -> bool:
+    """Whether a text mentions a speed, or that the wind is on."""
+    return SPEED_IN_TEXT.search(text) is not None or WIND_ON.search(text) is not None
 
 
 def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
@@ -85,9 +116,16 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
 
 def resembles(name: str, unit: str) -> str | None:
     """The condition that a name without a unit, or a unit alone, suggests without stating it; None: none."""
+    words = _JOINED.sub("_", name.strip())
+    if _DYNAMIC.search(words) and unit.lower() in _PRESSURES:
+        return "wind_speed"
     if unit:
-        return next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)
-    return next((key for key, pattern in _LIKE.items() if pattern.fullmatch(name.strip())), None)
+        found = next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)
+        fan = unit in ("rpm", "Hz", "%") and _FAN.search(words) is not None
+        return "wind_speed" if found is None and fan else found
+    found = next((key for key, pattern in _LIKE.items() if pattern.fullmatch(words)), None)
+    windy = found is None and _WINDY.search(words) is not None and _NOT_WINDY.search(words) is None
+    return "wind_speed" if windy else found
 
 
 def in_si(key: str, unit: str) -> float | None:

@@ -17,6 +17,7 @@ from tunnel_sim.files.importing.condition_names import (
 from tunnel_sim.files.importing.formats.text import read_cells
 from tunnel_sim.files.importing.tables import names_runs
 from tunnel_sim.files.importing.units import split_unit
+from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
@@ -75,7 +76,7 @@ class ConditionTable:
 
     def of(self, path: Path, run: str) -> dict[str, float]:
         """Conditions of a run, by its name or the name of its file."""
-        for name in (run, path.name, path.stem):
+        for name in (run, path.name, path.stem, stem_of(path)):
             if _same(name) in self._rows:
                 return self._rows[_same(name)]
         what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.column_numbers import describes_samples
 from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
     RUN_KEYS,
+    SPEED_IN_TEXT,
+    WIND_ON,
     Conditions,
     Hint,
     condition_of,
@@ -22,15 +24,16 @@ from tunnel_sim.files.importing.condition_names import (
     units_of,
 )
 from tunnel_sim.files.importing.condition_table import ConditionTable
-from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.units import claims, split_unit
+from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table
+from tunnel_sim.files.importing.units import claims, known_unit, split_unit
 from tunnel_sim.files.plausible import plausible_values
+from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 
 _OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
-_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
+_LISTED = 10  # statements of a file that are listed in a remark
 
 
 class Unstated(TunnelError):
@@ -114,7 +117,39 @@ def find_conditions(
         if key not in numbers and key not in columns:
             what = f"no column or number '{one_line(text, 40)}' that states {key}"
             raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
+    hints += [hint for name, text in table.texts.items() if (hint := _hint_of_text(name, text)) is not None]
+    said += unused_statements(table, claimed)
     return Stated(numbers, columns, hints=tuple(hints), like=tuple(like))
+
+
+def unused_statements(table: Table, claimed: Mapping[str, str]) -> list[str]:
+    """A remark on the numbers and texts of a table that are neither used nor reported otherwise."""
+    found = []
+    for heading, value in table.facts.items():
+        name, unit = split_unit(heading)
+        used = condition_of(name, unit, alone=True) is not None or any(
+            claims(text, name, unit) for text in claimed.values()
+        )
+        if not (used or heading in INPUT_FACTS or describes_samples(heading) or resembles(name, unit)):
+            found.append(f"{one_line(heading, 40)} = {value:g}")
+    found += [f"{one_line(name, 40)}: '{one_line(text, 60)}'" for name, text in table.texts.items()]
+    more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
+    return [f"stated in the file and not used: {', '.join(found[:_LISTED])}{more}"] if found else []
+
+
+def _hint_of_text(name: str, text: str) -> Hint | None:
+    """The hint of a text beside the columns that mentions a speed, or that the wind is on."""
+    shown_text = f"'{one_line(name, 40)}: {one_line(text, 60)}'"
+    speed = SPEED_IN_TEXT.search(text)
+    if speed is not None:
+        unit = known_unit(speed[2]) or ""
+        value = float(speed[1].replace(",", ".")) * (in_si("wind_speed", unit) or 1.0)
+        use = f"--set wind_speed={value:g} uses it"
+        return Hint("wind_speed", value, shown_text, "it is a text that mentions a speed", use)
+    if WIND_ON.search(text):
+        use = "--set wind_speed=SPEED (m/s) states it"
+        return Hint("wind_speed", float("nan"), shown_text, "it is a text that mentions a wind", use)
+    return None
 
 
 def from_facts(
@@ -263,7 +298,7 @@ def check_wind(
         if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
             what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
             raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
-    if _WIND_ON.search(f"{file.stem} {run}"):
+    if WIND_ON.search(f"{stem_of(file)} {run}"):
         what = "the name states that the wind is on, but not its speed"
         remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
         raise Unstated(what, where=where, remedy=remedy)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.condition_names import RUN_KEYS, Hint
+from tunnel_sim.files.reading import PACKED, stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
 _ALIASES = {
@@ -45,7 +46,7 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
     """Conditions in the name of a file, which must match the pattern where there is one."""
     if pattern is None:
         return {}
-    found = pattern.match(path.name)
+    found = pattern.match(path.stem if path.suffix.lower() == PACKED else path.name)
     if found is None:
         remedy = "correct the pattern, or rename the file"
         raise TunnelError("the name does not match --name", where=shown(path), remedy=remedy)
@@ -131,8 +132,8 @@ def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
     found = {}
     for path in files:
         hints = []
-        for part in name_parts(path.stem):
-            what = f"'{path.stem[part.start : part.end]}' in the file's name"
+        for part in name_parts(stem_of(path)):
+            what = f"'{stem_of(path)[part.start : part.end]}' in the file's name"
             why = f"it may state {part.key} = {part.value:g}"
             use = "--conditions RUNS.csv states it run by run"
             place = part.text
@@ -147,7 +148,7 @@ def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
 
 def _pattern(files: Sequence[Path]) -> str:
     """A pattern for `name_pattern` from the first name; empty if it does not fit all of them."""
-    stem = files[0].stem
+    stem = stem_of(files[0])
     text, at = "", 0
     parts = [part for part in name_parts(stem) if part.written]
     for part in parts:
@@ -160,7 +161,7 @@ def _pattern(files: Sequence[Path]) -> str:
     compiled = name_pattern(text)
     keys = [part.key for part in parts]
     for path in files:
-        stated = {part.key: part.value for part in name_parts(path.stem) if part.written}
+        stated = {part.key: part.value for part in name_parts(stem_of(path)) if part.written}
         try:
             if from_name(compiled, path) != {key: stated.get(key) for key in keys}:
                 return ""

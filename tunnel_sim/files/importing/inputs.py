@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.column_names import named
+from tunnel_sim.files.importing.column_names import ANGLE, named
 from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.tables import Channel, is_input
 from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
-from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
+from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, Command, InputColumn
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
 from tunnel_sim.vocabulary.record import Record
 
@@ -40,6 +40,7 @@ _NAMES = re.compile(
     re.IGNORECASE,
 )
 _FALSE_ALARM = 1e-5  # chance that a column without effect on the motion is taken for its input
+_ALIKE = 0.9  # correlation from which a column is the angle or its rate by another sensor
 _PAST = 12  # earlier readings that predict a free motion, in which the noise is as good as white
 _INPUTS = 4  # readings of an input, the present and earlier ones: inertia, damping, stiffness and a lag
 _PER_CYCLE = 30  # means that the test takes of a cycle: of more, each hardly differs from its neighbours
@@ -53,6 +54,17 @@ def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel
     return found[0] if found else None
 
 
+def names_command(channel: Channel) -> bool:
+    """Whether a column is the command of a servo by its name and unit."""
+    return _claimed(channel) == Command.column
+
+
+def names_input(channel: Channel) -> bool:
+    """Whether a column may be an input by its name and unit, and is not a condition."""
+    plausible = is_input(channel) or _claimed(channel) is not None or _NAMES.search(channel.name) is not None
+    return plausible and condition_of(channel.name, channel.unit) is None
+
+
 def find_input(
     channels: Sequence[Channel],
     beside: Sequence[Channel | None],
@@ -60,8 +72,14 @@ def find_input(
     choices: ImportChoices,
     remarks: list[str],
     where: str,
+    unit: str = "rad",
 ) -> RunInput | None:
-    """The input of a run; None for a free decay. ``beside`` are the columns of times and reading."""
+    """The input of a run; None for a free decay.
+
+    Args:
+        beside: the columns of times and reading.
+        unit: of the reading, for angles without one.
+    """
     if choices.input == "none":
         return None
     others = [channel for channel in channels if all(channel is not one for one in beside)]
@@ -79,42 +97,74 @@ def find_input(
             what = f"no column '{one_line(choices.input, 40)}' for the input"
             remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
             raise TunnelError(what, where=where, remedy=remedy)
-        return _as_input(stated, reading, choices, remarks)
+        return _as_input(stated, reading, choices, remarks, unit, where)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
-    candidates = exact
+    candidates = [*exact]
     for channel in () if exact else others:
         good = np.isfinite(channel.values) & np.isfinite(reading)
-        plausible = _claimed(channel) or _NAMES.search(channel.name)
-        conditional = condition_of(channel.name, channel.unit) is not None
-        if conditional or not plausible or np.count_nonzero(good) < 16:
+        if not names_input(channel) or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
         with suppress(TunnelError):  # it is not the motion itself
             checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
-            if chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
+            # The command of an angle by its name moves the body, however little of the motion it explains.
+            certain = names_command(channel) and ANGLE.search(channel.name)
+            if certain or chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
                 candidates.append(channel)
+    commands = [channel for channel in candidates if names_command(channel)]
+    if len(commands) == 1 and not exact:
+        remarks += [
+            f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; --input uses it instead of "
+            f"'{one_line(commands[0].name, 40)}'"
+            for c in candidates
+            if c is not commands[0]
+        ]
+        candidates = commands
     if len(candidates) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in candidates)
         remedy = f'give --input "{one_line(candidates[0].name, 40)}", another of them, or --input none'
         raise TunnelError(f"{len(candidates)} columns may be the input: {listed}", where=where, remedy=remedy)
-    return _as_input(candidates[0], reading, choices, remarks) if candidates else None
+    return _as_input(candidates[0], reading, choices, remarks, unit, where) if candidates else None
 
 
-def _as_input(channel: Channel, reading: Rows, choices: ImportChoices, said: list[str]) -> RunInput:
+def _as_input(
+    channel: Channel, reading: Rows, choices: ImportChoices, said: list[str], unit: str, where: str
+) -> RunInput:
     column = choices.input_as or _claimed(channel) or "drive"
     kind = INPUTS[column]
+    factor, name = kind.factor(channel.unit), one_line(channel.name, 40)
+    if kind.of_spring and channel.unit in ("", "counts"):
+        if choices.calibration is not None or (channel.unit and choices.counts_per_turn is None):
+            what = f"'{name}' states no unit of an angle, and that of the reading is not its own"
+            remedy = (
+                f"give the unit in its name, such as {name}_deg; or --input-as drive, whose gain is fitted"
+            )
+            raise TunnelError(what, where=where, remedy=remedy)
+        factor = kind.factor(unit) / (choices.counts_per_turn or 1.0)
+        said += [f"'{name}' is taken in the unit of the angle, {unit}"] if choices.input_as is None else []
     size, lag = correlation(channel.values, reading)
     said.append(
         f"driven by '{one_line(channel.name, 40)}', {kind.meaning} ({column}): its correlation with the reading is "
         f"{size:.2f} at a lag of {counted(lag, 'sample')}; --input none if it is a free decay"
     )
-    return RunInput(column, channel, channel.values * kind.factor(channel.unit))
+    return RunInput(column, channel, channel.values * factor)
 
 
 def _claimed(channel: Channel) -> InputColumn | None:
     """The kind of input shown by name and unit of a column; None if they do not show it."""
     return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
+
+
+def moves_before(values: PerSample, reading: PerSample) -> bool:
+    """Whether a column predicts the reading as an input does; neither a rate of it nor proportional to it."""
+    slope = np.gradient(reading)
+    for own in (reading, slope):
+        x, y = values - values.mean(), own - own.mean()
+        scale = float(np.sqrt((x @ x) * (y @ y)))
+        if scale > 0.0 and abs(float(x @ y)) > _ALIKE * scale:
+            return False
+    return chance_without_effect(values, reading) < _FALSE_ALARM
 
 
 def chance_without_effect(values: PerSample, reading: PerSample) -> Share:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
 from tunnel_sim.files.importing.column_numbers import Calibration
-from tunnel_sim.files.importing.columns import RunColumns, find_columns
+from tunnel_sim.files.importing.columns import RunColumns, find_columns, with_readings
 from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
+from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 from tunnel_sim.vocabulary.inputs import InputColumn
@@ -75,7 +76,7 @@ def raw_records(
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
-    for table in long or source.tables:
+    for table in with_readings(long or source.tables, choices, shown(source.path)):
         where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
         for columns in find_columns(table, choices, calibration, where):
             said = [*columns.said]
@@ -83,7 +84,7 @@ def raw_records(
             stated = find_conditions(table, columns.used, choices, said, where).of_rows(kept)
             stated = replace(stated, named=named, hints=(*stated.hints, *short))
             run = columns.pair.run
-            file = source.path.stem if several or not (table.part or run) else ""
+            file = stem_of(source.path) if several or not (table.part or run) else ""
             name = one_line("-".join(part for part in (file, table.part, run) if part))
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
             found += _records(name, source.path, table, columns, kept, stated, choices, said, where)

@@ -24,7 +24,7 @@ from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
-from tunnel_sim.files.reading import check_count
+from tunnel_sim.files.reading import check_count, stem_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
@@ -133,7 +133,7 @@ def read_records(
     count = sum(part.piece.last - part.piece.first for part in parts)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     sizes = _sizes(parts, choices)
-    campaign = _campaign(parts, sizes, name or one_line(files[0].stem), raws[0].quantity)
+    campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].quantity)
     # For the recipe: properties found in the files, where all records share them.
     known: dict[str, Any] = {**sources[0].known}
     units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))

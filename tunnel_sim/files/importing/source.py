@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.formats.labview import MAGIC, read_labview_tables
 from tunnel_sim.files.importing.formats.text import TEXT, read_text_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.readers import load_reader, reader_place
-from tunnel_sim.files.reading import check_count, is_blank, read_regular
+from tunnel_sim.files.reading import PACKED, check_count, is_blank, read_regular, unpacked
 from tunnel_sim.sandbox import LimitReached, Message, Sandbox
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
@@ -42,8 +43,10 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
     values = (np.frombuffer(array) for array in arrays)
     tables = []
     for table in found["tables"]:
-        channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
-        tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
+        channels = tuple(Channel(name, next(values), *more) for name, *more in table["channels"])
+        listed = {key: tuple(table[key]) for key in ("said", "native")}
+        apart = tuple(tuple(column) for column in table["apart"])
+        tables.append(Table(**table | listed | {"channels": channels, "apart": apart}))
     return tables
 
 
@@ -56,7 +59,7 @@ def _read(request: dict[str, str], contents: list[bytes]) -> Message:
     tables = pkgutil.resolve_name(request["reader"]).read_tables(contents.pop(), request["where"])
     described = [
         {field.name: getattr(table, field.name) for field in fields(Table)}
-        | {"channels": [(channel.name, channel.unit) for channel in table.channels]}
+        | {"channels": [(channel.name, channel.unit, channel.place) for channel in table.channels]}
         for table in tables
     ]
     columns = [np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels]
@@ -73,6 +76,7 @@ class Source:
     known: Mapping[str, str] = field(default_factory=dict)
 
 
+_GZIP = b"\x1f\x8b"
 _BEGINNINGS = {
     b"PK\x03\x04": "an Excel workbook or another archive",
     b"\x89HDF": "an HDF5 file",
@@ -81,18 +85,22 @@ _BEGINNINGS = {
     b"PAR1": "a Parquet file",
     b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls); save it as .xlsx",
     b"%PDF": "a PDF document",
-    b"\x1f\x8b": "a compressed file; unpack it",
+    _GZIP: "a file compressed by gzip; end its name with .gz",
 }
 
 
 def read_source(path: Path, choices: ImportChoices) -> Source:
     """Read a file of any known format; the meaning of its columns is not known yet."""
     where = shown(path)
-    ending = path.suffix.lower()
+    packed = path.suffix.lower() == PACKED
+    ending = Path(path.stem if packed else path.name).suffix.lower()
     reader, place = load_reader(ending), reader_place(ending)
     if reader is None or reader.read_tables is None:
         reader, place = TEXT, None
     content = read_regular(path, reader.limit)
+    digest = hashlib.sha256(content).hexdigest()
+    if packed and content.startswith(_GZIP):
+        content = unpacked(content, reader.limit, where)
     if is_blank(content):
         raise TunnelError("the file is empty", where=where, remedy="name a file with a record")
     if not reader.magic or not content.startswith(reader.magic):
@@ -102,7 +110,9 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
             remedy = "give the file the ending of its format, or export it again"
             raise TunnelError(what, where=where, remedy=remedy)
     known: dict[str, str] = {}
-    if place is None:
+    if place is None and content.startswith(MAGIC):
+        tables, known = read_labview_tables(content, where)
+    elif place is None:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
@@ -126,4 +136,4 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         raise TunnelError("no column of numbers", where=where, remedy=remedy)
     count = sum(table.channels[0].values.size for table in readable)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
-    return Source(path, hashlib.sha256(content).hexdigest(), tuple(readable), known)
+    return Source(path, digest, tuple(readable), known)

@@ -38,11 +38,13 @@ class Channel:
     Args:
         values: in the unit of the file; NaN where there is no number.
         unit: one of `units.UNITS`, another text, or empty where none is stated.
+        place: number of the column in the file, from 1 on; 0 where the file does not number its columns.
     """
 
     name: str
     values: Rows
     unit: str = ""
+    place: int = 0
 
     def __post_init__(self) -> None:
         """Make every NaN quiet: a damaged file may contain signalling ones, which turn a minimum into NaN.
@@ -63,6 +65,10 @@ class Table:
         said: how the table was read, and what was omitted.
         headed: whether the columns are named in the file.
         named: whether the part is the file's name for a run, which the table then contains completely.
+        texts: single texts beside the columns, by name.
+        native: names of the columns that were sampled on the clock of the table, where the columns of a part have
+            several clocks; the part then has a table for each of them. Empty: all columns.
+        apart: name, unit and reason of each column of the part that cannot be aligned with the clock of the table.
     """
 
     channels: tuple[Channel, ...]
@@ -71,6 +77,9 @@ class Table:
     said: tuple[str, ...] = ()
     headed: bool = True
     named: bool = False
+    texts: Mapping[str, str] = field(default_factory=dict)
+    native: tuple[str, ...] = ()
+    apart: tuple[tuple[str, str, str], ...] = ()
 
 
 def names_runs(heading: str) -> bool:

@@ -25,6 +25,7 @@ def tables_of_arrays(
     kind: str,
     units: Mapping[str, str] = MappingProxyType({}),
     runs: Mapping[str, str] = MappingProxyType({}),
+    texts: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Table]:
     """Tables of arrays: arrays of the same group and length belong together.
 
@@ -33,6 +34,7 @@ def tables_of_arrays(
 
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
+        texts: by path; those of every group are beside all tables.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}
@@ -69,7 +71,7 @@ def tables_of_arrays(
             if above == "" or group == above or group.startswith(above + "/"):
                 stated |= facts[above]
         said = f"{kind}: {counted(len(channels), 'channel')} of {counted(length, 'sample')}"
-        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group))))
+        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group)), texts=texts))
     return tables
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
 from tunnel_sim.files.importing.formats.text import facts_in
+from tunnel_sim.files.importing.formats.waveforms import Waveform, aligned_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import FileTable, Reader, faults
@@ -22,6 +24,12 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library, one_line
 
 _REMEDY = "write the file again, as Parquet or as text"
+_TDMS_UNITS = ("unit_string", "NI_UnitDescription")
+_TDMS_CLOCK = (
+    "wf_start_time", "wf_start_offset", "wf_increment", "wf_samples", "wf_xname", "wf_xunit_string",
+    "wf_time_pref",
+)  # fmt: skip
+"""Properties of a channel that state its unit, and its clock."""
 
 
 def _read_run(content: bytes, where: str, most: int) -> FileTable:
@@ -71,6 +79,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
         datasets: dict[str, Any] = {}
         attributes: dict[str, NDArray[np.generic]] = {}
         runs: dict[str, str] = {}
+        texts: dict[str, str] = {}
 
         def visit(path: str, item: Any) -> None:
             remedy = "leave out datasets that are not needed"
@@ -92,7 +101,10 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 elif group and name == "drive_hold" and isinstance(stated := item.attrs[name], str):
                     attributes[f"{path}/{name}"] = np.array(hold_order(stated))
                 elif group and isinstance(stated := item.attrs[name], str):
-                    attributes.update(_number_in(path, name, stated))
+                    if found := _number_in(path, name, stated):
+                        attributes.update(found)
+                    elif stated.strip():
+                        texts[f"{path}/{name}".lstrip("/")] = stated
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
@@ -107,7 +119,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
             elif item.dtype.kind in "iufb":
                 arrays[path] = item[()]
         units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
-    return tables_of_arrays(arrays, "HDF5 file", units, runs)
+    return tables_of_arrays(arrays, "HDF5 file", units, runs, texts)
 
 
 def _hdf5_unit(item: Any) -> str:
@@ -140,7 +152,7 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
         check_size(total // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know only paths
     arrays: dict[str, NDArray[np.generic]] = {}
-    runs = {}
+    runs, texts = {}, {}
     for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
         group, below, name = path.rpartition("/")
         if not isinstance(value, str):
@@ -149,9 +161,11 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
             runs[group] = value
         elif below and name == "drive_hold":
             arrays[path] = np.array(hold_order(value))
-        else:
-            arrays |= _number_in(group, name, value)
-    return tables_of_arrays(arrays, "MAT file", runs=runs)
+        elif found := _number_in(group, name, value):
+            arrays |= found
+        elif value.strip():
+            texts[path] = value
+    return tables_of_arrays(arrays, "MAT file", runs=runs, texts=texts)
 
 
 def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:
@@ -189,25 +203,38 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
         check_count(len(channels), limits.COLUMNS, "channels", where, remedy)
         check_size(sum(len(channel) for channel in channels), where)
         for group in groups:
-            numeric = [c for c in group.channels() if len(c) and np.dtype(c.dtype).kind in "iufb"]
-            for length in dict.fromkeys(len(channel) for channel in numeric):
-                facts = _tdms_numbers(file.properties) | _tdms_numbers(group.properties)
-                columns = []
-                for channel in numeric:
-                    if len(channel) == length:
-                        name, unit = split_unit(channel.name)
-                        stated = str(channel.properties.get("unit_string", ""))
-                        facts |= _tdms_numbers(channel.properties)
-                        values = channel[:].astype(np.float64)
-                        columns.append(Channel(name, values, known_unit(stated) or unit))
-                part = group.name if len(groups) > 1 else ""
-                size = f"{counted(len(columns), 'channel')} of {counted(length, 'sample')}"
-                said = (f"TDMS file: group '{group.name}', {size}",)
-                tables.append(Table(tuple(columns), part, facts, said))
+            part = group.name if len(groups) > 1 else ""
+            waves = [
+                _tdms_wave(place, channel)
+                for place, channel in enumerate(group.channels(), 1)
+                if len(channel) and np.dtype(channel.dtype).kind in "iufb"
+            ]
+            stated = file.properties | group.properties
+            texts = _tdms_texts(stated)
+            for table in aligned_tables(waves, f"TDMS file: group '{group.name}'", "wf_increment"):
+                facts = {**_tdms_numbers(stated), **table.facts}
+                tables.append(replace(table, part=part, facts=facts, texts={**texts, **table.texts}))
     return tables
 
 
-def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
+def _tdms_wave(place: int, channel: Any) -> Waveform:
+    """A channel with the clock and the unit that its properties state."""
+    properties = channel.properties
+    name, unit = split_unit(channel.name)
+    stated = next((str(properties[key]).strip() for key in _TDMS_UNITS if properties.get(key)), "")
+    clock = {key: properties[key] for key in _TDMS_CLOCK if key in properties}
+    offset, increment = (
+        float(value) if isinstance(value := clock.get(key), int | float | np.number) else 0.0
+        for key in ("wf_start_offset", "wf_increment")
+    )
+    start = clock.get("wf_start_time")
+    since = int(start.astype("datetime64[ns]").astype(np.int64)) if isinstance(start, np.datetime64) else None
+    others = {key: value for key, value in properties.items() if key not in (*_TDMS_CLOCK, *_TDMS_UNITS)}
+    column = Channel(name, channel[:].astype(np.float64), known_unit(stated) or stated or unit, place)
+    return Waveform(column, increment, offset, since, _tdms_numbers(others), _tdms_texts(others))
+
+
+def _tdms_numbers(properties: Mapping[str, object]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, value in properties.items():
         if isinstance(value, int | float | np.number):
@@ -215,6 +242,14 @@ def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
         elif isinstance(value, str):  # such as "12 m/s"
             found |= facts_in([f"{name}: {value}"])
     return found
+
+
+def _tdms_texts(properties: Mapping[str, object]) -> dict[str, str]:
+    return {
+        name: value
+        for name, value in properties.items()
+        if isinstance(value, str) and value.strip() and not facts_in([f"{name}: {value}"])
+    }
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)

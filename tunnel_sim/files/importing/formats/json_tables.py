@@ -35,6 +35,7 @@ class _Found:
     labels: dict[str, tuple[str, pl.Series]] = field(default_factory=dict)
     stated: dict[str, str] = field(default_factory=dict)
     """The unit that a group states for its readings."""
+    texts: dict[str, str] = field(default_factory=dict)
 
 
 def _read(content: bytes, where: str) -> list[Table]:
@@ -56,7 +57,7 @@ def _tables(document: Any, where: str) -> list[Table]:
     _visit(document, "", found)
     check_count(len(found.arrays), limits.COLUMNS, "arrays", where, "leave out arrays that are not needed")
     check_size(sum(array.size for array in found.arrays.values()), where)
-    tables = tables_of_arrays(found.arrays, "JSON file", found.units, found.runs)
+    tables = tables_of_arrays(found.arrays, "JSON file", found.units, found.runs, found.texts)
     if not any(table.channels and table.channels[0].values.size >= LEAST_ROWS for table in tables):
         remedy = "write times and angles as arrays by name, or as a list of records"
         raise TunnelError("no arrays of numbers", where=where, remedy=remedy)
@@ -81,8 +82,11 @@ def _visit(value: Any, path: str, found: _Found) -> None:
         elif name == "drive_hold":
             found.arrays[path] = np.array(hold_order(value))
         else:  # such as "12 m/s"
-            for heading, number in facts_in([f"{name}: {value}"]).items():
+            numbers = facts_in([f"{name}: {value}"])
+            for heading, number in numbers.items():
                 found.arrays["/".join(filter(None, (group, heading.replace("/", "∕"))))] = np.array(number)
+            if not numbers and value.strip() and name:
+                found.texts[path] = value
     elif isinstance(value, int | float):
         found.arrays[path or "value"] = np.array(float(value))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 import polars as pl
 
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.condition_names import mentions_wind
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
@@ -34,6 +35,8 @@ _FACT = re.compile(
 """A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell."""
 _HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
 _SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
+_AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")
+_COUNTS = ("sequence", "points")  # beside units: the column counts samples
 _LONG_UNIT = 8  # characters: a longer text is a name
 
 
@@ -49,13 +52,18 @@ def is_missing(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Layout:
-    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units."""
+    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units.
+
+    Args:
+        beside: indices of columns that hold the header of others, as in the files of some oscilloscopes.
+    """
 
     first: int
     names: tuple[str, ...]
     units: tuple[str, ...]
     headed: bool
     facts: Mapping[str, float]
+    beside: tuple[int, ...] = ()
 
     @property
     def runs(self) -> int | None:
@@ -115,28 +123,90 @@ def find_layout(
         texts = [cell for cell in cells if cell and not is_number(cell, decimal)]
         if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
             above.append((index, cells + [""] * (width - len(cells))))
-    units: list[str] = [""] * width
-    # A row of units: known ones or others in brackets, or more known ones than short texts.
-    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
-    known = [cell for cell in stated if known_unit(cell) is not None]
-    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
-    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
-    if known and (not bare or few):
-        beside = above.pop()[1]
-        units = [unit_beside(name, cell) for name, cell in zip(above[-1][1], beside, strict=True)]
+    units, numbers = _units_row(above, width, decimal)
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    facts = facts_in(lines[: above[-1][0] if above else first])
-    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
-        named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
+    stated = list(lines[: above[-1][0] if above else first])
+    beside: tuple[int, ...] = ()
+    if not names:
+        beside, found = _beside(rows, numeric)
+        stated += found
+    given = [one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)]
     return Layout(
         first,
-        tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
-        tuple(one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)),
+        tuple(distinct(named)) or tuple(f"column {i + 1}" for i in range(width)),
+        tuple(_of_scope(stated, given, numeric)),
         bool(names),
-        facts,
+        facts_in(stated) | numbers,
+        beside,
     )
+
+
+def _units_row(
+    above: list[tuple[int, list[str]]], width: int, decimal: str
+) -> tuple[list[str], dict[str, float]]:
+    """The units in the last of the rows that may name columns, and numbers there; it is removed if it states them.
+
+    Known units or others in brackets, or more known ones than short texts; numbers stand below their names.
+    """
+    units = [""] * width
+    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
+    numbers = [cell for cell in stated if is_number(cell, decimal)]
+    stated = [cell for cell in stated if cell not in numbers and cell.lower() not in _COUNTS]
+    known = [cell for cell in stated if known_unit(cell) is not None]
+    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
+    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
+    if not known or (bare and not few):
+        return units, {}
+    beside = above.pop()[1]
+    pairs = list(zip(above[-1][1], beside, strict=True))
+    facts = {name: float(cell.replace(",", ".")) for name, cell in pairs if name and cell in numbers}
+    return ["" if cell in numbers else unit_beside(name, cell) for name, cell in pairs], facts
+
+
+def _beside(rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> tuple[tuple[int, ...], list[str]]:
+    """Columns that hold a header beside the first rows of numbers, and their lines; empty: there are none."""
+    columns = [i for i in range(numeric[-1]) if i not in numeric]
+    blocks = [[i for i in columns if i < end] for end in (i for i in numeric if i - 1 in columns)]
+    found: list[int] = []
+    lines = []
+    for block in blocks:
+        block = [i for i in block if i not in found]
+        texts = [[row[i].strip() for i in block if i < len(row)] for row in rows]
+        filled = [index for index, cells in enumerate(texts) if any(cells)]
+        pairs = [cells for cells in texts if len(cells) > 1 and cells[0] and any(cells[1:])]
+        if filled and 2 * filled[-1] < len(rows) and 2 * len(pairs) >= len(filled):
+            lines += [",".join(filter(None, cells)) for cells in pairs]
+            found += block
+    return tuple(found), lines
+
+
+def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]) -> list[str]:
+    """The units of columns; of those without, as an oscilloscope states them for both axes."""
+    stated: dict[str, list[str]] = {}
+    for line in lines:
+        found = _AXIS.match(line.replace('"', ""))
+        if found is not None:
+            cells = [cell.strip() for cell in re.split(r"[,;\t]", found[2]) if cell.strip()]
+            stated.setdefault(found[1].lower(), []).extend(cells)
+    result = list(units)
+    if not {"horizontal", "vertical"} <= set(stated) or any(units[i] for i in numeric):
+        return result
+    after = 0
+    for place, column in enumerate(numeric):
+        first = place == 0 or column - 1 not in numeric
+        cells = stated["horizontal"] if first else stated["vertical"]
+        text = cells[0] if first else cells[min(after, len(cells) - 1)] if cells else ""
+        after += not first
+        result[column] = known_unit(text) or text
+    return result
+
+
+def distinct(names: Sequence[str]) -> list[str]:
+    """Names of columns, with the position where a name is ambiguous."""
+    counts = Counter(names)
+    return [name if counts[name] == 1 else f"{name} #{i + 1}" for i, name in enumerate(names)]
 
 
 TEXT = Reader("a table of text", limits.CSV_BYTES)
@@ -174,7 +244,7 @@ def read_text_tables(
     content: bytes, where: str, choices: ImportChoices
 ) -> tuple[list[Table], dict[str, str]]:
     """The table of a text file; and how it was read, for the recipe."""
-    content, encoding = _as_utf8(content, where)
+    content, encoding = as_utf8(content, where)
     if b"\n" not in content:
         content = content.replace(b"\r", b"\n")
     nul = (
@@ -192,11 +262,7 @@ def read_text_tables(
     if dialect is None:
         remedy = "give --delimiter and --decimal, or name a table"
         raise TunnelError("no columns of numbers", where=where, remedy=remedy)
-    check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    lines = content.count(b"\n")
-    check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
-    cells = lines * dialect.width
-    check_count(cells, limits.CELLS, "cells", where, "leave out columns that are not needed")
+    check_table(content, dialect.width, where)
     layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
     sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
@@ -214,6 +280,42 @@ def read_text_tables(
     if dialect.delimiter == " ":
         content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is scanned twice
         content = re.sub(rb"(?m)^ | $", b"", content)
+    text_at = {i for i in range(dialect.width) if _holds_texts(sample, i, dialect.decimal)} - {layout.runs}
+    labels = None
+    if layout.runs is not None:  # the name of a run is kept, even if it is "nan"
+        labels = frame_of(content, dialect, layout, text_at, layout.runs, where).to_series()
+    frame = frame_of(content, dialect, layout, text_at | {layout.runs}, None, where)
+    texts = {
+        f"line {i}": line.strip()
+        for i, line in enumerate(head[: layout.first], 1)
+        if len(line) <= _LONG_LINE and mentions_wind(line) and not facts_in([line])
+    }
+    table = Table((), said=(remark,), facts=layout.facts, texts=texts)
+    return tables_of(frame, layout, dialect.decimal, labels, table), known
+
+
+def check_table(content: bytes, width: int, where: str) -> None:
+    """Refuse a table of text of too many columns, lines or cells."""
+    check_count(width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
+    lines = content.count(b"\n")
+    check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
+    check_count(lines * width, limits.CELLS, "cells", where, "leave out columns that are not needed")
+
+
+def frame_of(
+    content: bytes,
+    dialect: Dialect,
+    layout: Layout,
+    texts: Collection[int | None],
+    at: int | None,
+    where: str,
+) -> pl.DataFrame:
+    """The columns of a table of text, from its first row of numbers on: numbers, or texts where one is found.
+
+    Args:
+        texts: indices of the columns of texts.
+        at: index of the only column to read, as texts as they are; None: all columns.
+    """
     options: dict[str, Any] = {
         "separator": dialect.delimiter,
         "has_header": False,
@@ -221,26 +323,19 @@ def read_text_tables(
         "truncate_ragged_lines": True,
     }
     names = [f"column_{i + 1}" for i in range(dialect.width)]
+    all_texts = dict.fromkeys(names, pl.String)
     missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
     try:
-        labels = None
-        if (at := layout.runs) is not None:  # the name of a run is kept, even if it is "nan"
-            schema = dict.fromkeys(names, pl.String)
-            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
+        if at is not None:
+            return pl.read_csv(content, schema=all_texts, columns=[at], **options)
+        kinds = {name: pl.String if i in texts else pl.Float64 for i, name in enumerate(names)}
+        numbers = {**options, "decimal_comma": dialect.decimal == ","}
+        if not set(texts) - {layout.runs}:  # a text may contain delimiters in quotes
+            numbers["quote_char"] = None
         try:
-            text_at = {i for i in range(dialect.width) if _holds_texts(sample, i, dialect.decimal)} - {at}
-            kinds = {
-                name: pl.String if i in text_at or i == at else pl.Float64 for i, name in enumerate(names)
-            }
-            numbers = {**options, "decimal_comma": dialect.decimal == ","}
-            if not text_at:  # a text may contain delimiters in quotes
-                numbers["quote_char"] = None
-            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
+            return pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
-            texts = dict.fromkeys(names, pl.String)
-            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
-        table = Table((), said=(remark,), facts=layout.facts)
-        return tables_of(frame, layout, dialect.decimal, labels, table), known
+            return pl.read_csv(content, schema=all_texts, null_values=missing, **options)
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
@@ -281,7 +376,7 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
     return best
 
 
-def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
+def as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
     """The text as UTF-8, and its encoding."""
     encoding = "ASCII"
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -308,6 +403,8 @@ def tables_of(
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
+        if i in layout.beside:
+            continue
         number, lost = column, 0
         if column.dtype == pl.String and name == "drive_hold":
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
@@ -326,7 +423,7 @@ def tables_of(
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
         if number.null_count() < number.len():
-            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit))
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1))
     table = replace(table, channels=tuple(channels), headed=layout.headed)
     tables = [table]
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
@@ -361,7 +458,7 @@ def _seconds(column: pl.Series) -> pl.Series:
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
     """A small table of texts, such as one of conditions: its names, and the cells of every further line."""
     where = shown(path)
-    content, _ = _as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
+    content, _ = as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
     lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]
     if len(lines) < 2:
         raise TunnelError("no rows", where=where, remedy="give a line of names and a line for each run")

@@ -182,8 +182,12 @@ def test_only_a_driven_run_may_be_stated_to_have_no_spring(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("0.1 + 20*V", (0.1, 20.0)), ("20 V", (0.0, 20.0)), ("-2*V - 0.5", (-0.5, -2.0)), ("V", (0.0, 1.0))],
-)
+    [
+        ("0.1 + 20*V", (0.1, 20.0)), ("20 V", (0.0, 20.0)), ("-2*V - 0.5", (-0.5, -2.0)), ("V", (0.0, 1.0)),
+        ("12*(V-2.5)", (-30.0, 12.0)), ("(V - 2.5) * 12", (-30.0, 12.0)), ("1 - 4*(2.5 - V)", (-9.0, 4.0)),
+        ("(V-2)/0.5", (-4.0, 2.0)), ("-V", (0.0, -1.0)), ("V/4 + 1", (1.0, 0.25)), ("-(V - 1)", (1.0, -1.0)),
+    ],
+)  # fmt: skip
 def test_a_calibration_formula(text: str, expected: tuple[float, float]) -> None:
     assert read_calibration(text) == expected
 
@@ -200,8 +204,9 @@ def test_a_voltage_is_converted_by_formula_or_table(tmp_path: Path) -> None:
     for calibration in ("-1.25 + 0.5*V", str(table)):
         (run,) = read_records([path], ImportChoices(calibration=calibration)).campaign.runs
         np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-9)
-    with pytest.raises(TunnelError, match="is not a formula"):
-        read_records([path], ImportChoices(calibration="2*V**2"))
+    for text in ("2*V**2", "12*(V-2.5", "1 + V + 2", "V/0", "12*(V*V)", "a + b*V", "1.5"):
+        with pytest.raises(TunnelError, match="is not a formula"):
+            read_records([path], ImportChoices(calibration=text))
 
 
 def test_settings_are_checked() -> None:

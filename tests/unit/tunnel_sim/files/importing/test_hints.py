@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.io
 
-from tests.support.import_files import csv, decay, written
+from tests.support.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
 from tunnel_sim.files.importing.conditions import Unstated
@@ -224,3 +226,89 @@ def test_a_table_of_conditions_has_the_names_and_units_of_files(tmp_path: Path) 
     text = "file;Wind speed [furlong]\na;1\nb;2\n"
     with pytest.raises(TunnelError, match=r"'Wind speed \[furlong\]' is not in a unit of wind_speed"):
         read_records(paths, conditions=written(tmp_path, "runs.csv", text))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "speed",
+        "fan_speed",
+        "tunnel",
+        "airspeed",
+        "U_ref",
+        "v_tunnel",
+        "pitot",
+        "wind_tunnel_velocity",
+        "FlowSpeed",
+    ],
+)
+def test_wind_off_is_not_assumed_beside_what_looks_like_a_speed(name: str, tmp_path: Path) -> None:
+    for member in (12.0, np.full(TIME.size, 12.0) + 0.1 * np.sin(TIME)):  # a number, or a channel
+        path = tmp_path / "rig.mat"
+        scipy.io.savemat(path, {"time": TIME, "yaw_rad": ANGLE, name: member})
+        choices = setting(f"wind_speed={name}")
+        with suppress(Unstated):  # asked, or taken: never passed over
+            assert read_records([path]).campaign.runs[0].wind_speed == pytest.approx(12.0, abs=0.1)
+            continue
+        with pytest.raises(Unstated, match=rf"'{name}'.*--set wind_speed={name} uses it"):
+            read_records([path])
+        assert read_records([path], choices).campaign.runs[0].wind_speed == pytest.approx(12.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "name", ["gyro", "temperature", "air_temp", "motor_speed", "angular_velocity", "serial", "fps"]
+)
+def test_other_members_are_listed_and_stop_nothing(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.mat"
+    scipy.io.savemat(path, {"time": TIME, "yaw_rad": ANGLE, name: 12.0})
+    found = read_records([path])
+    assert found.campaign.runs[0].wind_speed == 0.0
+    assert f"stated in the file and not used: {name} = 12" in "\n".join(found.remarks())
+
+
+def test_numbers_and_texts_that_are_not_used_are_listed(tmp_path: Path) -> None:
+    info, members = (
+        "stiff spring, new bearing",
+        {"time": TIME, "yaw_rad": ANGLE, "spring_K": 16.0, "mass": 3.5},
+    )
+    path = tmp_path / "rig.mat"
+    scipy.io.savemat(path, members | {"info": info, "Ts": 1.0 / RATE})
+    said = "\n".join(read_records([path]).remarks())
+    assert f"stated in the file and not used: mass = 3.5, info: '{info}'" in said
+    assert "--set spring_stiffness=spring_K uses it" in said
+    (run,) = read_records([path], setting("spring_stiffness=spring_K")).campaign.runs
+    assert run.spring_stiffness == 16.0
+    document = {"time": TIME.tolist(), "yaw_rad": ANGLE.tolist(), "operator": "bench", "kp": 4.0}
+    said = "\n".join(read_records([written(tmp_path, "log.json", json.dumps(document))]).remarks())
+    assert "stated in the file and not used: kp = 4, operator: 'bench'" in said
+
+
+@pytest.mark.parametrize("text", ["run 3 at 12 m/s", "tunnel 43.2 km/h, stiff spring", "second day, wind on"])
+def test_a_text_that_mentions_a_wind_is_not_passed_over(text: str, tmp_path: Path) -> None:
+    mat, document = tmp_path / "rig.mat", {"time": TIME.tolist(), "yaw_rad": ANGLE.tolist(), "info": text}
+    scipy.io.savemat(mat, {"time": TIME, "yaw_rad": ANGLE, "info": text})
+    for path in (mat, written(tmp_path, "log.json", json.dumps(document)), with_head(tmp_path, f"# {text}")):
+        with pytest.raises(Unstated, match="wind-off is not assumed beside it"):
+            read_records([path])
+        assert read_records([path], setting("wind_speed=12")).campaign.runs[0].wind_speed == 12.0
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "value"),
+    [
+        ("frontal_area=360 cm2", "frontal_area", 0.036), ("wind_speed=54 km/h", "wind_speed", 15.0),
+        ("spring_stiffness=2 N mm/rad", "spring_stiffness", 2e-3),
+        ("reference_length=25cm", "reference_length", 0.25),
+        ("air_density = 1.2 kg/m^3", "air_density", 1.2),
+        ("release_angle=10 deg", "release_angle", np.deg2rad(10.0)),
+    ],
+)  # fmt: skip
+def test_a_setting_may_have_a_unit(text: str, key: str, value: float) -> None:
+    assert getattr(parse_setting(text, "--set")[0], key) == pytest.approx(value)
+
+
+def test_a_unit_that_does_not_fit_a_setting_is_named() -> None:
+    with pytest.raises(TunnelError, match="'furlong' is not a unit of frontal_area; use one of m2"):
+        parse_setting("frontal_area=360 furlong", "--set")
+    with pytest.raises(TunnelError, match="'%' is not a unit of repeatability_wind_speed"):
+        parse_setting("repeatability_wind_speed=2 %", "--set")
