@@ -266,6 +266,15 @@ class Traits:
         del omega
         return True
 
+    def shown_in(self, duration: float) -> bool:
+        """Whether a record is long enough to show a fitted effect.
+
+        Args:
+            duration: of the record, s.
+        """
+        del duration
+        return True
+
     def alike(self) -> Sequence[Trial]:
         """Other values of its parameters with the same effect on the slow motion.
 
