@@ -22,7 +22,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
@@ -389,7 +389,7 @@ class NominalModel:
 
     def blind_spots(self, data: Data) -> tuple[str, ...]:
         """The limits of these runs, as clauses; those of every campaign are last."""
-        speeds = {run.wind_speed for run in data.runs if run.wind_on}
+        speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
         found = [*self.unseen(data)]
         if not data.wind_on:
             found.append("any effect of the air: there is no run with the wind on")
