@@ -185,7 +185,9 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
         caution = (*caution, *zeros_apart(study))
     found = replace(
         answer.found,
-        second_modes=second_modes(chosen.campaign, study.settings.words) if unknown and _tried_mode(study) else (),
+        second_modes=second_modes(chosen.campaign, study.settings.words)
+        if unknown and _tried_mode(study)
+        else (),
         rivals=_rivals(study) if unknown or not decided else (),
         cautions=(*answer.found.cautions, *caution),
     )

@@ -101,6 +101,8 @@ def beside_the_numbers(
         place=place if isinstance(place, PlaceFound) else None,
         nowhere=place if isinstance(place, Nowhere) else None,
         both_winds=len({run.wind_on for run in runs}) > 1,
+        robot=study.model.of_robot and not any(run.wind_on for run in runs),
+        driven=all(run.drive is not None for run in runs),
         nearly=nearly(study),
         immaterial=immaterial(before, after, study.settings.words) if study.named else {},
         choices=spring_choices(study),

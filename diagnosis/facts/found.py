@@ -192,6 +192,8 @@ class Found:
         place: reasons for the place of the gap; None where there is no gap, or no place.
         nowhere: the residuals of a campaign without a gap; else None.
         both_winds: whether the wind is off in some runs and on in others.
+        robot: whether the body is the joint of a machine, and not a body in a tunnel.
+        driven: whether every run is driven.
         nearly: effects that nearly explain an unexplained gap; None where there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
@@ -207,6 +209,8 @@ class Found:
     place: PlaceFound | None = None
     nowhere: Nowhere | None = None
     both_winds: bool = False
+    robot: bool = False
+    driven: bool = False
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()

@@ -378,7 +378,10 @@ def _beside(runs: list[_Pieces], frequency: float, harmonic: int) -> float:
         for run in runs:
             shown = shown_multiples(frequency, run.run.interval, run.duration, run.motion)
             if lower in shown:
-                power, freedom = power + float(run.power[run.index(lower * frequency)]), freedom + 2 * run.count
+                power, freedom = (
+                    power + float(run.power[run.index(lower * frequency)]),
+                    freedom + 2 * run.count,
+                )
         if freedom:
             tests.append(float(chdtrc(freedom, power)))
     return min(1.0, len(tests) * min(tests)) if tests else 1.0

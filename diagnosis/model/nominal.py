@@ -68,6 +68,8 @@ class NominalModel:
     per_inertia: ClassVar[bool] = False
     #: Whether anything restores the body, so that it swings about a place and its angle does not drift away.
     restored: ClassVar[bool] = True
+    #: Whether the body is the joint of a machine, whose springs and wind cannot be chosen.
+    of_robot: ClassVar[bool] = False
     #: Whether the resonance of a driven run is known, and need not show in it.
     resonance_known: ClassVar[bool] = False
     #: Units of the coefficients that it states, by name.
@@ -392,7 +394,7 @@ class NominalModel:
         speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
         found = [*self.unseen(data)]
         if not data.wind_on:
-            found.append("any effect of the air: there is no run with the wind on")
+            found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
             found.append(
                 "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
@@ -422,7 +424,7 @@ class NominalModel:
 
     def planned_springs(self, data: Data) -> tuple[float, ...]:
         """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
-        return tuple(sorted({round(k * f, 2) for k in data.springs for f in _FACTORS} | set(data.springs)))
+        return data.springs
 
 
 @lru_cache(maxsize=8)
@@ -437,7 +439,6 @@ def _program(text: str, spring: float) -> tuple[float, ...]:
 
 
 _PHASES = 64  # of a cycle, for its mean
-_FACTORS = (0.5, 1.0, 2.0)  # on the stiffnesses of the campaign's springs
 ALWAYS_BLIND = (
     "a constant sensor lag or filter: it only shifts the release",
     "an error of the clock",

@@ -75,7 +75,7 @@ def _is_hum(line: MainsLine, chosen: ReadOffSettings, *, known: bool) -> bool:
 
     A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
     therefore rejected. A mode excited at the release decays. A line of another source may lie in any of the ranges
-    that are searched, so a folded harmonic counts only beside a lower one, or where the mains are stated, and no line
+    that are searched, so a folded harmonic counts only beside a lower one, or where the mains are stated. No line
     counts where the ranges cover much of the spectrum.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.run_data import RunData
-from diagnosis.where.along_motion import apparent_moment, backbones, motion, phase_plane
+from diagnosis.where.along_motion import amplitude_about_rest, apparent_moment, backbones, phase_plane
 from diagnosis.where.excess import (
     Profile,
     RunExcess,
@@ -74,7 +74,7 @@ class _Samples:
         inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
         return cls(
             [_times(nominal, i) for i in range(len(runs))],
-            [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
+            [amplitude_about_rest(scaled, i) for i in range(len(runs))],
             [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
             [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
             # squares of filtered noise are correlated: as many are independent as coefficients pass

@@ -80,6 +80,7 @@ class SensorHysteresis(Effect):
     jumps = True
     size = "backlash of {half_width} to each side at the sensor"
     advice = "Remove the backlash between rod and sensor"
+    advice_for_joint = "Remove the backlash between joint and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
     signature = "The reading pauses at each reversal of the motion and lags by w in between."
     references = (

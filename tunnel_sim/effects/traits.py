@@ -58,6 +58,7 @@ class Traits:
     - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
     - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
+    - ``advice_for_joint``: the same for the joint of a machine, where it differs.
     - ``caveat``: how to read the coefficients that are reported with it.
     """
 
@@ -93,6 +94,7 @@ class Traits:
     tries: ClassVar[int] = 1
     size: ClassVar[str] = ""
     advice: ClassVar[str] = ""
+    advice_for_joint: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:

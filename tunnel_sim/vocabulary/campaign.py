@@ -143,7 +143,9 @@ class Run:
         return Dataset(columns, coords={"time_s": self.record.time_s}, attrs={"id": self.id, **stated})
 
 
-_SAME_SPEED = 0.01  # relative: an anemometer reads to about a per cent, and settings of a fan are farther apart
+_SAME_SPEED = (
+    0.01  # relative: an anemometer reads to about a per cent, and settings of a fan are farther apart
+)
 
 
 def speed_groups(speeds: Iterable[float]) -> dict[float, float]:

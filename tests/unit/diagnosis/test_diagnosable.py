@@ -10,10 +10,10 @@ from diagnosis.diagnosable import comparable_runs, without_short
 from diagnosis.facts.found import Fact
 from diagnosis.model.similarity import frequency
 from diagnosis.settings import Settings
+from identification.status import Outcome
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
 from tests.support.driven_runs import driven
-from identification.status import Outcome
 from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4

@@ -79,7 +79,9 @@ def test_a_blow_to_one_run_is_found_at_its_instant(run: str, impulse: float) -> 
 def test_a_disturbance_is_stated_by_the_clock_of_its_file(tmp_path: Path) -> None:
     """One file of a logger that was switched on 37.25 s before the release."""
     run = with_blow(campaign(), 0.02, 4.0, "r6").runs[5]
-    text = "\n".join(f"{t + 37.25:.3f},{y:.8f}" for t, y in zip(run.record.time_s, run.record.yaw_rad, strict=True))
+    text = "\n".join(
+        f"{t + 37.25:.3f},{y:.8f}" for t, y in zip(run.record.time_s, run.record.yaw_rad, strict=True)
+    )
     others = campaign().runs[:5]
     (tmp_path / "logged.csv").write_text(f"time_s,yaw_rad\n{text}\n")
     (read,) = read_records([tmp_path / "logged.csv"]).campaign.runs
