@@ -133,7 +133,8 @@ def _answer(document: Document, rest: str) -> str:
             else "No known effect explains it (tunnel effects lists them)."
         )
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
-    last = (explained, rest, _immaterial(facts["immaterial"]) or consequence(document))
+    changes = {} if document["rest"]["material"] else facts["immaterial"]
+    last = (explained, rest, _immaterial(changes) or consequence(document))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
     acting = []
@@ -190,6 +191,11 @@ def undecided_words(document: Document) -> str:
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
         said += f"{best} fits best, but does not predict held-out readings. "
+    if document.get("elsewhere"):
+        best, runs = _among_answers(document["elsewhere"]).capitalize(), document["where"]["runs"]
+        named = 0 < len(runs) <= settings_of(document).words.runs_listed
+        look = _runs(runs) if named else "the runs"
+        said += f"{best} fits best, but the residuals point elsewhere: look at {look} there first. "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
 
 

@@ -66,7 +66,7 @@ def test_the_place_does_not_depend_on_the_names(cause):
     named, _, said = localise(studied(data, base, (cause,)))
     assert named == unnamed
     agrees = effect_class(cause).channel == "damping"
-    assert said == dataclasses.replace(nothing, compared=(cause,), agrees=agrees)
+    assert said == dataclasses.replace(nothing, compared=(cause,), agrees=agrees, elsewhere=not agrees)
     assert nothing.compared == ()
 
 
