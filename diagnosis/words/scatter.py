@@ -64,6 +64,8 @@ def _undetermined(document: Document) -> str:
         return "since the answer is undecided"
     if (document.get("rest") or {}).get("significant"):
         return "since the answer leaves a gap beyond the noise"
+    if (document.get("closable") or {}).get("kind") == "between":
+        return "since a difference between the runs could explain the rest"
     found = document.get("repeatability") or {}
     limits = found.get("limits")
     if limits is None or all(limit is None for limit in limits.values()):
