@@ -48,9 +48,14 @@ def spreads_of(document: Document) -> list[Mapping[str, Any]]:
     return list((document.get("repeatability") or {"spreads": ()})["spreads"])
 
 
+def scatters(document: Document) -> bool:
+    """Whether the runs show scatter, or some is stated."""
+    return any(one["width"] for one in spreads_of(document))
+
+
 def repeats(document: Document) -> bool:
     """Whether a test that could see scatter between the runs saw none, and none is stated."""
-    return not any(one["width"] for one in spreads_of(document)) and not _undetermined(document)
+    return not scatters(document) and not _undetermined(document)
 
 
 def _undetermined(document: Document) -> str:
@@ -267,7 +272,7 @@ def repeatability_line(document: Document) -> str:
         return ""
     if repeats(document):
         return f"Repeatability: no run-to-run scatter detected: {_limits(found['limits'])}."
-    if not any(one["width"] for one in spreads_of(document)):
+    if not scatters(document):
         own = [f"{name} by {_root_mean_square(found['runs'], name, '')}" for name in ("frequency", "damping")]
         return (
             f"Repeatability: not determined, {_undetermined(document)}. The runs, one by one, deviate from the model "
@@ -301,17 +306,25 @@ def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str, of: str = "_
 def repeatability_table(document: Document) -> Table:
     """Every run against the model; a table without rows where the runs repeat."""
     found, rows = document.get("repeatability"), []
+    known = scatters(document)
     for run in found["runs"] if found and not repeats(document) else ():
         deviations = [
-            f"{_signed(run[name], run[f'{name}_std'])} (± {percent_of(run[f'{name}_band']).removesuffix(' %')})"
+            f"{_signed(run[name], run[f'{name}_std'])}{_band(run[f'{name}_band']) if known else ''}"
             for name in ("frequency", "damping")
         ]
         remark = "deviates far beyond the others" if found and run["id"] == found["outlier"] else ""
         rows.append((run["id"], "on" if run["windy"] else "off", *deviations, remark))
     heads = ("run", "wind", "frequency [%]", "damping [%]", "remark")
     last = None if any(row[-1] for row in rows) else -1
-    title = "Every run against the model, and its scatter by chance (one standard deviation)"
+    title = "Every run against the model"
+    if known:
+        title += ", and its scatter by chance (one standard deviation)"
     return Table(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
+
+
+def _band(width: Share) -> str:
+    """The scatter of a quantity by chance, such as `` (± 0.039)``."""
+    return f" (± {percent_of(width).removesuffix(' %')})"
 
 
 def _signed(value: float, std: float) -> str:
