@@ -14,7 +14,7 @@ from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
-from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable
+from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable, without_short
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.repeatability import AnswerWithout, Repeatability
@@ -81,6 +81,7 @@ def diagnose(
     joint, own = (None, model) if isinstance(model, NominalModel) else (model, None)
     if joint is not None:
         campaign, own = with_law(campaign, joint.law)
+    campaign, short = without_short(campaign)
     refuse_undiagnosable(campaign, own)
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
@@ -97,7 +98,7 @@ def diagnose(
         if answer.repeatability is not None and answer.repeatability.outlier:
             say(f"without run {answer.repeatability.outlier}")
             answer = _and_without_outlier(answer, answer.repeatability, chosen, settings, rivals)
-        return _without(answer, leave_out).in_words()
+        return _without(replace(answer, remarks=(*short, *answer.remarks)), leave_out).in_words()
 
 
 def _and_without_outlier(
@@ -199,11 +200,19 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
         caution = (*caution, *zeros_apart(study))
     found = replace(
         answer.found,
-        second_modes=second_modes(chosen.campaign, study.settings.words) if unknown else (),
+        second_modes=second_modes(chosen.campaign, study.settings.words)
+        if unknown and _tried_mode(study)
+        else (),
         rivals=_rivals(study) if unknown or not decided else (),
         cautions=(*answer.found.cautions, *caution),
     )
     return replace(answer, found=found)
+
+
+def _tried_mode(study: Study) -> bool:
+    """Whether a set with a second mode was weighed: only then its share of the gap is known."""
+    modes = {kind.name for kind in known_effects() if kind.line == "ringing"}
+    return any(modes.intersection(answer.effects) for answer in study.answers)
 
 
 def _rivals(study: Study) -> tuple[Fact, ...]:

@@ -26,7 +26,7 @@ from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign, Run, speed_groups
 from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
@@ -170,8 +170,9 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     at each speed. Frequencies at one speed within a ``ratio`` belong to one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
+    setting = speed_groups(run.wind_speed for run in runs)
     for run in runs:
-        by_speed[run.wind_speed].append((free_frequency(run, derivative), run))
+        by_speed[setting[run.wind_speed]].append((free_frequency(run, derivative), run))
     # by speed, groups of runs with about the same frequency, lowest first
     groups: list[list[list[Run]]] = []
     for alike in by_speed.values():
@@ -188,6 +189,35 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     if len(counts) == 1:
         return max(([run for group in rank for run in group] for rank in zip(*groups, strict=True)), key=len)
     return max((group for found in groups for group in found), key=len)
+
+
+def without_short(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """Leave out the runs that are too short to be diagnosed, with a remark, where others remain.
+
+    A driven run needs `LEAST_SAMPLES` samples to separate noise from response. A free decay with fewer samples is
+    left out where it shows no motion that can be diagnosed.
+    """
+    short = [
+        run
+        for run in campaign.runs
+        if run.record.yaw_rad.size < LEAST_SAMPLES
+        and (run.drive is not None or _motion(run, campaign) in _NOT_DIAGNOSABLE)
+    ]
+    if not short or len(short) == len(campaign.runs):
+        return campaign, ()
+    ids = tuple(run.id for run in short)
+    most = counted(max(run.record.yaw_rad.size for run in short), "sample")
+    what = f"too short for the diagnosis ({'' if len(short) == 1 else 'at most '}{most}), so left out"
+    remedy = f"record {LEAST_SAMPLES} samples or more"
+    return campaign.without(ids), (Remark(Outcome.LEFT_OUT, ids, what, remedy),)
+
+
+_NOT_DIAGNOSABLE = (Status.NO_OSCILLATION, Status.NOT_DETERMINED)
+
+
+def _motion(run: Run, campaign: Campaign) -> Status:
+    """The outcome of a fit of one free decay to a run."""
+    return identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
 
 
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
@@ -239,8 +269,8 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
     for run in campaign.runs:
         if run.drive is not None:
             continue
-        status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
-        if status in (Status.NO_OSCILLATION, Status.NOT_DETERMINED):
+        status = _motion(run, campaign)
+        if status in _NOT_DIAGNOSABLE:
             what, _, remedy = status.value.partition(": ")
             raise TunnelError(what, where=f"run {run.id}", remedy=f"{remedy}; or leave the run out")
     for run in campaign.runs:

@@ -305,7 +305,9 @@ class Diagnosis:
     def decision(self) -> Decision:
         """Whether the answer is decided, and the common part of the likely answers."""
         chosen = settings_of({"provenance": self.provenance}).answer
-        return decision([(c.effect, c.probability) for c in self.candidates], chosen, self.gap.closed)
+        answers, place = [(c.effect, c.probability) for c in self.candidates], self.found.place
+        elsewhere = place is not None and place.elsewhere
+        return decision(answers, chosen, self.gap.closed, elsewhere=elsewhere)
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""

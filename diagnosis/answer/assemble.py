@@ -68,7 +68,8 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
         amplitude_rad=survey.maps.amplitude.interval(chosen.interval_share),
         frequency_hz=survey.frequency_interval,
     )
-    return where, maps, described(where, place, [effect_class(name) for name in compared], study.settings)
+    kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)
+    return where, maps, described(where, place, kinds, study.settings, scattering=scattering)
 
 
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
@@ -114,6 +115,7 @@ def assemble(
         study.campaign, noise, closes.gap.runs, closes.confirmation, named=study.named, settings=settings
     )
     caveats = (*left_out, *of_answer, *outside_the_fits(study))
+    rest = _remains(study, found, answers, closes.steps)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
@@ -143,11 +145,11 @@ def assemble(
         inclusion=inclusion(weighed, study.beside, settings.gap),
         waterfall=closes.steps,
         disturbed=study.disturbed,
-        rest=_remains(study, found, answers, closes.steps),
+        rest=rest,
         # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
         repeatability=repeatability(chosen if study.causes != UNKNOWN else study.between_runs or chosen),
         model=patched,
-        found=beside_the_numbers(study, said, before, after, caveats),
+        found=beside_the_numbers(study, said, before, after, caveats, rest),
     )
 
 

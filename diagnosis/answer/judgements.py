@@ -88,21 +88,31 @@ def zeros_apart(study: Study) -> tuple[Fact, ...]:
 
 
 def beside_the_numbers(
-    study: Study, place: PlaceFound | Nowhere, before: Estimates, after: Estimates, caveats: tuple[Fact, ...]
+    study: Study,
+    place: PlaceFound | Nowhere,
+    before: Estimates,
+    after: Estimates,
+    caveats: tuple[Fact, ...],
+    rest: Remainder,
 ) -> Found:
     """Facts about an answer that are not numbers of it.
 
     Args:
         before: the coefficients without the causes.
         after: the coefficients with them.
+        rest: the remaining gap: where it could change the coefficients, the gap is not immaterial.
     """
     runs = study.nominal.problem.data.runs
     return Found(
         place=place if isinstance(place, PlaceFound) else None,
         nowhere=place if isinstance(place, Nowhere) else None,
         both_winds=len({run.wind_on for run in runs}) > 1,
+        robot=study.model.of_robot and not any(run.wind_on for run in runs),
+        driven=all(run.drive is not None for run in runs),
         nearly=nearly(study),
-        immaterial=immaterial(before, after, study.settings.words) if study.named else {},
+        immaterial=(
+            immaterial(before, after, study.settings.words) if study.named and not rest.material else {}
+        ),
         choices=spring_choices(study),
         hold=other_hold(study),
         noise=study.prepared.noise.reason,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,50 +12,52 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.normal_equations import project_release
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import RunData
+from diagnosis.model.run_data import Data, RunData
+from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
 
-_ANGLES = (0.35, 0.14)  # rad
-_SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
+_ANGLES = (1.0, 0.4)  # of the largest swing of the runs
 _DURATIONS = (10.0, 30.0)  # s
+_MOST_SPEEDS = 4
 _PHASES = 8  # of the true model's periodic effect, to average over
 _PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, one or two), to fit
 
 
 def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
-    """The feasible run for which two models, fitted to the same runs, predict the most different readings.
+    """The run for which two models, fitted to the same runs, predict the most different readings.
+
+    The rig can make it: springs, wind speeds and angles are those of its runs.
 
     Returns:
         Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected separation
-        (see `separation`) in standard deviations of the noise; None where no stiffness is known. The spring is one
-        of the campaign's, unless no run with these would distinguish the models.
+        (see `separation`) in standard deviations of the noise. None where no stiffness is known, and where a free
+        decay does not show the question: every run is driven, or the models differ in an effect of the input.
     """
     data = first.problem.data
-    known = _best_run(first, second, [k for k in data.model.planned_springs(data) if k in data.springs])
-    if known is not None and known["separation"] >= data.settings.answer.separated_by:
-        return known
-    others = data.model.planned_springs(data)
-    best = _best_run(first, second, others[:: max(1, len(others) // 4)])
-    return max((one for one in (known, best) if one), key=lambda one: one["separation"], default=None)
-
-
-def _best_run(first: Fit, second: Fit, springs: Sequence[float]) -> dict[str, Any] | None:
-    """The run with one of some springs that separates the models most; None without a spring."""
-    data = first.problem.data
+    differ = set(first.problem.effects) ^ set(second.problem.effects)
+    if all(run.drive is not None for run in data.runs) or any(kind.driven for kind in differ):
+        return None
     density = max((run.air_density for run in data.runs), default=0.0) or 1.2
-    speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
     found = []
-    for spring, speed, duration in itertools.product(springs, speeds, _DURATIONS):
+    for spring, speed, duration in itertools.product(
+        data.model.planned_springs(data), _speeds(data), _DURATIONS
+    ):
         run = planned_run(
             first, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
         )
-        for angle in _ANGLES:
+        for angle in (share * data.swing for share in _ANGLES):
             apart = separation(first, second, run, angle)
             if apart is not None:
                 design = {"spring_stiffness": spring, "wind_speed": speed, "release_angle": angle}
                 found.append(design | {"duration": duration, "separation": apart})
     return max(found, key=lambda one: one["separation"], default=None)
+
+
+def _speeds(data: Data) -> list[float]:
+    """Wind off, and up to `_MOST_SPEEDS` settings of the campaign's wind, the fastest among them, m/s."""
+    known = sorted({0.0, *speed_groups(run.wind_speed for run in data.runs).values()}, reverse=True)
+    return sorted({0.0, *known[:: -(-len(known) // _MOST_SPEEDS)]})
 
 
 def planned_run(

@@ -41,7 +41,8 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
     Returns:
         One for each run in which two decaying oscillations leave far less than one does, and are farther apart
         than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first
-        half or its first quarter. A motion that decays before it reverses is not a mode. Driven runs are left out.
+        half or its first quarter. A motion that shows fewer than three cycles is not a mode. Driven runs are left
+        out.
     """
     modes = []
     for run in campaign.runs:
@@ -61,7 +62,8 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
                 continue
             order = np.argsort(np.abs(two.frequency - one.frequency[0]))
             resolution = float(two.rate.sum()) / np.pi
-            if np.any(two.frequency < chosen.second_mode_cycles * two.rate):
+            lifetime = np.minimum(1.0 / np.maximum(two.rate, 1e-300), interval * values.size)
+            if np.any(two.frequency * lifetime < chosen.second_mode_cycles):
                 continue  # an impulse or a drift, and no oscillation
             turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:

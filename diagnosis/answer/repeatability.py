@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc, stdtr
+from scipy.special import fdtrc, ndtri, stdtr
 
-from diagnosis.facts.repeatability import Repeatability, RunRepeat, Spread, Trend
+from diagnosis.facts.repeatability import Repeatability, RunRepeat, ScatterLimits, Spread, Trend
 from diagnosis.likelihood.between_runs import RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
@@ -24,8 +24,10 @@ from identification.campaign.between_runs import (
 )
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.record import Array
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
+_AT_MOST = 0.95  # level of a limit
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
 _FEWEST = 5  # fewest runs for an outlier or a drift
 _OF_TREND = 2  # numbers of a straight line
@@ -46,7 +48,8 @@ def repeatability(fitted: Fit) -> Repeatability | None:
     runs = tuple(found.run(index) for index in range(len(fitted.problem.data.runs)))
     rate = fitted.settings.scatter.outlier_rate
     outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
-    return Repeatability(found.spreads(), runs, outliers[0].id if outliers else "", found.trends())
+    outlier = outliers[0].id if outliers else ""
+    return Repeatability(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +121,28 @@ class _Runs:
             spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
         return tuple(spreads)
 
+    def limits(self) -> ScatterLimits | None:
+        """Limits of the scatter of frequency and damping; None where the fit has chance differences.
+
+        A limit is the quantile of the width given the runs. Where it is hardly below the quantile of the prior, the
+        runs say nothing about the scatter.
+        """
+        if self.kept:
+            return None
+        pair = list(self.alone)
+        problem = replace(self.fitted.problem, scatter=tuple(self.scatter[place] for place in pair))
+        prior = width_prior(problem)
+        products = RunProducts.of(
+            [one[:, pair] for one in self.columns.deviations], self.columns.common, self.columns.seen
+        )
+        widths = width_quantiles(products, prior, (_AT_MOST,))[0]
+        unseen = prior.usual * 10.0 ** (prior.decades * float(ndtri(_AT_MOST)))
+        per = np.array([self._per(index) for index in range(len(self.fitted.problem.data.runs))])
+        sizes = widths * np.sqrt(np.mean(per**2, axis=0))
+        told = widths <= self.fitted.settings.scatter.limit_told * unseen
+        frequency, damping = (float(size) if known else None for size, known in zip(sizes, told, strict=True))
+        return ScatterLimits(frequency, damping)
+
     def trends(self) -> tuple[Trend, ...]:
         """Parameters that differ between the runs and follow their order.
 
@@ -151,17 +176,26 @@ class _Runs:
         only = kind.name in known and drifts(self.fitted, known.index(kind.name))
         return Trend(kind.name, float(slope), std, p_value, left, only)
 
+    def _changes(self, index: int) -> Array:
+        """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""
+        problem = self.fitted.problem
+        run = problem.data.runs[index]
+        stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
+        table = SettingsTable.of([stated])
+        return np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
+
+    def _per(self, index: int) -> Array:
+        """Relative changes of a run's frequency and damping by a unit of its own spring and damper, shape (2,)."""
+        changes, pair = self._changes(index), self.alone
+        _, damping, stiffness = linear_coefficients(self.fitted, index)
+        return np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
+
     def run(self, index: int) -> RunRepeat:
         """One run against the model."""
         problem = self.fitted.problem
         run, pair = problem.data.runs[index], self.alone
-        stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
         inertia, damping, stiffness = linear_coefficients(self.fitted, index)
-        table = SettingsTable.of([stated])
-        # of its stiffness and its damping
-        changes = np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
-        # a change of the run's own spring and damper is a change of its frequency and its damping
-        per = np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
+        changes, per = self._changes(index), self._per(index)
         deviation = self.columns.deviations[index][:, pair]
         covariance = np.linalg.pinv(deviation.T @ deviation)
         own = per * (covariance @ (deviation.T @ self.columns.seen[index]))

@@ -20,6 +20,7 @@ class Decision:
         effects: effects common to the likely answers, with their probabilities.
         channels: channels on which all likely answers act, with their probabilities.
         unpredictive: the answer, where it is probable enough but does not predict them; else empty.
+        elsewhere: the answer, where it is probable enough but the residuals show another place; else empty.
     """
 
     decided: bool
@@ -27,26 +28,33 @@ class Decision:
     effects: Mapping[str, float]
     channels: Mapping[str, float]
     unpredictive: str = ""
+    elsewhere: str = ""
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The fields ``decided``, ``unpredictive``, ``credible`` and ``common`` of a document."""
+        """The fields ``decided``, ``unpredictive``, ``elsewhere``, ``credible`` and ``common`` of a document."""
         return {
             "decided": self.decided,
             "unpredictive": self.unpredictive,
+            "elsewhere": self.elsewhere,
             "credible": [{"effect": effect, "probability": value} for effect, value in self.credible],
             "common": {"effects": dict(self.effects), "channels": dict(self.channels)},
         }
 
 
 def decision(
-    answers: Sequence[tuple[str, float]], chosen: AnswerSettings, closed: float | None = None
+    answers: Sequence[tuple[str, float]],
+    chosen: AnswerSettings,
+    closed: float | None = None,
+    *,
+    elsewhere: bool = False,
 ) -> Decision:
-    """Judge the answers by their probabilities, and the first of them by its predictions.
+    """Judge the answers by their probabilities, and the first of them by its predictions and its place.
 
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
         closed: share of the gap that the answer explains on held-out readings; None: not known.
+        elsewhere: whether the residuals show a place at which none of its causes acts.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):
@@ -63,8 +71,9 @@ def decision(
     names_effects = first not in ("none", "unknown")
     predicts = not names_effects or closed is None or closed >= chosen.predicted_from
     return Decision(
-        decided=probable and predicts,
+        decided=probable and predicts and not (names_effects and elsewhere),
         unpredictive=first if probable and not predicts else "",
+        elsewhere=first if probable and names_effects and elsewhere else "",
         credible=tuple(credible),
         effects=_common(causes, chosen.in_common),
         channels=_common(

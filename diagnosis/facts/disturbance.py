@@ -11,8 +11,8 @@ class Disturbance:
 
     Args:
         run: id of the run.
-        at_s: the instant, by the time stamps of the run, s.
-        kept_until_s: end of the part that is used, by the same stamps, s; None where the run is left out, or used
+        at_s: the instant, by the clock of the run's file, s.
+        kept_until_s: end of the part that is used, by the same clock, s; None where the run is left out, or used
             as a whole.
         p_value: probability of as large a jump among all runs and instants, by chance and by causes that act in
             all runs, a fraction.

@@ -51,6 +51,10 @@ class Noted:
         return {**self.fact.to_json_dict(), "runs": list(self.runs)}
 
 
+BETWEEN_RUNS = ("frequency between runs", "damping between runs")
+"""Kinds of reasons by which most of a gap is between the runs."""
+
+
 @dataclass(frozen=True)
 class PlaceFound:
     """The reasons for the place of a gap.
@@ -65,7 +69,9 @@ class PlaceFound:
         channel: the reason for the channel.
         condition: the reason for the condition.
         compared: all causes of the answer, whose channels are compared with the place.
-        agrees: whether any of them acts there.
+        agrees: whether any of them acts there, or its residual points there.
+        alike: whether the residual of one points there, though none acts there.
+        elsewhere: whether the place contradicts the causes: none of them acts there. Such an answer is not decided.
     """
 
     runs: int
@@ -78,6 +84,8 @@ class PlaceFound:
     condition: Fact
     compared: tuple[str, ...] = ()
     agrees: bool = False
+    alike: bool = False
+    elsewhere: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,6 +200,8 @@ class Found:
         place: reasons for the place of the gap; None where there is no gap, or no place.
         nowhere: the residuals of a campaign without a gap; else None.
         both_winds: whether the wind is off in some runs and on in others.
+        robot: whether the body is the joint of a machine, and not a body in a tunnel.
+        driven: whether every run is driven.
         nearly: effects that nearly explain an unexplained gap; None where there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
@@ -207,6 +217,8 @@ class Found:
     place: PlaceFound | None = None
     nowhere: Nowhere | None = None
     both_winds: bool = False
+    robot: bool = False
+    driven: bool = False
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()

@@ -79,6 +79,20 @@ class RunRepeat:
 
 
 @dataclass(frozen=True)
+class ScatterLimits:
+    """Upper limits of scatter that was not detected, under a model that explains the runs down to their noise.
+
+    Args:
+        frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction; None
+            where the runs would hide usual scatter.
+        damping: of the damping ratio, as ``frequency``.
+    """
+
+    frequency: float | None
+    damping: float | None
+
+
+@dataclass(frozen=True)
 class AnswerWithout:
     """The answer from the other runs, without a run that deviates far beyond them.
 
@@ -101,6 +115,7 @@ class Repeatability:
         outlier: id of the run that deviates far beyond the others; empty: none.
         trends: numbers that drift over the campaign, beyond chance.
         without_outlier: the answer without that run; None: there is none, or the others cannot be diagnosed.
+        limits: of scatter where none was detected or stated; else None.
     """
 
     spreads: tuple[Spread, ...] = ()
@@ -108,3 +123,4 @@ class Repeatability:
     outlier: str = ""
     trends: tuple[Trend, ...] = ()
     without_outlier: AnswerWithout | None = None
+    limits: ScatterLimits | None = None

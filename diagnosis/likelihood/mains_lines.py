@@ -8,10 +8,11 @@ where sine and cosine are not distinct.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import Line, ResidualSpectrum, block_gain, resonance, smooth_spectra
@@ -67,6 +68,9 @@ class MainsLine(Line):
         later: power in the later halves of these runs over that in the earlier halves, dimensionless.
         evidence: drop of χ² beyond chance, at all visible multiples of the frequency, dimensionless.
         folds: number of times the line is folded, in the run of the lowest sample rate.
+        beside: p-value of the clearest lower multiple that is visible; 1 where none is.
+        covered: share of the visible spectrum in which mains lines as plain as this one are sought: the probability
+            that a line of another source is taken for it.
     """
 
     harmonic: int
@@ -78,6 +82,13 @@ class MainsLine(Line):
     later: float
     evidence: float
     folds: int
+    beside: float = 1.0
+    covered: float = 0.0
+
+    @property
+    def plainness(self) -> tuple[int, int]:
+        """Number of foldings, and the multiple: the less, the less far-fetched."""
+        return self.folds, self.harmonic
 
 
 def apparent(frequency: float | Array, interval: float) -> Array:
@@ -230,10 +241,13 @@ def fastest(fit: Fit) -> float:
     return max(resonance(fit, i) for i in range(len(fit.problem.data.runs)))
 
 
-def mains_lines(fit: Fit) -> list[MainsLine]:
+def mains_lines(fit: Fit, stated: float = 0.0) -> list[MainsLine]:
     """The strongest line at every visible multiple of each nominal frequency of the mains.
 
     Ordered by nominal frequency, then by multiple.
+
+    Args:
+        stated: nominal frequency of the mains, Hz of the rig as measured; 0: not stated, and both are sought.
     """
     data = fit.problem.data
     length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
@@ -241,11 +255,14 @@ def mains_lines(fit: Fit) -> list[MainsLine]:
         _Pieces.of(run, residual, fastest(fit), resonance(fit, i), length)
         for i, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True))
     ]
-    sought = list(_sought(runs, data.similarity))
+    sought = list(_sought(runs, data.similarity, (stated,) if stated > 0.0 else MAINS))
     trials = sum(_places(runs, *one) for one in sought)
     whole = smooth_spectra(fit)
     found = (_line(runs, whole, *one, trials) for one in sought)
-    return [line for line in found if line is not None]
+    lines = [line for line in found if line is not None]
+    widths = [(_foldings(runs, *one), one[1], _share_of_spectrum(runs, *one)) for one in sought]
+    covers = [sum(w for *plain, w in widths if tuple(plain) <= line.plainness) for line in lines]
+    return [replace(line, covered=share) for line, share in zip(lines, covers, strict=True)]
 
 
 def mains_line(fit: Fit) -> MainsLine | None:
@@ -254,10 +271,14 @@ def mains_line(fit: Fit) -> MainsLine | None:
 
 
 def _sought(
-    runs: list[_Pieces], similarity: Similarity
+    runs: list[_Pieces], similarity: Similarity, mains: Sequence[float]
 ) -> Iterator[tuple[float, int, float, tuple[int, ...]]]:
-    """Nominal frequency (Hz), multiple, range (a share) and run numbers of every line that is sought."""
-    for own in MAINS:
+    """Nominal frequency (Hz), multiple, range (a share) and run numbers of every line that is sought.
+
+    Args:
+        mains: the nominal frequencies, Hz of the rig as measured.
+    """
+    for own in mains:
         nominal = similarity.similar(own, "Hz")
         for harmonic in HARMONICS:
             reaches = [run.reach(harmonic * nominal) for run in runs]
@@ -272,6 +293,25 @@ def _places(
     """Number of independent places in a range: two in each spectral line, as a window halves the record."""
     longest = max(runs[i].duration for i in concerned)
     return 2.0 * (2.0 * reach * harmonic * nominal * longest + 1.0)
+
+
+def _foldings(
+    runs: list[_Pieces], nominal: float, harmonic: int, reach: float, concerned: tuple[int, ...]
+) -> int:
+    """Number of times the middle of a range is folded, in the run of the lowest sample rate."""
+    del reach
+    return max(int(np.round(harmonic * nominal * runs[i].run.interval)) for i in concerned)
+
+
+def _share_of_spectrum(
+    runs: list[_Pieces], nominal: float, harmonic: int, reach: float, concerned: tuple[int, ...]
+) -> float:
+    """Width of a range as a share of the visible spectrum beyond the motion, in the run where it is largest."""
+    width, shares = 2.0 * reach * harmonic * nominal, []
+    for i in concerned:
+        lowest, highest = _limits(runs[i].run.interval, runs[i].duration, runs[i].motion)
+        shares.append(width / (highest - lowest))
+    return max(shares)
 
 
 def _line(
@@ -326,7 +366,25 @@ def _line(
         later=float(later) / max(float(earlier), 1e-9),
         evidence=_evidence(runs, frequency),
         folds=max(int(np.round(refined * run.run.interval)) for run in among),
+        beside=_beside(runs, frequency, harmonic),
     )
+
+
+def _beside(runs: list[_Pieces], frequency: float, harmonic: int) -> float:
+    """P-value of the clearest visible multiple below another one, times their number; 1 where none is visible."""
+    tests = []
+    for lower in range(1, harmonic):
+        power, freedom = 0.0, 0
+        for run in runs:
+            shown = shown_multiples(frequency, run.run.interval, run.duration, run.motion)
+            if lower in shown:
+                power, freedom = (
+                    power + float(run.power[run.index(lower * frequency)]),
+                    freedom + 2 * run.count,
+                )
+        if freedom:
+            tests.append(float(chdtrc(freedom, power)))
+    return min(1.0, len(tests) * min(tests)) if tests else 1.0
 
 
 def _refined(runs: list[_Pieces], spectra: list[ResidualSpectrum], place: float) -> float:

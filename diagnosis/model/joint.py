@@ -49,6 +49,7 @@ class _OfLaw(NominalModel):
 
     law: JointLaw = field(kw_only=True)
 
+    of_robot: ClassVar[bool] = True
     resonance_known: ClassVar[bool] = True
 
     @property
@@ -214,17 +215,13 @@ class Joint(_OfLaw, Rig):
     def unseen(self, data: Data) -> Sequence[str]:
         """The limits of a single spring."""
         if data.driven:
-            return ("structural as opposed to viscous damping: there is one spring only",)
+            return ("structural as opposed to viscous damping: the joint has one stiffness",)
         return super().unseen(data)
 
     @property
     def unseen_scale(self) -> str:
         """The clause on a common scale that driven runs cannot show."""
         return "a scale of the input moment as opposed to a scale of the inertia and all moments of the model"
-
-    def planned_springs(self, data: Data) -> tuple[float, ...]:
-        """The stiffness of the law, which cannot be chosen."""
-        return data.springs
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ class LooseBody(NominalModel):
     """A driven body that nothing holds: Izz β̈ + C β̇ = M + M0."""
 
     restored: ClassVar[bool] = False
+    of_robot: ClassVar[bool] = True
     resonance_known: ClassVar[bool] = True
     coefficient_units: ClassVar[Mapping[str, str]] = {
         "yaw_inertia": "kg m2",

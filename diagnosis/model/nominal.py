@@ -22,7 +22,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
@@ -68,6 +68,8 @@ class NominalModel:
     per_inertia: ClassVar[bool] = False
     #: Whether anything restores the body, so that it swings about a place and its angle does not drift away.
     restored: ClassVar[bool] = True
+    #: Whether the body is the joint of a machine, whose springs and wind cannot be chosen.
+    of_robot: ClassVar[bool] = False
     #: Whether the resonance of a driven run is known, and need not show in it.
     resonance_known: ClassVar[bool] = False
     #: Units of the coefficients that it states, by name.
@@ -389,10 +391,10 @@ class NominalModel:
 
     def blind_spots(self, data: Data) -> tuple[str, ...]:
         """The limits of these runs, as clauses; those of every campaign are last."""
-        speeds = {run.wind_speed for run in data.runs if run.wind_on}
+        speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
         found = [*self.unseen(data)]
         if not data.wind_on:
-            found.append("any effect of the air: there is no run with the wind on")
+            found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
             found.append(
                 "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
@@ -425,7 +427,7 @@ class NominalModel:
 
     def planned_springs(self, data: Data) -> tuple[float, ...]:
         """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
-        return tuple(sorted({round(k * f, 2) for k in data.springs for f in _FACTORS} | set(data.springs)))
+        return data.springs
 
 
 @lru_cache(maxsize=8)
@@ -441,7 +443,6 @@ def _program(text: str, spring: float) -> tuple[float, ...]:
 
 _OF_A_DECAY = 2  # numbers that a run determines: its frequency and its damping
 _PHASES = 64  # of a cycle, for its mean
-_FACTORS = (0.5, 1.0, 2.0)  # on the stiffnesses of the campaign's springs
 ALWAYS_BLIND = (
     "a constant sensor lag or filter: it only shifts the release",
     "an error of the clock",

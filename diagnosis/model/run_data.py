@@ -17,6 +17,7 @@ from diagnosis.settings import Settings
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -450,7 +451,10 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
         every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
         without them. The only run of its kind is in no group.
     """
-    order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
+    setting = speed_groups(run.wind_speed for run in data.runs)
+    order = sorted(
+        data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, setting[run.wind_speed])
+    )
     free = [run for run in order if _covers(data, [run])]
     count = min(count, len(free))
     if count < 2:

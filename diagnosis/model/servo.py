@@ -53,6 +53,7 @@ class _OfServo(NominalModel):
 
     kv: float = 0.0
 
+    of_robot: ClassVar[bool] = True
     resonance_known: ClassVar[bool] = True  # a servo may be damped so well that none shows
 
     def of(self, campaign: Campaign) -> NominalModel:

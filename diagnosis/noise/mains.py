@@ -61,25 +61,29 @@ def find_hum(nominal: Fit) -> float | None:
     frequencies explain the same sampled lines, the one of least folding, then of the lowest multiple, is taken.
     """
     chosen = nominal.settings.read_off
-    found = [line for line in mains_lines(nominal) if _is_hum(line, chosen)]
+    stated = chosen.mains_hz
+    found = [line for line in mains_lines(nominal, stated) if _is_hum(line, chosen, known=stated > 0.0)]
     if not found:
         return None
     most = max(line.evidence for line in found)
     alike = (line for line in found if line.evidence >= (1.0 - chosen.hum_alike) * most)
-    return min(alike, key=_plainness).parameter
+    return min(alike, key=lambda line: line.plainness).parameter
 
 
-def _plainness(line: MainsLine) -> tuple[int, int]:
-    """Number of foldings of a line, and its multiple."""
-    return line.folds, line.harmonic
-
-
-def _is_hum(line: MainsLine, chosen: ReadOffSettings) -> bool:
+def _is_hum(line: MainsLine, chosen: ReadOffSettings, *, known: bool) -> bool:
     """Whether a line exceeds chance and its surroundings, in most runs, and in their later halves as well.
 
     A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
-    therefore rejected. A mode excited at the release decays.
+    therefore rejected. A mode excited at the release decays. A line of another source may lie in any of the ranges
+    that are searched, so a folded harmonic counts only beside a lower one, or where the mains are stated. No line
+    counts where the ranges cover much of the spectrum.
+
+    Args:
+        known: whether the mains are stated.
     """
+    folded = line.harmonic > 1 and line.folds > 0 and not known
+    if (folded or line.covered > chosen.hum_covered) and line.beside >= chosen.hum_run_rate:
+        return False
     chance = float(chdtri(line.freedom, chosen.hum_rate / line.trials))
     shown = line.powers > chdtri(2.0 * line.pieces, chosen.hum_run_rate)
     return (

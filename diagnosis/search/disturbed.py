@@ -62,7 +62,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     similarity, chosen = nominal.problem.data.similarity, nominal.settings.selection
     runs = {run.id: run for run in nominal.problem.data.runs}
     index = {run.id: place for place, run in enumerate(nominal.problem.data.runs)}
-    stamps = {run.id: run.record.time_s for run in measured.runs}
+    origins = {run.id: float(run.record.time_s[0]) + run.clock_s for run in measured.runs}
     seen = {one.id: one for one in jumps(nominal)}
     found = []
     for name, p_value in beyond_the_others(list(seen.values()), chosen):
@@ -73,7 +73,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         while first > 0 and _clear(float(one.chance[first - 1]), chosen):
             first -= 1
         last = min(float(one.time[first]), float(one.time[most]) - 1.0 / frequency)
-        begun = float(stamps[name][0]) + similarity.own(runs[name].start, "s")
+        begun = origins[name] + similarity.own(runs[name].start, "s")
         at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
         kept = until if last * frequency >= chosen.disturbed_kept else None
         found.append(Disturbance(name, at, kept, p_value))
@@ -127,7 +127,7 @@ def undisturbed(campaign: Campaign, disturbed: Sequence[Disturbance]) -> Campaig
     for run in kept.runs:
         end = until.get(run.id)
         if end is not None:
-            inside = run.record.time_s < end
+            inside = run.record.time_s < end - run.clock_s
             run = replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
         runs.append(run)
     return replace(kept, runs=tuple(runs))

@@ -197,9 +197,13 @@ def is_plausible(fitted: Fit) -> bool:
     ]
     if any(name in problem.names and fitted.bound(name) for name in inside):
         return False
-    motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
+    motions = [
+        (2.0 * np.pi * resonance(fitted, i), run.duration) for i, run in enumerate(fitted.problem.data.runs)
+    ]
     return all(
-        np.mean([effect.plausible(omega) for omega in motions]) >= chosen.plausible_runs for effect in effects
+        np.mean([effect.plausible(omega) and effect.shown_in(duration) for omega, duration in motions])
+        >= chosen.plausible_runs
+        for effect in effects
     )
 
 

@@ -245,6 +245,20 @@ class ReadOffSettings:
         "judgement",
         "Hum from an amplifier or a lamp may change by a factor of two. A mode excited at the release decays more.",
     )
+    hum_covered: float = setting(
+        0.2,
+        "Maximum share of the spectrum that is searched for mains lines as plain as that of a hum: the probability "
+        "that a line of another source is taken for hum.",
+        "judgement",
+        "Beside a lower multiple of the mains the line needs no such limit.",
+    )
+    mains_hz: float = setting(
+        0.0,
+        "Frequency of the mains as you know it, 50 or 60 Hz; 0: not known. Folded harmonics then count alone.",
+        "judgement",
+        "Most campaigns do not state it.",
+        unit="Hz",
+    )
     hum_alike: float = setting(
         0.02,
         "Maximum relative difference in evidence at which two mains frequencies explain the lines equally well.",

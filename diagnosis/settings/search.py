@@ -365,6 +365,13 @@ class ScatterSettings:
         "One effect in 16,000 reaches this size by chance.",
         unit="std",
     )
+    limit_told: float = setting(
+        0.5,
+        "Maximum ratio of the upper limit of a scatter that is not detected to its limit before any run, for the "
+        "runs to say something about it.",
+        "judgement",
+        "Above it the limit is the prior's.",
+    )
     widths_settled: float = setting(
         1.0,
         "Drop of −2 ln L above which a fit is repeated with new widths of the scatter.",

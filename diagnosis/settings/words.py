@@ -157,10 +157,10 @@ class WordsSettings:
         "judgement",
     )
     second_mode_cycles: float = setting(
-        0.5,
-        "Minimum number of cycles of a mode within its lifetime.",
+        3.0,
+        "Minimum number of cycles of a mode within its lifetime and within its record.",
         "judgement",
-        "A motion that decays sooner never reverses.",
+        "Fewer do not distinguish an oscillation from a drift or an impulse.",
         unit="cycles",
     )
     runs_listed: int = setting(12, "Maximum number of runs in a sentence.", "judgement", unit="runs")

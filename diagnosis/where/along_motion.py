@@ -154,6 +154,20 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
     return angle / omega**run.derivative, rate / omega**run.derivative
 
 
+def amplitude_about_rest(fit: Fit, index: int) -> Array:
+    """Amplitude of the fitted motion of a run about its rest, rad, shape (n,).
+
+    A free decay ends at the zero of the fit. A driven body, or one that nothing holds, may rest anywhere, so the
+    middle of its run counts.
+    """
+    angle, rate = motion(fit, index)
+    data = fit.problem.data
+    run = data.runs[index]
+    if run.derivative == 0 and (run.drive is not None or not data.model.restored):
+        angle = angle - float(np.mean(angle))
+    return np.asarray(np.hypot(angle, rate), np.float64)
+
+
 def apparent_moment(fit: Fit, index: int) -> Apparent | None:
     """The moment missing from the model in a run; None where the run is too short, too slow or not of an angle."""
     run = fit.problem.data.runs[index]

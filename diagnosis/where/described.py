@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from diagnosis.facts.found import Nowhere, PlaceFound
+from diagnosis.facts.found import BETWEEN_RUNS, Nowhere, PlaceFound
 from diagnosis.result import Where
 from diagnosis.settings import Settings
 from diagnosis.where.excess import bands_beyond_chance
@@ -23,11 +24,19 @@ def nowhere(found: Survey, *, within_step: bool) -> Nowhere:
     return Nowhere(count, min(1.0, count * min(run.p_value for run in found.maps.runs)), within_step)
 
 
-def described(where: Where, place: Place, compared: Sequence[type[Effect]], settings: Settings) -> PlaceFound:
+def described(
+    where: Where,
+    place: Place,
+    compared: Sequence[type[Effect]],
+    settings: Settings,
+    *,
+    scattering: bool = False,
+) -> PlaceFound:
     """The facts about a place.
 
     Args:
         compared: causes that have to agree with it.
+        scattering: whether the runs differ from each other by chance in the answer.
     """
     maps, chosen = place.survey.maps, settings.words
     length, greatest = float(maps.time.edges[-1]), float(maps.amplitude.edges[-1])
@@ -38,6 +47,7 @@ def described(where: Where, place: Place, compared: Sequence[type[Effect]], sett
     beyond = bands_beyond_chance(maps.bands, settings.where)
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
     shown = [b for b in maps.bands if b.band in beyond and b.excess > chosen.band_listed * whole]
+    against = judged(where.channel, place.channel.reason.kind, compared, scattering=scattering)
     return PlaceFound(
         runs=len(maps.runs),
         share=sum(run.share for run in maps.runs if run.id in where.runs),
@@ -52,5 +62,44 @@ def described(where: Where, place: Place, compared: Sequence[type[Effect]], sett
         channel=place.channel.reason,
         condition=place.condition.reason,
         compared=tuple(kind.name for kind in compared),
-        agrees=any(where.channel in (kind.channel, *kind.resembles) for kind in compared),
+        **vars(against),
     )
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The place against the causes: the verdict, the decision and the sentences on the place follow it.
+
+    Args:
+        agrees: whether any cause acts there, or its residual points there.
+        alike: whether the residual of one points there, though none acts there.
+        elsewhere: whether the place contradicts the causes.
+    """
+
+    agrees: bool
+    alike: bool
+    elsewhere: bool
+
+
+def judged(
+    channel: str | None, reason: str, compared: Sequence[type[Effect]], *, scattering: bool
+) -> Judgement:
+    """Judge causes by the place that the residuals show.
+
+    A wrong stated value changes stiffness and damping alike, so no place contradicts it. Neither does a gap
+    between runs contradict runs that differ from each other. A random moment shifts frequency and damping along the
+    decay of every run by chance.
+
+    Args:
+        channel: on which the gap acts; None: not known.
+        reason: its kind.
+        compared: the causes; empty where none is named.
+        scattering: whether the runs differ from each other by chance in the answer.
+    """
+    acting = {kind.channel for kind in compared}
+    agrees = channel in acting | {one for kind in compared for one in kind.resembles}
+    by_chance = any(kind.random for kind in compared) and reason.endswith("along the decay")
+    between = scattering and reason in BETWEEN_RUNS
+    open_to_any = channel is None or "calibration" in acting or by_chance or between
+    elsewhere = bool(compared) and not agrees and not open_to_any
+    return Judgement(agrees, agrees and channel not in acting, elsewhere)

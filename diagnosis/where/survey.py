@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.run_data import RunData
-from diagnosis.where.along_motion import apparent_moment, backbones, motion, phase_plane
+from diagnosis.where.along_motion import amplitude_about_rest, apparent_moment, backbones, phase_plane
 from diagnosis.where.excess import (
     Profile,
     RunExcess,
@@ -22,7 +22,7 @@ from diagnosis.where.excess import (
     within_bands,
 )
 from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.record import Array
 
 _TIME_BINS = 60
@@ -74,7 +74,7 @@ class _Samples:
         inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
         return cls(
             [_times(nominal, i) for i in range(len(runs))],
-            [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
+            [amplitude_about_rest(scaled, i) for i in range(len(runs))],
             [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
             [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
             # squares of filtered noise are correlated: as many are independent as coefficients pass
@@ -203,6 +203,7 @@ def _groups(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[G
     """Mean excess of the runs that share a condition; conditions that do not vary are left out."""
     runs, similarity = fit.problem.data.runs, fit.problem.data.similarity
     levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
+    speeds = speed_groups(run.wind_speed for run in runs)
     keys = {
         "wind": ["on" if run.wind_on else "off" for run in runs],
         "spring": [
@@ -211,7 +212,7 @@ def _groups(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[G
             else f"{similarity.own(run.spring_stiffness, 'N m/rad'):g} N m/rad"
             for run in runs
         ],
-        "speed": [f"{run.wind_speed:g} m/s" for run in runs],
+        "speed": [f"{speeds[run.wind_speed]:g} m/s" for run in runs],
         "amplitude": [f"{0.05 * round(start / 0.05):.2f} rad" for start in starts],
     }
 
@@ -240,12 +241,13 @@ def _times(fit: Fit, index: int) -> Array:
 
 def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> Grid:
     """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
-    speeds = sorted({run.wind_speed for run in runs})
+    setting = speed_groups(run.wind_speed for run in runs)
+    speeds = sorted(set(setting.values()))
     shared = len(speeds) == 1
     longest = max(float(time[-1]) for time in samples.time)
     edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
     places = [
-        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
+        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(setting[run.wind_speed]))
         for run, time in zip(runs, samples.time, strict=True)
     ]
     columns = []

@@ -164,7 +164,8 @@ def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, 
 
 def advice(document: Document, name: str) -> str:
     """What to do about a cause, with the values that it names, without a full stop."""
-    said = {kind.name: kind.advice for kind in known_effects()}.get(name)
+    robot = bool(document["found"].get("robot"))
+    said = {kind.name: (robot and kind.advice_for_joint) or kind.advice for kind in known_effects()}.get(name)
     if not said:
         return f"Repair or model the cause of {plain(name)}"
     values = _parameters(document["candidates"][0], name)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.numbers import listed, plain, probability
+from diagnosis.words.numbers import listed, plain, probability, rounded_up
 from identification.blocks import Table
 from identification.printing import Document, concise, significant, with_std
 from tunnel_sim.effects import ALL_EFFECTS
@@ -48,9 +48,34 @@ def spreads_of(document: Document) -> list[Mapping[str, Any]]:
     return list((document.get("repeatability") or {"spreads": ()})["spreads"])
 
 
+def scatters(document: Document) -> bool:
+    """Whether the runs show scatter, or some is stated."""
+    return any(one["width"] for one in spreads_of(document))
+
+
 def repeats(document: Document) -> bool:
-    """Whether the runs show no scatter, and none is stated."""
-    return not any(one["width"] for one in spreads_of(document))
+    """Whether a test that could see scatter between the runs saw none, and none is stated."""
+    return not scatters(document) and not _undetermined(document)
+
+
+def _undetermined(document: Document) -> str:
+    """The reason why it is not known whether the runs repeat, as a clause; empty where it is known.
+
+    Scatter is measured against the noise, so the answer must explain the runs down to their noise.
+    """
+    if document["causes"] == ["unknown"]:
+        return "since no known effect explains the gap"
+    if not document.get("decided", True):
+        return "since the answer is undecided"
+    if (document.get("rest") or {}).get("significant"):
+        return "since the answer leaves a gap beyond the noise"
+    if (document.get("closable") or {}).get("kind") == "between":
+        return "since a difference between the runs could explain the rest"
+    found = document.get("repeatability") or {}
+    limits = found.get("limits")
+    if limits is None or all(limit is None for limit in limits.values()):
+        return "since these runs would not show usual scatter"
+    return ""
 
 
 def percent_of(value: Share, digits: int = 2, *, sign: bool = False) -> str:
@@ -246,31 +271,60 @@ def repeatability_line(document: Document) -> str:
     if not found or len(found["runs"]) < 2:
         return ""
     if repeats(document):
-        return "Repeatability: the runs repeat, without scatter of frequency or damping."
+        return f"Repeatability: no run-to-run scatter detected: {_limits(found['limits'])}."
+    if not scatters(document):
+        own = [f"{name} by {_root_mean_square(found['runs'], name, '')}" for name in ("frequency", "damping")]
+        return (
+            f"Repeatability: not determined, {_undetermined(document)}. The runs, one by one, deviate from the model "
+            f"in {' and in '.join(own)} (root mean square)."
+        )
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
     beyond = f"; outlier: {found['outlier']}" if found["outlier"] else ""
     return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}."
 
 
-def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
-    """Root mean square scatter of a quantity over the runs, in per cent."""
-    return percent_of((sum(one[f"{name}_band"] ** 2 for one in runs) / len(runs)) ** 0.5)
+def _limits(limits: Mapping[str, float | None]) -> str:
+    """Upper limits of scatter that is not detected, such as ``frequency less than 0.05 %``."""
+    said = [
+        f"{name} not determined, since these runs would not show usual scatter"
+        if limit is None
+        else f"{name} less than {rounded_up(100.0 * limit)} %"
+        for name, limit in limits.items()
+    ]
+    return f"{', '.join(said)} (one standard deviation; 95 % limits)"
+
+
+def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str, of: str = "_band") -> str:
+    """Root mean square of a quantity over the runs, in per cent.
+
+    Args:
+        of: ``_band``: of its scatter between runs; empty: of the runs' own deviations.
+    """
+    return percent_of((sum(one[f"{name}{of}"] ** 2 for one in runs) / len(runs)) ** 0.5)
 
 
 def repeatability_table(document: Document) -> Table:
     """Every run against the model; a table without rows where the runs repeat."""
     found, rows = document.get("repeatability"), []
+    known = scatters(document)
     for run in found["runs"] if found and not repeats(document) else ():
         deviations = [
-            f"{_signed(run[name], run[f'{name}_std'])} (± {percent_of(run[f'{name}_band']).removesuffix(' %')})"
+            f"{_signed(run[name], run[f'{name}_std'])}{_band(run[f'{name}_band']) if known else ''}"
             for name in ("frequency", "damping")
         ]
         remark = "deviates far beyond the others" if found and run["id"] == found["outlier"] else ""
         rows.append((run["id"], "on" if run["windy"] else "off", *deviations, remark))
     heads = ("run", "wind", "frequency [%]", "damping [%]", "remark")
     last = None if any(row[-1] for row in rows) else -1
-    title = "Every run against the model, and its scatter by chance (one standard deviation)"
+    title = "Every run against the model"
+    if known:
+        title += ", and its scatter by chance (one standard deviation)"
     return Table(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
+
+
+def _band(width: Share) -> str:
+    """The scatter of a quantity by chance, such as `` (± 0.039)``."""
+    return f" (± {percent_of(width).removesuffix(' %')})"
 
 
 def _signed(value: float, std: float) -> str:

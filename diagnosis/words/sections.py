@@ -62,7 +62,7 @@ from identification.printing import COEFFICIENTS, Document, significant, trade_o
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
-_UNDETERMINED = "cannot be determined from these runs"
+_UNDETERMINED = "not shown by the residuals alone"
 
 
 def sections(document: Document, campaign: Campaign | None = None) -> tuple[Section, ...]:

@@ -133,7 +133,8 @@ def _answer(document: Document, rest: str) -> str:
             else "No known effect explains it (tunnel effects lists them)."
         )
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
-    last = (explained, rest, _immaterial(facts["immaterial"]) or consequence(document))
+    changes = {} if document["rest"]["material"] else facts["immaterial"]
+    last = (explained, rest, _immaterial(changes) or consequence(document))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
     acting = []
@@ -190,6 +191,11 @@ def undecided_words(document: Document) -> str:
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
         said += f"{best} fits best, but does not predict held-out readings. "
+    if document.get("elsewhere"):
+        best, runs = _among_answers(document["elsewhere"]).capitalize(), document["where"]["runs"]
+        named = 0 < len(runs) <= settings_of(document).words.runs_listed
+        look = _runs(runs) if named else "the runs"
+        said += f"{best} fits best, but the residuals point elsewhere: look at {look} there first. "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
 
 
@@ -351,6 +357,8 @@ def run_to_make(document: Document) -> Document | None:
 def unplannable(document: Document) -> str:
     """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
     known = document["coefficients"]["before"]
+    if document["found"].get("driven"):
+        return f"No run is planned for driven runs: {_OTHER_INPUT}."
     if not known:
         return "No run can be planned: the nominal model was not fitted to any run."
     if "omega_n" in known:
@@ -358,11 +366,14 @@ def unplannable(document: Document) -> str:
     return ""
 
 
+_OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
+
+
 def too_close(run: Mapping[str, float]) -> str:
     """The statement that no run distinguishes two answers."""
     return (
-        "No possible run distinguishes these answers: in the best one they differ by "
-        f"{run['separation']:.1f} standard deviations of the noise."
+        "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
+        f"they differ by {run['separation']:.1f} standard deviations of the noise."
     )
 
 
@@ -381,7 +392,9 @@ def rival_lines(document: Document) -> list[str]:
             if decided
             else "A run that would distinguish the likely answers"
         )
-        lines.append(f"{which}: {run_words(run)}.")
+        lines.append(f"{which}: {_run_words(document, run)}.")
+    elif rivals and document["found"].get("driven"):
+        lines.append(f"To distinguish them, {_OTHER_INPUT}.")
     elif rivals:
         lines.append(
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
@@ -389,19 +402,26 @@ def rival_lines(document: Document) -> list[str]:
     return lines
 
 
-def run_words(run: Mapping[str, float]) -> str:
+def run_words(run: Mapping[str, float], *, robot: bool = False) -> str:
     """A run to make, in words.
 
     Args:
-        run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation in
-            standard deviations of the noise.
+        run: spring stiffness (N m/rad), wind speed (m/s), release angle from the rest (rad), duration (s) and
+            separation in standard deviations of the noise.
+        robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
     """
     wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
+    rig = "" if robot else f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, "
     angle = reading_shown(run["release_angle"], 2)
     return (
-        f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, release at {angle}, "
+        f"{rig}release at {angle}{' from the rest' if robot else ''}, "
         f"duration {run['duration']:g} s (the answers differ by {run['separation']:.0f} standard deviations)"
     )
+
+
+def _run_words(document: Document, run: Mapping[str, float]) -> str:
+    """As `run_words`, for the rig of a document."""
+    return run_words(run, robot=bool(document["found"].get("robot")))
 
 
 def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -428,15 +448,18 @@ def next_steps(document: Document) -> list[str]:
     if causes != _UNKNOWN and document.get("decided", True):
         steps += choice_steps(document)
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
-        words = f"Make the run that distinguishes the answers: {run_words(run)}."
+        words = f"Make the run that distinguishes the answers: {_run_words(document, run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
     if step := model_step(document):
         steps.append(f"{step}.")
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):
-        springs = not unplannable(document) and document.get("model") is None  # stated, and can be chosen
-        kinds = ["springs"] * springs + ["wind speeds"] * windy(document) + ["release angles"]
+        robot, driven = (bool(document["found"].get(name)) for name in ("robot", "driven"))
+        # stated, and can be chosen
+        springs = not robot and not unplannable(document) and document.get("model") is None
+        kinds = ["springs"] * springs + ["wind speeds"] * windy(document)
+        kinds += ["inputs" if driven else "release angles"]
         steps += [
             f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from math import degrees
 from typing import Any
 
+from diagnosis.facts.found import BETWEEN_RUNS
 from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
 from diagnosis.words.scatter import scattering
@@ -48,9 +49,6 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
 """Reasons why a gap acts on a channel, or needs wind: clauses by kind."""
 
 
-_BETWEEN_RUNS = ("frequency between runs", "damping between runs")
-
-
 def reason(given: Mapping[str, Any]) -> str:
     """The clause of a reason, a fact of the document."""
     said = REASONS[given["kind"]]
@@ -76,8 +74,14 @@ def where_words(document: Document) -> str:
         parts.append(f"By frequency: {', '.join(listed)}.")
     channel, condition = reason(place["channel"]), reason(place["condition"])
     words = CHANNELS.get(where["channel"] or "")
-    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
-    between = place["channel"]["kind"] in _BETWEEN_RUNS and bool(scattering(document["causes"]))
+    acts = f"It acts on {words}" if words else "The residuals alone do not show what it acts on"
+    if (
+        words
+        and place["compared"]
+        and (place.get("alike") or not (place["agrees"] or place.get("elsewhere")))
+    ):
+        acts = f"It looks like a change of {words}"  # which the causes bring about as well
+    between = place["channel"]["kind"] in BETWEEN_RUNS and bool(scattering(document["causes"]))
     if between:
         acts, channel = "Most of it is between the runs", "each run alone is linear"
     if where["condition"] is None:
@@ -85,7 +89,11 @@ def where_words(document: Document) -> str:
     else:
         parts.append(f"{acts}: {channel}.")
         if place["wind"]:  # without runs of both winds the condition goes unsaid
-            parts.append(f"It appears {CONDITIONS[where['condition']]}: {condition}.")
+            conditions = {effect_class(name).condition for name in place["compared"]}
+            if conditions and where["condition"] not in conditions:  # the causes act in other runs, too
+                parts.append(f"{condition[:1].upper()}{condition[1:]}.")
+            else:
+                parts.append(f"It appears {CONDITIONS[where['condition']]}: {condition}.")
     return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
 
 
@@ -145,7 +153,8 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     if not place["compared"] or where["channel"] is None:
         return ""
     kinds = [effect_class(name) for name in place["compared"]]
-    there = [kind for kind in kinds if where["channel"] in (kind.channel, *kind.resembles)]
+    there = [kind for kind in kinds if where["channel"] == kind.channel]
+    alike = [kind for kind in kinds if kind not in there and where["channel"] in kind.resembles]
     elsewhere: dict[str, list[str]] = {}
     for kind in (kind for kind in kinds if kind not in there):
         elsewhere.setdefault(CHANNELS[kind.channel], []).append(kind.name)
@@ -155,7 +164,12 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     ]
     if not elsewhere:
         return f"That agrees with {plain(*place['compared'])}."
-    if not there:
-        return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."
-    acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
-    return f"{acts_there[0].upper()}{acts_there[1:]}; {' and '.join(acting)}."
+    if there:
+        acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
+        return f"{acts_there[0].upper()}{acts_there[1:]}; {' and '.join(acting)}."
+    if alike:
+        names = plain(*(kind.name for kind in alike))
+        return f"{names[0].upper()}{names[1:]} look{'s' * (len(alike) == 1)} like this in a decay."
+    if not place.get("elsewhere", True):
+        return ""  # the place does not speak against them
+    return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."

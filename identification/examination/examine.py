@@ -160,7 +160,8 @@ def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     for run in campaign.runs:
         record, first = run.record, find_release(run.record, campaign.sensor)
         if first:
-            what = f"release found at {record.time_s[first]:.3f} s; the samples before it are left out"
+            at = float(record.time_s[first]) + run.clock_s
+            what = f"release found at {at:.3f} s; the samples before it are left out"
             remarks.append(Remark(Outcome.CUT, (run.id,), what, "cut the record by hand if that is wrong"))
             run = replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:]))
         runs.append(run)

@@ -19,7 +19,7 @@ from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.frequency import follow_peaks, starting_decay, starting_frequency
 from identification.signal.noise import reading_noise, white_noise
 from identification.status import Outcome, Remark
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties, speed_groups
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes after the release
@@ -175,9 +175,10 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
     """Groups of two or more centres of equal spring, wind and swing."""
     by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
+    setting = speed_groups(centre.run.wind_speed for centre in centres)
     for centre in centres:
         run = centre.run
-        by_condition[run.spring_stiffness, run.wind_speed, run.air_density].append(centre)
+        by_condition[run.spring_stiffness, setting[run.wind_speed], run.air_density].append(centre)
     groups = []
     for one in by_condition.values():
         left = sorted(one, key=lambda centre: -centre.swing)

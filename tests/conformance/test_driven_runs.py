@@ -321,7 +321,7 @@ IN_WIND = {"wind_speed": 3.0, "air_density": 1.2}
         ("loose", of_first(drive={"column": "base_rad"}), (identify,), "root acts through the spring"),
         (
             "moment",
-            shortened,
+            alone(shortened),
             (diagnose,),
             f"driven and has {LEAST_SAMPLES - 1} samples.*{LEAST_SAMPLES} samples or more",
         ),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.words.scatter import percent_of, repeats
+from diagnosis.words.scatter import percent_of, scatters
 from identification.printing import Document
 from tunnel_lab.plotting.style import INTERVAL, figure, figure_text, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
@@ -43,7 +43,7 @@ def repeatability_figure(document: Document) -> Figure | None:
     panels[0].set_ylim(len(runs) - 0.4, -0.6)
     panels[1].tick_params(axis="y", length=0)
     handles, labels = panels[0].get_legend_handles_labels()
-    if repeats(document):
+    if not scatters(document):
         labels = ["noise (95 %)" if label.startswith("scatter") else label for label in labels]
     fig.legend(
         handles,

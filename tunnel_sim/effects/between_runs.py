@@ -87,6 +87,7 @@ class StiffnessScatter(BetweenRuns):
     on_spring = True
     scatters = "spring_stiffness"
     advice = "Clamp the spring in the same way before every run, or leave it in place"
+    advice_for_joint = "Start every run from the same configuration and temperature"
     equation = "(1 + εi) Kr in run i, εi normal with standard deviation σ, drawn for every run"
     signature = "The frequencies of one spring differ by chance, also with the wind off; its damping repeats."
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
@@ -115,6 +116,7 @@ class DampingScatter(BetweenRuns):
     condition = "always"
     scatters = "mechanical_damping"
     advice = "Run the bearing in before every run, and lay the cable in the same way"
+    advice_for_joint = "Warm the joint up before every run, and lay its cables in the same way"
     equation = "(1 + εi) Cr in run i, εi normal with standard deviation σ, drawn for every run"
     signature = (
         "The damping of equal runs differs by chance, also with the wind off; their frequencies repeat."

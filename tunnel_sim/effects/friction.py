@@ -33,7 +33,7 @@ AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Dry friction in the rod's bearing and potentiometer.
+    """Dry friction, as in bearings, seals and gears.
 
     With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
     doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
@@ -55,6 +55,9 @@ class CoulombFriction(Effect):
     jumps = True
     size = "dry friction of {friction_moment}"
     advice = "Reduce the dry friction of the bearing and the potentiometer"
+    advice_for_joint = (
+        "Reduce the dry friction of the joint (gear, bearings and seals), or add it to the model"
+    )
     equation = (
         "−Tc sgn β̇; rest while the other moments stay within ±Tc; general forms: −Tc z/zs, ż = β̇ − |β̇| z/zs; "
         "(|β̇|/2 rad/s)^n Tc, tanh(|β̇|/v0) Tc or (1 + b exp(−(β̇/vs)²)) Tc for Tc; in a joint Tc + μ |M|, where M is "

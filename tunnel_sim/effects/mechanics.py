@@ -30,6 +30,7 @@ class CubicStiffness(Effect):
     condition = "always"
     on_spring = True
     advice = "Model the spring's cubic stiffness, or release from smaller angles"
+    advice_for_joint = "Model the cubic stiffness of the joint, or use smaller angles"
     equation = "−κ Kr β³; general form: |β|^p sgn β for β³"
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
@@ -53,6 +54,7 @@ class AsymmetricStiffness(Effect):
     condition = "always"
     on_spring = True
     advice = "Seat the spring so that it is equally stiff to both sides"
+    advice_for_joint = "Model a stiffness of the joint that differs to the two sides"
     equation = "−κ Kr β²; general form: |β|^p for β²"
     signature = (
         "The centre of the oscillation shifts by −κ A²/2 and a second harmonic appears; the "
@@ -82,6 +84,7 @@ class FreePlay(Effect):
     size = "play of {half_width} to each side between spring and rod"
     parts = True
     advice = "Remove the play between spring and rod"
+    advice_for_joint = "Remove the play in the gear of the joint, or add it to the model"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
@@ -104,6 +107,7 @@ class GravityStiffness(Effect):
     by_angle_in_room = True
     size = "gravity of up to {stiffness}"
     advice = "Model gravity's sine, or level the axis and balance the body on it"
+    advice_for_joint = "Correct gravity's moment in the model: mass and centre of mass of the links"
     equation = "−Kg sin(β − βg)"
     signature = (
         "The same stiffness is added to every spring, so the line of Kr against ωn² keeps its gradient "
@@ -156,6 +160,7 @@ class RodFlexibility(Effect):
     by_angle_in_room = True
     size = "a rod that twists by {compliance}"
     advice = "Stiffen the rod, or put the sensor at the body's end"
+    advice_for_joint = "Stiffen the transmission, or put the sensor at the side of the link"
     equation = (
         "s Izz θ̈ + Cr θ̇ + Kr θ = Krod φ + Crod φ̇; (1 − s) Izz β̈ = Ka β + Ca β̇ − Krod φ − Crod φ̇; φ = β − θ, "
         "the sensor reads θ, Crod is 1 % of critical"

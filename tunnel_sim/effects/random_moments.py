@@ -109,6 +109,7 @@ class AmbientVibration(RandomMoment):
     source = "ambient"
     size = "a random moment of {moment}"
     advice = "Isolate the rig from its floor and from draughts, or average over more runs"
+    advice_for_joint = "Isolate the base of the machine from vibration, or average over more runs"
     equation = "random moment of standard deviation s, correlated as exp(−2π fb |t − t'|)"
     signature = (
         "In every run, also with the wind off, the decay ends in narrow-band noise at the rig's natural frequency. "

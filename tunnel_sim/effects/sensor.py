@@ -80,6 +80,7 @@ class SensorHysteresis(Effect):
     jumps = True
     size = "backlash of {half_width} to each side at the sensor"
     advice = "Remove the backlash between rod and sensor"
+    advice_for_joint = "Remove the backlash between joint and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
     signature = "The reading pauses at each reversal of the motion and lags by w in between."
     references = (
@@ -349,6 +350,7 @@ class MainsHum(Effect):
 
 _LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
 _DECAYS = 1.01  # a fit that ends at the least damping has found a driven line
+_LEAST_CYCLES = 3.0  # within its record and within its decay: fewer do not show an oscillation; judgement
 _SLOWEST = 0.1  # of the motion's frequency: judgement; anything slower is a drift in a record of ten cycles
 _LEAST_SPRING = 1e-9  # N m/rad: a fit may try zero
 
@@ -407,11 +409,18 @@ class SecondMode(Effect):
         return (residuals.ringing(), residuals.excited())
 
     def plausible(self, omega: float) -> bool:
-        """Whether it is a separate oscillation: it decays, is not the motion's, and not as slow as a drift."""
+        """Whether it is a separate oscillation.
+
+        It decays, but not within three cycles, is not the motion's, and not as slow as a drift.
+        """
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
-        return (
-            decays and self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
-        )
+        lasts = 2.0 * np.pi * self.damping_ratio * _LEAST_CYCLES < 1.0
+        apart = self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        return decays and lasts and apart
+
+    def shown_in(self, duration: float) -> bool:
+        """Whether a record contains three of its cycles."""
+        return self.frequency * duration >= 2.0 * np.pi * _LEAST_CYCLES
 
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0

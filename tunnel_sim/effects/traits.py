@@ -58,6 +58,7 @@ class Traits:
     - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
     - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
+    - ``advice_for_joint``: the same for the joint of a machine, where it differs.
     - ``caveat``: how to read the coefficients that are reported with it.
     - ``undetected``: how to read them where it is not named, with ``{size}`` and ``{changes}`` at its upper
       limit; a clause without its full stop.
@@ -95,6 +96,7 @@ class Traits:
     tries: ClassVar[int] = 1
     size: ClassVar[str] = ""
     advice: ClassVar[str] = ""
+    advice_for_joint: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
     undetected: ClassVar[str] = "{effect} of up to {size} is not excluded and would change {changes}"
 
@@ -267,6 +269,15 @@ class Traits:
             False where its parameters make it part of the motion itself.
         """
         del omega
+        return True
+
+    def shown_in(self, duration: float) -> bool:
+        """Whether a record is long enough to show a fitted effect.
+
+        Args:
+            duration: of the record, s.
+        """
+        del duration
         return True
 
     def alike(self) -> Sequence[Trial]:

@@ -147,6 +147,9 @@ def run_place(path: Path, run_id: str) -> str:
     return f"{shown(path)}, run '{run_id}'"
 
 
+_NOT_STATED = ("id", "record", "drive", "clock_s")  # of a run, among its conditions
+
+
 def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, Any]:
     """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
@@ -157,7 +160,7 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
             document[key] = _stated(vars(values))
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
-        | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record", "drive")})
+        | _stated({key: value for key, value in vars(run).items() if key not in _NOT_STATED})
         | ({} if run.drive is None else _stated(run.drive.stated))
         for run in campaign.runs
     ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
@@ -91,6 +91,7 @@ class Run:
             in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
+        clock_s: time of the file's clock at time 0 of the record, s; 0 where the record has the times of its file.
     """
 
     id: str
@@ -100,6 +101,7 @@ class Run:
     air_density: float | None = None
     release_angle: float | None = None
     drive: Drive | None = None
+    clock_s: float = field(default=0.0, compare=False)
 
     @property
     def wind_on(self) -> bool:
@@ -139,6 +141,32 @@ class Run:
         if self.drive is not None:
             columns[self.drive.column] = ("time_s", self.drive.values, {"long_name": "input of the run"})
         return Dataset(columns, coords={"time_s": self.record.time_s}, attrs={"id": self.id, **stated})
+
+
+_SAME_SPEED = (
+    0.01  # relative: an anemometer reads to about a per cent, and settings of a fan are farther apart
+)
+
+
+def speed_groups(speeds: Iterable[float]) -> dict[float, float]:
+    """The setting of the wind to which every stated speed belongs.
+
+    Readings of one setting, such as 24.9972 and 25 m/s, differ by less than the error of a reading.
+
+    Args:
+        speeds: as stated, m/s.
+
+    Returns:
+        By stated speed, the member of its group that is written most briefly, m/s; 0 is a group of its own.
+    """
+    groups: list[list[float]] = []
+    for speed in sorted(set(speeds)):
+        if groups and speed <= (1.0 + _SAME_SPEED) * groups[-1][0]:
+            groups[-1].append(speed)
+        else:
+            groups.append([speed])
+    named = [(min(group, key=lambda one: (len(f"{one:g}"), len(repr(one)))), group) for group in groups]
+    return {speed: name for name, group in named for speed in group}
 
 
 def needs_density(wind_speed: float, *scales: float | None) -> bool:

@@ -11,6 +11,7 @@ from identification import policy
 from identification.examination.self_excited import Swing
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import speed_groups
 
 
 @dataclass(frozen=True)
@@ -23,12 +24,12 @@ class EqualStatementsDiffer(StatementSlip):
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare the runs that state the same, with equal amplitudes."""
         groups: dict[tuple[float | None, ...], list[Swing]] = defaultdict(list)
+        setting = speed_groups(swing.run.wind_speed for swing in seen.swings)
         for swing in seen.swings:
             run = swing.run
             if run.spring_stiffness and swing.rate > 0.0:
-                groups[run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None].append(
-                    swing
-                )
+                speed = setting[run.wind_speed]
+                groups[run.spring_stiffness, speed, run.air_density if run.wind_on else None].append(swing)
         ids: list[str] = []
         largest = 0.0, 0.0
         for group in groups.values():

@@ -17,6 +17,7 @@ from identification import policy
 from identification.examination.self_excited import Swing
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.record import Array
 
 _FEWEST = 3  # runs: of two different zeros, either may be right
@@ -80,7 +81,8 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
     A moment of the air moves the centre by a different angle with another spring or speed.
     """
     windy = np.array([swing.run.wind_on for swing in swings])
-    conditions = {(s.run.spring_stiffness, s.run.wind_speed) for s in swings if s.run.wind_on}
+    setting = speed_groups(s.run.wind_speed for s in swings)
+    conditions = {(s.run.spring_stiffness, setting[s.run.wind_speed]) for s in swings if s.run.wind_on}
     return len(conditions) == 1 and bool(np.all(odd == windy) or np.all(odd == ~windy))
 
 

@@ -12,6 +12,7 @@ from identification.examination.self_excited import Swing
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import speed_groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ class WindExchanged(StatementSlip):
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Exchange wind on and off in all runs, where there is one speed."""
         swings = tuple(s for s in seen.swings if s.run.spring_stiffness)
-        speeds = {s.run.wind_speed for s in swings if s.run.wind_on}
+        speeds = set(speed_groups(s.run.wind_speed for s in swings if s.run.wind_on).values())
         changes = _changes(swings)
         if len(speeds) != 1 or len({c.swing.run.spring_stiffness for c in changes}) == 1:
             return ()

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.diagnosable import comparable_runs
+from diagnosis.diagnosable import comparable_runs, without_short
 from diagnosis.facts.found import Fact
 from diagnosis.model.similarity import frequency
 from diagnosis.settings import Settings
+from identification.status import Outcome
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
+from tests.support.driven_runs import driven
 from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4
@@ -133,3 +135,43 @@ def test_a_wind_on_run_in_another_mode_is_left_out():
     found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)), Settings().selection)
     assert [run.id for run in found.runs] == ["r01", "r02"]
     assert (said.kind, said.figures["runs"]) == ("another mode", ["r03"])
+
+
+def cut(run, count, name):
+    """The first samples of a run as a run of its own."""
+    record = Record(run.record.time_s[:count], run.record.yaw_rad[:count])
+    drive = None if run.drive is None else replace(run.drive, values=run.drive.values[:count])
+    return replace(run, id=name, record=record, drive=drive)
+
+
+@pytest.mark.parametrize("given", ["driven", "free"])
+def test_one_short_run_is_left_out_and_does_not_refuse_the_others(given):
+    data = driven("moment") if given == "driven" else decays(PAIR)
+    short = cut(data.runs[0], 150, "short")
+    if given == "free":  # too short to show its motion above the noise
+        noise = 1e-3 * np.random.default_rng(1).standard_normal(150)
+        short = replace(short, record=Record(short.record.time_s, noise))
+    found, (remark,) = without_short(replace(data, runs=(short, *data.runs)))
+    assert found.runs == data.runs
+    assert (remark.outcome, remark.runs) == (Outcome.LEFT_OUT, ("short",))
+    assert "too short for the diagnosis" in remark.what
+    assert without_short(data) == (data, ())
+    assert without_short(replace(data, runs=(short,)))[1] == ()  # refused by name
+
+
+def test_a_diagnosis_states_the_short_run_that_it_leaves_out():
+    data = driven("moment")
+    given = replace(data, runs=(*data.runs, cut(data.runs[0], 150, "short")))
+    found = diagnose(given, kinds=vocabulary(("coulomb_friction",)))
+    assert found.causes == ()
+    assert found.remarks[0].runs == ("short",)
+    assert [run.id for run in found.gap.runs] == [run.id for run in data.runs]
+
+
+def test_wind_speeds_within_their_reading_are_one_speed():
+    """24.9972 and 25 m/s are one setting of the fan, so a run of another spring is left out among them."""
+    speeds = (25.0, 24.9972, 25.0, 24.98)
+    data = decays([Setting(16.12, speed) for speed in speeds] + [Setting(44.84, 25.01)], bare=range(5))
+    found, (said,) = comparable_runs(data, Settings().selection)
+    assert [run.id for run in found.runs] == ["r01", "r02", "r03", "r04"]
+    assert said == Fact("other springs", {"runs": ["r05"]})

@@ -115,7 +115,8 @@ def imported_run(
             record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*remarks, f"left out: {error.what}"), rest, sizes)
-    run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
+    begun = float(clock[0] - record.time_s[0])
+    run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive, clock_s=begun)
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
 
 

@@ -12,6 +12,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
+from diagnosis.search.investigate import nominal_study
+from tests.support.driven_runs import driven
 from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -132,3 +134,20 @@ def test_runs_without_stiffness_propose_none():
     runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])
     base = nominal(replace(data, runs=runs))
     assert separating_run(base, base) is None
+
+
+def test_the_run_is_one_that_the_rig_can_make(rivals):
+    """Its only spring, its wind speeds, and angles within its swing."""
+    data = rivals[0].problem.data
+    found = separating_run(*rivals)
+    assert found["spring_stiffness"] == 16.12
+    assert found["wind_speed"] in (0.0, 15.0, 25.0)
+    assert 0.0 < found["release_angle"] <= data.swing
+
+
+def test_a_free_decay_is_not_proposed_where_it_does_not_show_the_question(rivals):
+    data = driven("moment")
+    base = nominal_study(data, ()).nominal
+    assert separating_run(base, base) is None
+    late = replace(rivals[1].problem, effects=(effect_class("input_delay"),))
+    assert separating_run(rivals[0], replace(rivals[1], problem=late)) is None

@@ -10,7 +10,7 @@ import pytest
 from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.units import own_repeatability
-from diagnosis.facts.repeatability import Repeatability
+from diagnosis.facts.repeatability import Repeatability, ScatterLimits
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered
 from diagnosis.words.cautions import CAUTIONS, said
@@ -93,3 +93,52 @@ def test_zeros_that_would_close_an_unexplained_gap_are_mentioned(apart: float) -
         assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact.to_json_dict())
         stated = replace(data, sensor=replace(data.sensor, zero="common"))
         assert zeros_apart(studied(stated, nominal(data))) == ()
+
+
+def with_damping(errors: np.ndarray, seed: int = 0) -> Campaign:
+    """Six or more runs, the damping of each of which is off by a share of its own."""
+    conditions = (CONDITIONS * 2)[: errors.size]
+    runs = []
+    for number, (condition, error) in enumerate(zip(conditions, errors, strict=True)):
+        one = campaign(
+            conditions=(condition, *CONDITIONS[:5]),
+            duration=6.0,
+            seed=seed + number,
+            damping=0.008 * (1.0 + error),
+        ).runs[0]
+        runs.append(replace(one, id=f"r{number + 1:02d}"))
+    return replace(campaign(duration=1.0), runs=tuple(runs))
+
+
+def limits(data: Campaign) -> ScatterLimits:
+    given = repeatability(nominal(data))
+    assert given is not None
+    assert given.limits is not None
+    return given.limits
+
+
+@pytest.mark.parametrize("width", [0.0, 0.002, 0.004])
+def test_a_limit_is_not_below_the_scatter_that_is_there(width: float) -> None:
+    """Scatter too small for the test, of the mechanical damping: most of the whole with the wind off."""
+    rng = np.random.default_rng(11)
+    found = [limits(with_damping(width * rng.standard_normal(12), 100 * i)) for i in range(4)]
+    assert all(one.damping is not None and one.frequency is not None for one in found)
+    # the mean share of the mechanical damping in the whole is above one third
+    assert sum(one.damping < width / 3.0 for one in found) == 0
+    assert max(one.frequency for one in found) < 2e-4
+    assert max(one.damping for one in found) < 0.02
+
+
+def test_few_noisy_runs_say_nothing_about_scatter() -> None:
+    data = campaign(conditions=CONDITIONS[:3], duration=2.0)
+    rng = np.random.default_rng(2)
+    runs = tuple(
+        replace(run, record=replace(run.record, yaw_rad=run.record.yaw_rad + rng.normal(0.0, 0.05, 500)))
+        for run in data.runs
+    )
+    sensor = replace(data.sensor, noise_std=0.05)
+    assert limits(replace(data, runs=runs, sensor=sensor)) == ScatterLimits(None, None)
+
+
+def test_where_scatter_is_found_no_limit_is_stated() -> None:
+    assert found(np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))).limits is None

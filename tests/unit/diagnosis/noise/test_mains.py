@@ -99,7 +99,10 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     data = humming(clean, 2e-3, multiple * mains)
     folded = abs(multiple * mains - rate * round(multiple * mains / rate))
     assert folded == pytest.approx(place, abs=1e-9)
-    found = nominal_study(data, ALL_EFFECTS)
+    stated = Settings().changed({"read_off.mains_hz": round(mains, -1)})
+    found = nominal_study(data, ALL_EFFECTS, stated)
+    if multiple > 1 and multiple * mains > 0.5 * rate:  # alone, it may be a line of another source
+        assert nominal_study(data, ALL_EFFECTS).prepared.hum is None
     if place < 3.0 * 2.1:  # within the harmonics of a motion of 2 Hz
         assert found.prepared.hum is None
         return
@@ -113,6 +116,47 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
     assert any("times the mains' frequency" in one for one in said) == (multiple > 1)
     assert nominal_study(clean, ALL_EFFECTS).prepared.hum is None
+
+
+#: Sample rate, and the line of a structure, Hz, where a multiple of 50 or 60 Hz within 1.1 % of it is folded to.
+STRUCTURAL = [(240.0, 12.76), slow(240.0, 41.2), slow(170.0, 70.2), slow(130.0, 10.9), slow(200.0, 48.6)]
+
+
+@pytest.mark.parametrize(("rate", "place"), STRUCTURAL)
+def test_a_structural_line_is_not_a_folded_harmonic(rate, place):
+    """Of motions of 1 Hz: the folded ranges cover a quarter of the spectrum at such rates."""
+    settings = [Setting(4.0, speed) for speed in (0.0, 5.0, 8.0)]
+    clean = free_decays.campaign(
+        settings, noise=NOISE, rate=rate, duration=10.0, rng=np.random.default_rng(6)
+    )
+    assert nominal_study(humming(clean, 1e-3, place), ALL_EFFECTS).prepared.hum is None
+
+
+@pytest.mark.parametrize(("rate", "mains"), [(240.0, 50.4), slow(170.0, 59.8)])
+def test_a_folded_harmonic_beside_its_fundamental_is_a_hum(rate, mains):
+    settings = [Setting(16.12, speed) for speed in (0.0, 15.0, 25.0)]
+    clean = free_decays.campaign(
+        settings, noise=NOISE, rate=rate, duration=10.0, rng=np.random.default_rng(7)
+    )
+    data = humming(clean, 3e-4, mains, third=5.0)
+    found = nominal_study(data, ALL_EFFECTS)
+    assert found.prepared.hum is not None
+    assert found.similarity.own(found.prepared.hum.frequency, "Hz") == pytest.approx(mains, abs=3e-3)
+    assert found.prepared.hum.harmonic == 3
+    assert not found.gap.test.detected
+
+
+def test_the_width_that_is_searched_is_priced():
+    """At 240 Hz all multiples cover a tenth of the spectrum and more, the fundamentals a twentieth."""
+    clean = decays(rate=240.0, duration=8.0)
+    lines = {(line.harmonic, round(line.parameter, -1)): line for line in mains_lines(nominal(clean))}
+    first = lines[1, 50.0]
+    assert 0.02 < first.covered < 0.06  # 2 % of 50 and of 60 Hz to either side, of about 110 Hz
+    assert max(line.covered for line in lines.values()) > 2.5 * first.covered
+    data = humming(clean, 1e-3)
+    strict = Settings().changed({"read_off.hum_covered": 0.5 * first.covered})
+    assert nominal_study(data, ALL_EFFECTS).prepared.hum is not None
+    assert nominal_study(data, ALL_EFFECTS, strict).prepared.hum is None
 
 
 @pytest.mark.parametrize(("rate", "multiple"), [(110.0, 1), (220.0, 2)])

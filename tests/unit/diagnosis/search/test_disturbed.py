@@ -33,6 +33,7 @@ from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import Effect, effect_class, effect_from, known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -73,6 +74,27 @@ def test_a_blow_to_one_run_is_found_at_its_instant(run: str, impulse: float) -> 
     assert found.kept_until_s is not None
     assert found.kept_until_s < 4.0
     assert found.p_value < CHOSEN.disturbed_rate
+
+
+def test_a_disturbance_is_stated_by_the_clock_of_its_file(tmp_path: Path) -> None:
+    """One file of a logger that was switched on 37.25 s before the release."""
+    run = with_blow(campaign(), 0.02, 4.0, "r6").runs[5]
+    text = "\n".join(
+        f"{t + 37.25:.3f},{y:.8f}" for t, y in zip(run.record.time_s, run.record.yaw_rad, strict=True)
+    )
+    others = campaign().runs[:5]
+    (tmp_path / "logged.csv").write_text(f"time_s,yaw_rad\n{text}\n")
+    (read,) = read_records([tmp_path / "logged.csv"]).campaign.runs
+    assert read.record.time_s[0] == 0.0
+    conditions = {"id": "r6", "spring_stiffness": run.spring_stiffness, "air_density": run.air_density}
+    logged = dataclasses.replace(read, wind_speed=run.wind_speed, **conditions)
+    data = dataclasses.replace(campaign(), runs=(*others, logged))
+    (found,) = accused(data)
+    assert found.run == "r6"
+    assert found.at_s == pytest.approx(41.25, abs=0.1)
+    assert found.kept_until_s is not None
+    kept = undisturbed(data, (found,)).runs[5]
+    assert kept.record.time_s[-1] + 37.25 == pytest.approx(found.kept_until_s, abs=0.01)
 
 
 @pytest.mark.slow

@@ -16,8 +16,9 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
 from diagnosis.model.blocks import without_start
+from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
-from diagnosis.where.along_motion import apparent_moment, backbones, drift
+from diagnosis.where.along_motion import amplitude_about_rest, apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.where.place import (
     _between_runs,
@@ -28,8 +29,10 @@ from diagnosis.where.place import (
 )
 from tests.marks import slow
 from tests.support import gap_campaigns
+from tests.support.driven_runs import driven
 from tests.support.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.record import Record
 
 DURATION = 7.0
 campaign = partial(gap_campaigns.campaign, duration=DURATION)
@@ -63,7 +66,7 @@ def test_the_place_does_not_depend_on_the_names(cause):
     named, _, said = localise(studied(data, base, (cause,)))
     assert named == unnamed
     agrees = effect_class(cause).channel == "damping"
-    assert said == dataclasses.replace(nothing, compared=(cause,), agrees=agrees)
+    assert said == dataclasses.replace(nothing, compared=(cause,), agrees=agrees, elsewhere=not agrees)
     assert nothing.compared == ()
 
 
@@ -381,3 +384,18 @@ def test_one_windy_run_of_three_or_more_with_nearly_all_of_the_gap_says_nothing_
     ]
     found = dataclasses.replace(found, maps=dataclasses.replace(found.maps, runs=tuple(runs)))
     assert (infer_condition(data, base, found).reason == Fact("one run", {"run": "r2"})) == lone
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.5 * np.pi])
+def test_amplitudes_are_about_the_rest_of_the_body(turned):
+    """An arm that is driven about an angle of 90° swings by as much as about zero."""
+    data = driven("loose")
+    runs = tuple(
+        dataclasses.replace(run, record=Record(run.record.time_s, run.record.yaw_rad + turned))
+        for run in data.runs
+    )
+    found = nominal_study(dataclasses.replace(data, runs=runs), ()).nominal
+    swing = max(float(np.ptp(run.record.yaw_rad)) for run in data.runs)
+    largest = max(float(amplitude_about_rest(found, i).max()) for i in range(len(runs)))
+    assert 0.3 * swing < largest < 1.5 * swing
+    assert swing < 1.0

@@ -85,7 +85,7 @@ def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
     text = placed(
         given, channel={"kind": "frequency between runs"}, condition={"kind": "one run", "run": "beta"}
     )
-    assert "What it acts on cannot be determined: each run alone is linear" in text
+    assert "The residuals alone do not show what it acts on: each run alone is linear" in text
     assert text.endswith("; whether it needs wind cannot be determined from one run alone (beta).")
 
 

@@ -186,7 +186,7 @@ def test_the_run_to_make(given: Document) -> None:
     assert len(rival_lines(given)) == 2
     assert len(rival_lines(given | {"next_run": None})) == 2
     close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
-    assert close[1].startswith("No possible run distinguishes these answers")
+    assert close[1].startswith("No run with the springs and wind speeds of this campaign distinguishes")
     assert "by 2.9 standard deviations" in close[1]
     assert rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
 

@@ -20,13 +20,13 @@ from diagnosis.words.cards import key_figures
 from diagnosis.words.causes import said_size
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.tables import candidates_table, parameters_table, runs_table
-from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
+from diagnosis.words.verdict import headline, next_steps, rival_lines, undecided_words, verdict
 from identification.blocks import typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
 from tunnel_lab.report.page import render_report
-from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects import effect_class, effect_from, known_effects
 
 
 def gap(*held_out: bool) -> GapSummary:
@@ -498,3 +498,25 @@ def test_what_to_do_about_runs_is_said_once() -> None:
     steps = next_steps(given)
     assert steps.count("a, b: record it again.") == 1
     assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut
+
+
+OF_A_TUNNEL = ("spring", "wind", "potentiometer", "turbulence", "rod", "level the axis", "draught")
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_robot_gets_the_advice_of_a_robot(driven):
+    """Of every effect that a joint may have, decided, between two, and undecided."""
+    kinds = [kind for kind in known_effects() if kind.condition == "always" and not kind.chosen_spring()]
+    for kind in kinds:
+        one = answer_of(kind.name, both_winds=False, robot=True, driven=driven)
+        one["candidates"] = [{"effect": kind.name, "probability": 0.9, "parameters": {}}]
+        one["maps"]["runs"] = [run | {"wind_speed": 0.0} for run in one["maps"]["runs"]]
+        one["next_run"] = None if driven else one["next_run"]
+        for changed in (one, one | {"ambiguous_with": ["free_play"]}, one | {"decided": False}):
+            said = " ".join([*next_steps(changed), *rival_lines(changed)]).lower()
+            assert not [word for word in OF_A_TUNNEL if word in said], (kind.name, said)
+    said = " ".join(
+        next_steps(one | {"decided": False}) + rival_lines(one | {"ambiguous_with": ["free_play"]})
+    )
+    assert ("another input" in said) == driven
+    assert ("release at" in said) != driven

@@ -1,0 +1,126 @@
+"""No sentence of an answer contradicts another: verdict, place and probability follow one judgement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from diagnosis import diagnose
+from diagnosis.facts.decision import decision
+from diagnosis.settings import Settings
+from diagnosis.where.described import judged
+from diagnosis.words.sections import place_rows
+from diagnosis.words.verdict import headline, next_steps, verdict
+from diagnosis.words.where import where_words
+from tests.support.contradictions import contradictions
+from tests.support.diagnosis_document import document
+from tunnel_sim.effects import Effect, effect_class, known_effects
+
+ROOT = Path(__file__).parents[4]
+FIGURES = {"from_s": 1.0, "to_s": 2.0, "frequency_hz": 2.0, "runs": 2, "run": "beta"}
+CHANNELS = (None, "stiffness", "damping", "forcing", "sensor")
+OF_CHANNEL = ("blow", "damping along the decay", "frequency between runs", "harmonics")
+WINDS = {"always": "wind-off runs show it", "wind_on": "wind-off runs show none"}
+
+
+def answered(
+    names: tuple[str, ...], channel: str | None, reason: str, condition: str, probability: float = 0.9
+) -> dict[str, Any]:
+    """The document of causes beside a place."""
+    one, kinds = document(), [effect_class(name) for name in names]
+    against = judged(channel, reason, kinds, scattering=False)
+    place = one["found"]["place"] | vars(against) | {"compared": list(names)}
+    place |= {"channel": {"kind": reason, **FIGURES}, "condition": {"kind": WINDS[condition], **FIGURES}}
+    one["found"] |= {"place": place, "both_winds": True}
+    one["where"] |= {"channel": channel, "condition": condition}
+    answers = [(" + ".join(names), probability), ("unknown", 1.0 - probability)]
+    decided = decision(answers, Settings().answer, elsewhere=against.elsewhere).to_json_dict()
+    one["candidates"] = [{"effect": name, "probability": value, "parameters": {}} for name, value in answers]
+    return one | {"causes": list(names), "ambiguous_with": []} | decided
+
+
+def printed(one: dict[str, Any]) -> str:
+    rows = " ".join(f"{label}: {value}." for label, value in place_rows(one))
+    return f"{verdict(one, '')} Where: {where_words(one)} {rows} {' '.join(next_steps(one))}"
+
+
+def sets() -> Iterator[tuple[type[Effect], ...]]:
+    kinds = [kind for kind in known_effects() if not kind.scatters]
+    yield from ((kind,) for kind in kinds)
+    yield from pairwise(kinds)
+
+
+def test_no_place_contradicts_decided_causes() -> None:
+    """Every effect and every second pair of neighbours, with every place, reason and wind."""
+    faults, undecided = set(), 0
+    for kinds in sets():
+        names = tuple(kind.name for kind in kinds)
+        for channel in CHANNELS:
+            for reason in OF_CHANNEL[: 4 if len(kinds) == 1 else 1]:
+                for condition in WINDS:
+                    one = answered(names, channel, reason, condition)
+                    undecided += not one["decided"]
+                    faults |= {(names, channel, reason, fault) for fault in contradictions(one, printed(one))}
+    assert not faults
+    assert undecided > 100
+
+
+def test_causes_that_do_not_agree_with_the_place_are_undecided_between_them_and_a_look_at_the_runs() -> None:
+    one = answered(("cubic_stiffness",), "forcing", "blow", "always", 0.97)
+    assert (one["decided"], one["elsewhere"]) == (False, "cubic_stiffness")
+    assert headline(one) == ("Undecided: cubic stiffness, and more", "open")
+    said = verdict(one, "")
+    assert "explain the gap" not in said
+    assert "Cubic stiffness fits best, but the residuals point elsewhere: look at runs " in said
+    assert "Do not repair the rig on this answer" in " ".join(next_steps(one))
+    agreed = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always", 0.97)
+    assert (agreed["decided"], agreed["elsewhere"]) == (True, "")
+
+
+@pytest.mark.parametrize("reason", ["frequency along the decay", "damping along the decay"])
+def test_a_random_moment_may_shift_frequency_and_damping(reason: str) -> None:
+    """It changes both along the decay of every run by chance, so such a place does not speak against it."""
+    channel = reason.split()[0].replace("frequency", "stiffness")
+    for name in ("buffeting", "ambient_vibration"):
+        one = answered((name,), channel, reason, "wind_on", 0.97)
+        assert one["decided"]
+        assert "It looks like a change of the" in where_words(one)
+        assert not contradictions(one, printed(one))
+    assert not answered(("buffeting",), "sensor", "harmonics", "wind_on", 0.97)["decided"]
+
+
+def test_a_gap_whose_rest_could_change_the_coefficients_is_not_immaterial() -> None:
+    one = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always")
+    one["found"]["immaterial"] = {"cn_beta": 1e-4, "cn_r": 1e-4}
+    one["rest"]["material"] = False
+    assert "The gap is immaterial" in verdict(one, "")
+    one["rest"]["material"] = True
+    assert "The gap is immaterial" not in verdict(one, "")
+    assert not contradictions(one, printed(one))
+
+
+def test_no_page_has_a_sentence_of_a_pair() -> None:
+    """Answers in the documentation: of the packaged examples, of real records and of driven ones."""
+    never = ("the runs repeat, without scatter", "What it acts on cannot be determined")
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    found = {
+        (page.name, words) for page in pages for words in never if words in " ".join(page.read_text().split())
+    }
+    assert not found
+
+
+def campaigns() -> list[Path]:
+    """Those of the tests, and of the folder beside the checkout where there is one."""
+    folders = [ROOT / "tests" / "data" / "foreign", ROOT.parent / "shared" / "data" / "foreign"]
+    return [one.parent for folder in folders for one in sorted(folder.glob("*/campaign.toml"))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", campaigns(), ids=lambda folder: folder.name)
+def test_no_answer_to_a_campaign_of_another_simulator_contradicts_itself(folder: Path) -> None:
+    found = diagnose(folder)
+    assert not contradictions(found.to_json_dict(), str(found))
