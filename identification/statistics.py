@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
-from identification.estimate import Estimate, NoiseLevel, Quantity
+from identification.estimate import Estimate, Quantity
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -200,9 +200,21 @@ def widened_covariance(covariance: Square, least_std: PerParameter) -> Array:
     return np.asarray(covariance * np.outer(factor, factor))
 
 
-def fisher_covariance(normal: Square, noise: NoiseLevel) -> Array:
-    """Inverse information times the noise variance, widened by the slow ratio, shape (p, p)."""
-    return inverse(normal) * (noise.std**2 * noise.slow_ratio)
+def fisher_covariance(normal: Square, variance: float) -> Array:
+    """Inverse information times the noise variance, shape (p, p)."""
+    return inverse(normal) * variance
+
+
+def sandwich_covariance(informations: Array, powers: Sequence[float]) -> Array:
+    """Covariance of a least-squares fit to runs whose noise differs, shape (p, p).
+
+    Args:
+        informations: of each run, for noise of variance 1, shape (r, p, p).
+        powers: of the noise of each run at the frequency of its motion.
+    """
+    outer = inverse(np.sum(informations, axis=0))
+    middle = sum((one * power for one, power in zip(informations, powers, strict=True)), np.zeros_like(outer))
+    return np.asarray(outer @ middle @ outer)
 
 
 def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> Array:

@@ -19,18 +19,14 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import Data
 from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
+from identification.signal.colour import CYCLES, HANN, LOWEST, Periodogram, levinson, steady
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
-_CYCLES = 8.0  # least number in a part: the motion's windowed line then stays within the excluded share
-_BESIDE = 0.25  # of the motion's frequency, excluded on either side of its harmonics
-_LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
 _OCTAVE_PARTS = 2  # bands in an octave
 _SLOPE_BANDS = 4  # lowest bands that give the slope below them
-#: Neighbouring ordinates under a Hann window that carry the information of one independent ordinate.
-HANN = 1.94
 _LONGEST = 512  # taps of the whitening filter
 
 
@@ -94,19 +90,19 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
         The spectrum; None where it is flat within a tolerance and chance, no bands agree in all parts of the
         records, or these are too few.
     """
-    parts, chosen = [], nominal.settings.noise
+    parts, sizes, chosen = [], [], nominal.settings.noise
     wanted = max(2, -(-_PARTS // len(nominal.residuals)))
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
         own, values = resonance(nominal, index), run.unscaled(residual)
-        pieces = min(wanted, int(run.reading.size * run.interval * own / _CYCLES))
+        pieces = min(wanted, int(run.reading.size * run.interval * own / CYCLES))
         length = values.size // max(pieces, 1)
         for piece in (slice(i * length, (i + 1) * length) for i in range(pieces)):
-            parts.append(_part(values[piece], run.reading[piece] - values[piece], run, own))
-    sizes = [part.motion for part in parts]
+            parts.append(Periodogram.of(values[piece], run.interval, own, run.noise.variance))
+            sizes.append(float(np.std(run.reading[piece] - values[piece])))
     if len(sizes) < chosen.colour_parts or max(sizes) < chosen.colour_amplitudes * min(sizes):
         return None
     lowest = max(
-        _LOWEST * max(part.frequency[1] for part in parts),
+        LOWEST * max(part.frequency[1] for part in parts),
         beyond * max(resonance(nominal, i) for i in range(len(nominal.residuals))),
     )
     highest = 0.5 / max(run.interval for run in nominal.problem.data.runs)
@@ -116,17 +112,17 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     edges = np.geomspace(lowest, highest, round(_OCTAVE_PARTS * np.log2(highest / lowest)) + 1)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
-    steady = _steady(power, count, chosen.colour_band_rate)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= chosen.colour_bands)):
+    kept = steady(power, count, chosen.colour_band_rate)
+    if kept.sum() < 2 or (throughout and not (kept[0] and kept.mean() >= chosen.colour_bands)):
         return None
     total = count.sum(axis=0)
-    level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
-    std = np.sqrt(1.0 / total[steady])
+    level = np.log(np.sum(power * count, axis=0)[kept] / total[kept])
+    std = np.sqrt(1.0 / total[kept])
     weight = 1.0 / (std**2 + chosen.colour_flat**2)
     departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
     if departure < float(chdtri(level.size - 1, chosen.colour_rate)):  # one constant within chance
         return None
-    centres = np.sqrt(edges[1:] * edges[:-1])[steady]
+    centres = np.sqrt(edges[1:] * edges[:-1])[kept]
     lowest_bands = slice(0, _SLOPE_BANDS)
     place, weight = np.log(centres)[lowest_bands], 1.0 / std[lowest_bands] ** 2
     centred = place - float(weight @ place / weight.sum())
@@ -134,55 +130,8 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     slope = float((weight * centred) @ level[lowest_bands]) / information
     slope_std = float(np.sqrt(1.0 / information))
     # where a gap hides the lowest bands, a steeper slope would take the gap for noise
-    steep = slope - chosen.colour_slope_stds * slope_std if steady[0] else slope
+    steep = slope - chosen.colour_slope_stds * slope_std if kept[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
-
-
-def _steady(power: Array, count: Array, rate: float) -> np.ndarray:
-    """The bands with one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
-
-    A steady band fails at a ``rate``. Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc.
-    R. Soc. A 160 (1937) 268, doi 10.1098/rspa.1937.0109).
-    """
-    total = count.sum(axis=0)
-    mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
-    ratio = np.maximum(power / np.where(mean > 0.0, mean, 1.0), 1e-300)  # any number where the count is 0
-    corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
-    statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
-    freedom = np.sum(count > 0, axis=0) - 1
-    limit = chdtri(np.maximum(freedom, 1), rate)
-    return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """A part of a record: its periodogram, in units of white noise, and the size of the motion (rad)."""
-
-    frequency: Array
-    power: Array
-    between: Array  # which ordinates lie between the harmonics of the motion
-    motion: float
-
-    def by_band(self, edges: Array) -> tuple[Array, Array]:
-        """Mean power and number of independent ordinates by band, shape (bands,) each."""
-        band = np.searchsorted(edges, self.frequency[self.between], side="right") - 1
-        inside = (band >= 0) & (band < edges.size - 1)
-        count = np.bincount(band[inside], minlength=edges.size - 1)
-        power = np.bincount(band[inside], self.power[self.between][inside], edges.size - 1)
-        return power / np.maximum(count, 1), count / HANN
-
-
-def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
-    window = np.hanning(values.size)
-    scale = run.noise.variance * float(window @ window)
-    power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / scale
-    frequency = np.fft.rfftfreq(values.size, run.interval)
-    order = frequency / own
-    multiple = np.round(order)
-    beside = np.where(multiple > 0, np.abs(order - multiple) >= _BESIDE, True)
-    beside &= frequency * values.size * run.interval > _LOWEST
-    beside[-1] = False  # the ordinate at half the sampling rate has one degree of freedom
-    return _Part(np.asarray(frequency), np.asarray(power), beside, float(np.std(motion)))
 
 
 def _red(slope: float) -> float:
@@ -193,9 +142,9 @@ def _red(slope: float) -> float:
 def whitened(data: Data, colour: Colour) -> Data:
     """The data, prepared for white noise, with a filter that whitens noise of a colour.
 
-    The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
-    all records together have less than one nat of evidence for another; the gain of all further orders follows
-    from the spectrum (Kolmogorov). The runs have the variance of the innovations.
+    The recursion stops at the order beyond which all records together have less than one nat of evidence for
+    another; the gain of all further orders follows from the spectrum (Kolmogorov). The runs have the variance of
+    the innovations.
     """
     longest = max(run.reading.size for run in data.runs)
     total = sum(run.reading.size for run in data.runs)
@@ -206,14 +155,9 @@ def whitened(data: Data, colour: Colour) -> Data:
         spectrum = colour.at(frequency)
         covariance = np.fft.irfft(np.exp(spectrum), size)
         least = np.exp(np.mean(np.concatenate([spectrum, spectrum[-2:0:-1]])))
-        whitening, variance = np.ones(1), float(covariance[0])
-        while whitening.size <= _LONGEST and 0.5 * total * np.log(variance / least) > 1.0:
-            order = whitening.size
-            reflection = -float(whitening @ covariance[order:0:-1]) / variance
-            grown = np.append(whitening, 0.0)
-            whitening = grown + reflection * grown[::-1]
-            variance *= 1.0 - reflection**2
-        filters[interval] = whitening, variance
+        for filters[interval] in levinson(covariance[: _LONGEST + 1]):
+            if 0.5 * total * np.log(filters[interval][1] / least) <= 1.0:
+                break
     runs = []
     for run in data.runs:
         whitening, variance = filters[run.interval]
@@ -239,8 +183,8 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
-        values = run.unscaled(residual)
-        whole = _part(values, run.reading - values, run, resonance(nominal, index))
+        values, own = run.unscaled(residual), resonance(nominal, index)
+        whole = Periodogram.of(values, run.interval, own, run.noise.variance)
         spectra.append((whole.frequency[whole.between], whole.power[whole.between]))
     frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
     relative = frequency / colour.frequency[0]

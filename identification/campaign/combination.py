@@ -33,9 +33,9 @@ from identification.signal.noise import noise_level
 from identification.signal.run_fit import (
     FittedRun,
     Gained,
+    ResidualCheck,
     describe_run,
     noise_and_failure,
-    residual_check,
     residuals_of,
 )
 from identification.statistics import determined
@@ -208,6 +208,7 @@ def run_estimate(
     decay: Decay,
     covariance: Array | None,
     noise_std: float,
+    check: ResidualCheck | None,
     sensor: SensorProperties,
     windows: tuple[WindowEstimate, ...] = (),
 ) -> Found:
@@ -216,6 +217,7 @@ def run_estimate(
     Args:
         covariance: of (a, k) from the method, shape (2, 2), in 1/s and 1/s²; None where it gives none.
         noise_std: of one sample of the reading, rad.
+        check: of the least-squares residual; None where there is none.
     """
     reading = Reading.from_record(run.record)
     projected = project_run(reading, decay)
@@ -224,7 +226,6 @@ def run_estimate(
     _, failure = noise_and_failure(reading, *projected, sensor)
     if failure is not None or covariance is None:
         return failure or Status.NOT_CONVERGED
-    check = residual_check(run, decay, sensor)
     noise = None if check is None else check.noise
     covariance = covariance if check is None else check.widened(covariance)
     estimate = describe_run(run, reading, *projected, covariance, noise_std**2, noise=noise, windows=windows)

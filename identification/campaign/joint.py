@@ -33,11 +33,12 @@ from identification.campaign.derivatives import (
 )
 from identification.estimate import Estimate, Quantity, Status, by_severity
 from identification.signal.decay_fit import DecayFit, fit_decays, shared_system
-from identification.signal.noise import noise_level
+from identification.signal.noise import noise_of
 from identification.signal.run_fit import FittedRun, residuals_of
 from identification.statistics import (
     determined,
     fisher_covariance,
+    sandwich_covariance,
     scaled_solve,
     scatter_of_runs,
     widened_covariance,
@@ -82,14 +83,17 @@ def joint_estimate(
     if fit is None or not determined(fit.normal):
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     residuals = residuals_of(readings, fit.runs, fit.zero, _JOINT_UNKNOWNS + own_zeros)
-    noise = noise_level(residuals, campaign.sensor)
-    covariance = fisher_covariance(fit.normal, noise)
+    noise = noise_of(residuals, campaign.sensor)
+    if noise.powers:
+        covariance = sandwich_covariance(_systems(fit, linked, own_zeros=own_zeros)[0], noise.powers)
+    else:
+        covariance = fisher_covariance(fit.normal, noise.variance)
     size = design.size
     values = derivatives(design, fit.parameters[:size])
     covariance_of_values = values.jacobian @ covariance[:size, :size] @ values.jacobian.T
     statuses = (
         statuses
-        | noise_statuses([noise, *(item.noise for _, item, _ in used)])
+        | noise_statuses([noise.level, *(item.noise for _, item, _ in used)])
         | design_statuses(design, fit.parameters[:size])
     )
     zero = None
@@ -105,7 +109,7 @@ def joint_estimate(
         )
         estimate = replace(estimate, remarks=(gain, *remarks))
     filled = filled_estimate(campaign, estimate, runs, design, values, covariance_of_values, statuses)
-    return replace(filled, sensor_zero=zero, noise=noise)
+    return replace(filled, sensor_zero=zero, noise=noise.level)
 
 
 def _scatter(
@@ -115,10 +119,16 @@ def _scatter(
     size = found.jacobian.shape[1]
     windy = sum(run.wind_speed > 0.0 for run in runs)
     informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
+    total, scores = _systems(fit, linked, own_zeros=own_zeros)
+    influences = (found.jacobian @ scaled_solve(total.sum(axis=0), scores.T)[:size]).T
+    return scatter_of_runs(influences, informative_runs)
+
+
+def _systems(fit: DecayFit, linked: Design, *, own_zeros: bool) -> tuple[Array, Array]:
+    """Information, shape (r, p, p), and score, shape (r, p), of the shared parameters in each run."""
     systems = [
         shared_system([run], [link], "own" if own_zeros else "shared", fit.parameters)
         for run, link in zip(fit.runs, linked.links, strict=True)
     ]
     total, scores = (np.array(one) for one in zip(*systems, strict=True))
-    influences = (found.jacobian @ scaled_solve(total.sum(axis=0), scores.T)[:size]).T
-    return scatter_of_runs(influences, informative_runs)
+    return total, scores

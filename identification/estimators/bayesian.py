@@ -374,7 +374,7 @@ class Bayesian(RunByRun):
         frequency = decay.omega_n / (2.0 * np.pi)
         thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
         means, _ = block_means(Reading(time, residual), frequency, self.blocks_per_cycle)
-        known = variance if noise.source == "stated" or noise.departs else None
+        known = variance if noise.source == "stated" or noise.slow_ratio > 1.0 else None
         within = float(inner(residual, residual) - factor * inner(means.yaw, means.yaw))
         linear = _LINEAR + (forcing.known is None)
         knowledge = NoiseKnowledge(known, factor, max(within, 0.0), time.size - linear)

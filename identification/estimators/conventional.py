@@ -1,7 +1,8 @@
 """The paper's conventional method: spectrum, time to half amplitude, wind-on against wind-off.
 
-Standard deviations of frequency f and decay rate σ are the scatter of one run's peaks, without the bias of the
-method. The pairs are compared by eqs 7, 8, 17 and 18 (`identification.campaign.pairing`).
+Standard deviations of frequency f and decay rate σ are propagated from the noise, without the bias of the
+method; that of σ is the scatter of the peaks where it is larger beyond chance. The pairs are compared by eqs 7, 8,
+17 and 18 (`identification.campaign.pairing`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from identification.campaign.pairing import Paired, PairedRun
 from identification.estimate import Quantity, RunEstimate, Status, by_severity
 from identification.policy import LEAST_PROMINENCE
 from identification.signal.free_decay import Decay
-from identification.signal.frequency import peak_decay, psd_peak
+from identification.signal.frequency import PEAK_HALF_WIDTH, peak_decay, psd_peak, psd_peak_std
+from identification.signal.noise import PeakNoise, reading_noise
 from identification.signal.run_fit import residual_check
 from identification.statistics import decay_covariance, deviations
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
@@ -29,18 +31,24 @@ class Conventional(Paired):
 
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
         peak = psd_peak(run.record)
-        peaks = peak_decay(run.record, peak.frequency) if peak.prominence > LEAST_PROMINENCE else None
+        if not peak.prominence > LEAST_PROMINENCE:
+            return RunEstimate(run.id, (Status.NO_OSCILLATION,)), None
+        white = reading_noise(run.record, sensor)
+        samples = 2.0 * PEAK_HALF_WIDTH / peak.frequency * run.record.sample_rate
+        peaks = peak_decay(run.record, peak.frequency, PeakNoise.of(white, samples))
         if peaks is None:
             return RunEstimate(run.id, (Status.NO_OSCILLATION,)), None
         omega_d = 2.0 * np.pi * peak.frequency
         check = residual_check(run, Decay(peaks.rate, omega_d**2 + peaks.rate**2), sensor)
-        noise = None if check is None else check.noise
-        omega_d_std = 2.0 * np.pi * peaks.frequency_std
+        noise, noise_std = (None, white) if check is None else (check.noise, check.noise_std)
+        if check is not None and check.colour is not None:
+            own_noise = PeakNoise.of(noise_std, samples, check.colour)
+            peaks = peak_decay(run.record, peak.frequency, own_noise) or peaks
+        omega_d_std = 2.0 * np.pi * psd_peak_std(run.record, peak.frequency, noise_std)
         if check is not None and check.noise.departs:
             own = decay_covariance(peaks.rate, omega_d, peaks.rate_std**2, omega_d_std**2)
             rate_std, omega_d_std = deviations(peaks.rate, omega_d, check.widened(own))
-            peaks = replace(peaks, rate_std=rate_std, frequency_std=omega_d_std / (2.0 * np.pi))
-            omega_d_std = 2.0 * np.pi * peaks.frequency_std
+            peaks = replace(peaks, rate_std=rate_std)
         omega = float(np.hypot(omega_d, peaks.rate))
         omega_std = float(np.hypot(omega_d * omega_d_std, peaks.rate * peaks.rate_std)) / omega
         zeta_std = float(np.hypot(omega_d * peaks.rate_std, peaks.rate * omega_d_std)) * omega_d / omega**3
@@ -55,4 +63,6 @@ class Conventional(Paired):
             sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
             noise=noise,
         )
-        return estimate, PairedRun(run, peak.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std)
+        return estimate, PairedRun(
+            run, peak.frequency, omega_d_std / (2.0 * np.pi), peaks.rate, peaks.rate_std
+        )

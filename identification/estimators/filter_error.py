@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Quantity, Status
+from identification.signal.colour import Autoregression
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
 from identification.signal.filter import DrivenFit, KnownInput, fit_driven
 from identification.signal.forcing import Forced
@@ -32,7 +33,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
-_INNOVATIONS_BLOCK = 3  # innovations in an eighth of a cycle
+_INNOVATIONS_CYCLE = 24.0  # innovations in a cycle
 INTENSITY_UNIT = "rad2/s3"
 
 
@@ -69,7 +70,7 @@ class FilterError(RunByRun):
         # The innovations judge the model, since they are white if it is right; the residual is not.
         values, expected = filtered.innovations.values, filtered.innovations.variance
         level = noise_level(
-            [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
+            [Residual(values, _INNOVATIONS_CYCLE, _DECIDED, float(np.abs(values).max()))],
             SensorProperties(noise_std=float(np.sqrt(expected))),
         )
         departs = level.departs or level.disagrees
@@ -91,10 +92,10 @@ class FilterError(RunByRun):
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
             return None
-        noise_std = white_noise(fit.residual, sensor) if noise.departs else noise.std
-        thin, factor = block_means(
-            even_reading(bare.reading), fit.decay.omega_d / (2.0 * np.pi), self.blocks_per_cycle
-        )
+        white = noise.slow_ratio == 1.0
+        noise_std = noise.std if white else white_noise(fit.residual, sensor)
+        frequency = fit.decay.omega_d / (2.0 * np.pi)
+        thin, factor = block_means(even_reading(bare.reading), frequency, self.blocks_per_cycle)
         if thin.time.size < 4 * _DECIDED:
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
@@ -109,4 +110,13 @@ class FilterError(RunByRun):
 
             known = KnownInput(response, forcing.known)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
-        return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
+        if found is None or found.model.decay.stiffness <= 0.0:
+            return None
+        if not white and not noise.departs:  # coloured noise of the sensor explains the residual too
+            residual, _ = block_means(
+                even_reading(Reading(time, fit.residual)), frequency, self.blocks_per_cycle
+            )
+            rival = Autoregression.of(residual.yaw, 1.0 / (frequency * interval))
+            if rival is not None and rival.cost(residual.yaw) < found.innovations.cost:
+                return None
+        return found, noise_std

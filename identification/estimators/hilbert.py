@@ -25,7 +25,7 @@ from identification.signal.decay_fit import Reading, RunFit, even_reading, proje
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
 from identification.signal.noise import reading_noise
-from identification.signal.run_fit import CYCLES, modal_quantities
+from identification.signal.run_fit import CYCLES, modal_quantities, residual_check
 from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.quantities import Angles
@@ -102,7 +102,10 @@ class Hilbert(RunByRun):
         if start is None:
             return Status.NO_OSCILLATION
         reading = Reading.from_record(run.record)
-        noise_std = reading_noise(run.record, sensor)
+        check = residual_check(run, start, sensor)
+        coloured = check is not None and check.colour is not None
+        # half-cycle averages are lines of zero noise at all other harmonics: only the power at the motion counts
+        noise_std = check.noise_std if check is not None and coloured else reading_noise(run.record, sensor)
         decay, covariance, seen = start, None, None
         for _ in range(_PASSES):
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
@@ -141,7 +144,7 @@ class Hilbert(RunByRun):
                     cycles=self.cycles_per_window,
                 )
             )
-        return run_estimate(run, decay, covariance, noise_std, sensor, tuple(windows))
+        return run_estimate(run, decay, covariance, noise_std, check, sensor, tuple(windows))
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:

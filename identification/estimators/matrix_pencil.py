@@ -50,8 +50,8 @@ class MatrixPencil(RunByRun):
         noise, failure = noise_and_failure(reading, fitted, zero, sensor)
         if failure is not None:
             return failure
-        variance = noise.std**2 * noise.slow_ratio
+        variance = noise.variance
         covariance = found.weights @ found.weights.T * (variance / factor)
-        estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)
+        estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise.level)
         coefficients = np.array([fitted.decay.rate, fitted.decay.stiffness, 0.0])
         return RunDecay(estimate, Gained.of(coefficients, covariance))

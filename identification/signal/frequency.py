@@ -14,10 +14,13 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.special import chdtri
 
-from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE, LEAST_SAMPLES
+from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE, LEAST_SAMPLES, MISFIT_RATE
 from identification.signal.decay_fit import Reading, mean_of_blocks, projected_cost
 from identification.signal.free_decay import Decay
+from identification.signal.noise import PEAK_HALF_TURN, PeakNoise
+from identification.statistics import inner
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
 Complex = NDArray[np.complex128]
@@ -78,6 +81,28 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     frequency, power = _spectral_peak(record, padding, falling)
     highest = float(power[:-1].max(initial=0.0))
     return SpectralPeak(frequency, highest / max(float(np.median(power)), 1e-300) if frequency else 0.0)
+
+
+def psd_peak_std(record: Record, frequency: float, noise_std: float) -> float:
+    """Standard deviation of the frequency of `psd_peak` by noise, without its bias, Hz.
+
+    The peak is where the slope of the power is zero: to first order the noise moves it by its share of the slope,
+    over the curvature.
+
+    Args:
+        frequency: of the peak, Hz, above 0.
+        noise_std: of one sample, rad; of coloured noise, the root of its power at the frequency.
+    """
+    record = evenly_spaced(record, bridged=False)
+    centred = record.yaw_rad - record.yaw_rad.mean()
+    time = record.time_s - record.time_s.mean()
+    window = _window(centred.size, falling=False)
+    lines = window * np.exp(-2j * np.pi * frequency * time)
+    rows = lines * np.stack((np.ones_like(time), -1j * time, -(time**2)))
+    value, slope, bend = np.sum(rows * centred, axis=-1)  # not BLAS: see `statistics.inner`
+    curvature = 2.0 * (abs(slope) ** 2 + (bend * np.conj(value)).real)
+    moved = 2.0 * np.real(rows[1] * np.conj(value) + rows[0] * np.conj(slope))
+    return noise_std * sqrt(float(inner(moved, moved))) / abs(float(curvature)) / (2.0 * np.pi)
 
 
 def _spectral_peak(record: Record, padding: int, falling: bool) -> tuple[float, Array]:
@@ -208,7 +233,9 @@ def _integral(time: Array, values: Array) -> Array:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, on either side of a peak, for the fit of its parabola
+PEAK_HALF_WIDTH = PEAK_HALF_TURN / (
+    2.0 * np.pi
+)  # of a period, on either side of a peak, for the fit of its parabola
 _LEAST_SAMPLES = 1.5001  # on either side of a peak, whose parabola needs three
 _LEAST_PEAKS = 4
 _MOVES = 8  # of half a window each
@@ -216,28 +243,27 @@ _MOVES = 8  # of half a window each
 
 @dataclass(frozen=True)
 class PeakDecay:
-    """Damping and scatter of the peaks.
+    """Damping from the peaks.
 
     Args:
         rate: decay rate σ, 1/s; the time to half amplitude is ln 2/σ.
-        rate_std: its standard deviation from the scatter of the peaks about their line, 1/s.
-        frequency_std: standard deviation of the frequency from the scatter of the peaks' instants, Hz.
+        rate_std: its standard deviation, 1/s.
         zero: the sensor's zero, rad.
         zero_std: its standard deviation from the scatter of the peaks, rad.
     """
 
     rate: float
     rate_std: float
-    frequency_std: float
     zero: float
     zero_std: float
 
 
-def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
+def peak_decay(record: Record, frequency: float, noise: PeakNoise) -> PeakDecay | None:
     """The decay rate from a line through the logarithm of the peaks, of both signs, against time.
 
     The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which are evenly placed about it. Peaks
-    are followed until they fall below a tenth of the first. None where there are fewer than four.
+    are followed until they fall below a tenth of the first. Where they scatter about the line more than the noise
+    does, beyond chance, the deviation is that of the scatter. None where there are fewer than four peaks.
 
     Args:
         frequency: of the oscillation, Hz.
@@ -252,12 +278,20 @@ def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
     count = int(below[0]) if below.size else sizes.size
     if count < _LEAST_PEAKS:
         return None
-    slope, slope_std = _line(times[:count], np.log(sizes[:count]))
-    period_half, period_std = _line(np.arange(count, dtype=np.float64), times[:count])
+    times, sizes = times[:count], sizes[:count]
+    centred = times - times.mean()
+    gains = centred / float(centred @ centred)
+    logarithms = np.log(sizes)
+    slope = float(gains @ logarithms)
+    residual = logarithms - logarithms.mean() - slope * centred
+    stds = noise.height / sizes
+    rate_std = float(np.linalg.norm(gains * stds))
+    if float(np.sum((residual / stds) ** 2)) > chdtri(count - 2, MISFIT_RATE):
+        scatter = float(np.sqrt(residual @ residual / (count - 2))) * float(np.linalg.norm(gains))
+        rate_std = max(rate_std, scatter)
     return PeakDecay(
         rate=-slope,
-        rate_std=max(slope_std, LEAST_NOISE * frequency),
-        frequency_std=max(0.5 * period_std / period_half**2, LEAST_NOISE * frequency),
+        rate_std=max(rate_std, LEAST_NOISE * frequency),
         zero=zero,
         zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), LEAST_NOISE * float(sizes[0])),
     )
@@ -324,15 +358,6 @@ def _parabola(x: Array, y: Array) -> Array:
     np.multiply(x, x, out=columns[0])
     columns[1] = x
     return np.asarray(np.linalg.lstsq(columns.T, y, rcond=None)[0])
-
-
-def _line(x: Array, y: Array) -> tuple[float, float]:
-    # Gradient and its standard deviation.
-    centred = x - x.mean()
-    spread = float(centred @ centred)
-    gradient = float(centred @ y) / spread
-    residual = y - y.mean() - gradient * centred
-    return gradient, float(np.sqrt(residual @ residual / (x.size - 2) / spread))
 
 
 _LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more has little effect elsewhere

@@ -2,7 +2,10 @@
 
 The fast part of a residual (its sixth differences) contains only noise, whatever the model. The slow part (means
 over an eighth of a cycle) also contains the misfit of the model, in the band of the oscillation, which
-determines the parameters. White noise has the same power in both: their ratio is tested by F.
+determines the parameters. White noise has the same power in both: their ratio is tested by F. Where they differ,
+the noise may be coloured: its spectrum is taken between the harmonics of the motion
+(`identification.signal.colour`), and the same test judges the whitened residual. Noise that passes has the power of
+its spectrum at the frequency of the motion in every standard deviation; a residual that does not is a misfit.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from scipy.special import fdtri
 
 from identification.estimate import NoiseLevel
 from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
+from identification.signal.colour import Autoregression, Periodogram, slow_part, steady
 from identification.statistics import inner
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.quantities import Angles, Seconds
@@ -26,7 +30,9 @@ _ORDER = 6
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
-_LONGEST_BLOCK = 1e9  # samples: longer than any record
+_LONGEST_CYCLE = 8e9  # samples: longer than any record
+_BLOCKS = 8  # in a cycle, of the slow part
+_PARTS = 16  # of a residual, in which noise has the same power
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,23 +41,48 @@ class Residual:
 
     Args:
         values: reading less model, shape (n,), rad.
+        cycle: samples in a cycle of the motion.
         unknowns: number of parameters fitted to the run's own data.
         peak: greatest deviation of the reading from the sensor's zero, rad.
     """
 
     values: Array
-    block: int
+    cycle: float
     unknowns: int
     peak: float
 
+    @property
+    def block(self) -> int:
+        """Samples in an eighth of a cycle, at least one."""
+        return max(1, round(self.cycle / _BLOCKS))
 
-def eighth_of_a_cycle(omega_n: float, sample_interval: Seconds) -> int:
-    """Samples in an eighth of the natural period, at least one.
+
+def samples_in_cycle(omega_n: float, sample_interval: Seconds) -> float:
+    """Samples in a natural period.
 
     Args:
         omega_n: natural angular frequency, rad/s.
     """
-    return max(1, round(min(2.0 * np.pi / (8.0 * omega_n * sample_interval), _LONGEST_BLOCK)))
+    return float(min(2.0 * np.pi / (omega_n * sample_interval), _LONGEST_CYCLE))
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of fitted runs.
+
+    Args:
+        colours: of each run's noise; none where it is white.
+        powers: of each run's coloured noise at the frequency of its motion, rad²; none where it is white.
+    """
+
+    level: NoiseLevel
+    colours: tuple[Autoregression, ...] = ()
+    powers: tuple[float, ...] = ()
+
+    @property
+    def variance(self) -> float:
+        """That of white noise with its power at the frequency of the motion, rad²."""
+        return self.level.std**2 * self.level.slow_ratio
 
 
 def stated_noise(sensor: SensorProperties) -> float | None:
@@ -61,8 +92,8 @@ def stated_noise(sensor: SensorProperties) -> float | None:
     return float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
 
 
-def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
-    """The noise level behind the standard deviations: the stated one where the residuals agree, else measured."""
+def noise_of(residuals: Sequence[Residual], sensor: SensorProperties) -> Noise:
+    """The noise behind the standard deviations: the stated level where residuals agree, else the measured one."""
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
@@ -75,26 +106,133 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     bears_out = stated is not None and _agree(fast, stated, degrees)
     reference = stated if stated is not None and bears_out else fast
     # Power of the block means relative to white noise of the reference level, and the verdict by F.
-    power, freedom, ratio, departs = 0.0, 0, 1.0, False
-    for residual in residuals:
-        own, blocks = slow_power(residual.values, residual.block)
-        power += own
-        freedom += blocks - residual.unknowns
-    if freedom >= 3:
-        ratio = power / freedom / reference**2
-        chance = float(fdtri(freedom, min(np.inf if bears_out else degrees, 1e9), 1.0 - MISFIT_RATE))
-        departs = bool(ratio > chance * (1.0 + NOISE_TOLERANCE) ** 2)
+    slow = _squares([slow_power(one.values, one.block) for one in residuals])
+    departs, ratio = _exceeds(slow[0] / reference**2, slow[1] - unknowns, np.inf if bears_out else degrees)
+    if departs:
+        coloured = _coloured(residuals, total, stated)
+        if coloured is not None:
+            return coloured
     if not departs and bears_out and stated is not None:
         bears_out = _agree(total, stated, count - unknowns)
     used = reference if departs or (bears_out and stated is not None) else total
-    return NoiseLevel(
-        std=used,
+    return Noise(
+        NoiseLevel(
+            std=used,
+            source="stated" if bears_out else "residual",
+            residual_std=total,
+            slow_ratio=max(ratio, 1.0) if departs else 1.0,
+            departs=departs,
+            disagrees=stated is not None and not bears_out,
+        )
+    )
+
+
+def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
+    """`noise_of` without the colours of the runs."""
+    return noise_of(residuals, sensor).level
+
+
+def _squares(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Sums of squares, and their numbers, of all runs together."""
+    return sum(power for power, _ in parts), sum(count for _, count in parts)
+
+
+def _exceeds(power: float, freedom: float, degrees: float) -> tuple[bool, float]:
+    """Whether residuals have more power than the noise beyond chance, and the ratio of the powers.
+
+    Args:
+        power: sum of squares over the variance of the noise.
+        freedom: degrees of freedom of the power.
+        degrees: of freedom of the variance of the noise.
+    """
+    if freedom < 3:
+        return False, 1.0
+    chance = float(fdtri(freedom, min(degrees, 1e9), 1.0 - MISFIT_RATE))
+    return bool(power / freedom > chance * (1.0 + NOISE_TOLERANCE) ** 2), power / freedom
+
+
+def _coloured(residuals: Sequence[Residual], total: float, stated: float | None) -> Noise | None:
+    """Coloured noise that explains the residuals; None where there is none.
+
+    It does where the whitened residuals pass the test of white noise, also close to the motion alone, and have one
+    power in all parts of a run: the misfit of a model lies there, or changes along the run, and a random moment
+    excites the resonance.
+
+    Args:
+        total: standard deviation of the residuals, rad.
+        stated: noise, rad; None where it is not stated.
+    """
+    colours, innovations = [], []
+    for residual in residuals:
+        colour = Autoregression.of(residual.values, residual.cycle)
+        if colour is None or not colour.innovations > 0.0:
+            return None
+        colours.append(colour)
+        innovations.append(colour.whitened(residual.values))
+    unknowns, degrees = sum(one.unknowns for one in residuals), sum(colour.freedom for colour in colours)
+    slow = _squares(
+        [slow_power(w, max(1, round(c.cycle / _BLOCKS))) for w, c in zip(innovations, colours, strict=True)]
+    )
+    near = _squares([c.near_motion(one.values) for c, one in zip(colours, residuals, strict=True)])
+    if _exceeds(slow[0], slow[1] - unknowns, degrees)[0] or _exceeds(*near, degrees)[0]:
+        return None
+    if not _steady_along(innovations):
+        return None
+    freedom = sum(_independent_squares(residual) for residual in residuals)
+    bears_out = stated is not None and _agree(total, stated, freedom)
+    std = stated if bears_out and stated is not None else total
+    powers = [float(colour.power(1.0)) * (std / total) ** 2 for colour in colours]
+    level = NoiseLevel(
+        std=std,
         source="stated" if bears_out else "residual",
         residual_std=total,
-        slow_ratio=max(ratio, 1.0) if departs else 1.0,
-        departs=departs,
+        slow_ratio=float(np.mean(powers)) / std**2,
+        departs=False,
         disagrees=stated is not None and not bears_out,
     )
+    return Noise(level, tuple(colours), tuple(powers))
+
+
+def _independent_squares(residual: Residual) -> float:
+    """The number of independent squares in the variance of coloured noise: (Σ S)² over Σ S²."""
+    own = 1.0 / residual.cycle
+    power = Periodogram.of(residual.values, 1.0, own).bridged(own)
+    return 2.0 * residual.values.size * float(np.mean(power)) ** 2 / float(np.mean(power**2))
+
+
+_ODD = np.arange(
+    1.0, 16.0, 2.0
+)  # harmonics of the motion that alternate from peak to peak as its own line does
+PEAK_HALF_TURN = np.pi / 6.0
+"""Angle of the motion within the half width of a peak, a twelfth of a period, rad."""
+
+
+@dataclass(frozen=True)
+class PeakNoise:
+    """Noise of the vertex of a parabola through the samples within a twelfth of a period of a peak.
+
+    Its height is their mean with weights (9 − 15x²)/8 and its slope that with weights 3x/2, with the place x within
+    ±1. A line through peaks of alternating sign averages all noise but that near the odd harmonics of the motion.
+
+    Args:
+        height: standard deviation of the height, rad.
+        slope: of the slope per half width, rad; of the instant, over ω² h w for a height h and a half width w.
+    """
+
+    height: float
+    slope: float
+
+    @classmethod
+    def of(cls, std: float, samples: float, colour: Autoregression | None = None) -> PeakNoise:
+        """White noise of a standard deviation (rad), or coloured noise, in windows of a number of samples."""
+        turn = PEAK_HALF_TURN * _ODD
+        heights = (15.0 * (np.sin(turn) / turn - np.cos(turn)) / turn - 3.0 * np.sin(turn)) / (2.0 * turn)
+        slopes = 3.0 * (np.sin(turn) / turn - np.cos(turn)) / turn
+        power = np.full(turn.size, std**2) if colour is None else colour.power(_ODD)
+        height, slope = (
+            sqrt(float(np.average(power, weights=one**2)) / samples) for one in (heights, slopes)
+        )
+        return cls(1.5 * height, sqrt(3.0) * slope)
 
 
 def white_noise(reading: Array, sensor: SensorProperties) -> float:
@@ -106,7 +244,7 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
     """
     peak = 0.5 * float(np.ptp(reading))
     floor = max(LEAST_NOISE * peak, 1e-300)
-    return _as_stated(*_fast_part([Residual(reading, 1, 0, peak)], floor), floor, sensor)
+    return _as_stated(*_fast_part([Residual(reading, 1.0, 0, peak)], floor), floor, sensor)
 
 
 def reading_noise(record: Record, sensor: SensorProperties) -> float:
@@ -130,16 +268,27 @@ def reading_noise(record: Record, sensor: SensorProperties) -> float:
 
 
 def slow_power(values: Angles, block: int) -> tuple[float, int]:
-    """Power of the slow part of a residual, by its means over blocks, rad², and the number of blocks.
+    """Power of the slow part of a residual, rad², and the number of blocks.
 
     The power of white noise is its variance times that number.
 
     Args:
-        block: number of samples in a block, such as `eighth_of_a_cycle`.
+        block: number of samples in a block, such as `Residual.block`.
     """
-    blocks = values.size // block
-    means = values[: blocks * block].reshape(blocks, block).mean(axis=1)
-    return float(inner(means, means)) * block, blocks
+    slow = slow_part(values, block)
+    return float(inner(slow, slow)), slow.size
+
+
+def _steady_along(runs: Sequence[Array]) -> bool:
+    """Whether white values have one power in all parts of every run.
+
+    Args:
+        runs: their values, shape (n,).
+    """
+    split = [np.array_split(values, _PARTS) for values in runs]
+    power = np.array([[float(np.mean(one**2)) for one in run] for run in split]).T
+    count = np.array([[0.5 * one.size for one in run] for run in split]).T
+    return bool(steady(power, count, MISFIT_RATE / len(runs)).all())
 
 
 def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperties) -> float:

@@ -20,11 +20,12 @@ from identification.policy import (
     LEAST_WINDOW_ENERGY,
     MISFIT_DEVIATIONS,
 )
+from identification.signal.colour import Autoregression
 from identification.signal.decay_fit import DecayFit, Reading, RunFit, fit_decays, fit_run
 from identification.signal.forcing import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
-from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level, slow_power
+from identification.signal.noise import Noise, Residual, noise_of, samples_in_cycle, slow_power
 from identification.statistics import determined, eliminate, inner, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -123,15 +124,15 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     noise, failure = noise_and_failure(reading, fitted, zero, sensor)
     if failure is not None:
         return FittedRun.failed(run, reading, failure)
-    variance = noise.std**2 * noise.slow_ratio
+    level, variance = noise.level, noise.variance
     covariance = decay_covariance_of(fitted) * variance
     windows = (
-        () if forcing.driven else fit_windows(reading, fitted.decay, zero, noise, cycles=cycles_per_window)
+        () if forcing.driven else fit_windows(reading, fitted.decay, zero, level, cycles=cycles_per_window)
     )
-    estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise, windows=windows)
+    estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=level, windows=windows)
     if not estimate.identified:
-        return FittedRun(reading, None, noise, estimate)
-    return FittedRun(reading, fitted, noise, estimate, _gained(run, reading, fit, variance))
+        return FittedRun(reading, None, level, estimate)
+    return FittedRun(reading, fitted, level, estimate, _gained(run, reading, fit, variance))
 
 
 def _gained(run: Run, reading: Reading, fit: DecayFit, variance: float) -> Gained:
@@ -184,7 +185,7 @@ def residuals_of(
             omega = max(rate, 1e-300) / max(angle, 1e-300)
         interval = float(reading.time[-1] - reading.time[0]) / (reading.time.size - 1)
         peak = float(np.abs(reading.yaw - reading.forcing.level(reading.yaw, zero)).max())
-        residuals.append(Residual(run.residual, eighth_of_a_cycle(omega, interval), unknowns, peak))
+        residuals.append(Residual(run.residual, samples_in_cycle(omega, interval), unknowns, peak))
     return residuals
 
 
@@ -195,15 +196,15 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 
 def noise_and_failure(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
-) -> tuple[NoiseLevel, Status | None]:
-    """The noise level from the residual of one run's fit, and the status of a failure; None if there is none.
+) -> tuple[Noise, Status | None]:
+    """The noise from the residual of one run's fit, and the status of a failure; None if there is none.
 
     Args:
         zero: its sensor zero, rad.
     """
-    noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
+    noise = noise_of(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
-    if float(inner(motion, motion)) < LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+    if float(inner(motion, motion)) < LEAST_ENERGY * max(noise.level.std, noise.level.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
     return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
@@ -309,10 +310,17 @@ class ResidualCheck:
 
     Args:
         covariance: of (a, k) by least squares, widened where the model departs, shape (2, 2), in 1/s and 1/s².
+        colour: of the noise; None where it is white.
     """
 
     noise: NoiseLevel
     covariance: Array
+    colour: Autoregression | None = None
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of white noise with the power at the frequency of the motion, rad."""
+        return self.noise.std * float(np.sqrt(self.noise.slow_ratio))
 
     def widened(self, covariance: Array) -> Array:
         """A covariance of (a, k), shape (2, 2), raised to that of least squares where the model departs."""
@@ -333,8 +341,8 @@ def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> Residual
     noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)
     if failure is not None:
         return None
-    covariance = decay_covariance_of(fit.runs[0]) * (noise.std**2 * noise.slow_ratio)
-    return ResidualCheck(noise, covariance)
+    covariance = decay_covariance_of(fit.runs[0]) * noise.variance
+    return ResidualCheck(noise.level, covariance, noise.colours[0] if noise.colours else None)
 
 
 def fit_windows(
@@ -413,8 +421,10 @@ def _window_estimate(time: Array, run: RunFit, noise: NoiseLevel, cycles: int) -
     if not decay.stiffness > 0.0:  # a stretch that only creeps
         return None
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
-    power, blocks = slow_power(run.residual, eighth_of_a_cycle(decay.omega_n, interval))
-    variance = noise.std**2 * max(1.0, power / max(blocks - 4, 1) / noise.std**2)
+    residual = Residual(run.residual, samples_in_cycle(decay.omega_n, interval), 4, 0.0)
+    power, blocks = slow_power(residual.values, residual.block)
+    least = noise.std**2 if noise.departs else noise.std**2 * noise.slow_ratio
+    variance = max(least, power / max(blocks - residual.unknowns, 1))
     if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]

@@ -12,10 +12,11 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
-from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
+from diagnosis.noise.colour import alike_in_all_runs, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.settings import Settings
+from identification.signal.colour import steady
 from tests.marks import slow
 from tests.support.gap_campaigns import NOISE, campaign, nominal, with_blow, with_settings
 from tests.unit.diagnosis.search.test_process_noise import buffeted
@@ -263,17 +264,17 @@ def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():
     rng = np.random.default_rng(4)
     count = np.tile(np.array([[3.0], [5.0], [10.0], [20.0]]), 4000)
     power = rng.gamma(count) / count
-    found = _steady(power, count, Settings().noise.colour_band_rate)
+    found = steady(power, count, Settings().noise.colour_band_rate)
     refused = int(np.sum(~found))
     assert 17 <= refused <= 68  # of 4000 at 1 %: outside with probability 3e-5
     louder = power * np.array([[1.0], [1.0], [1.0], [10.0]])
-    assert np.mean(_steady(louder, count, Settings().noise.colour_band_rate)) < 0.5
+    assert np.mean(steady(louder, count, Settings().noise.colour_band_rate)) < 0.5
     with_empty = (np.vstack((values, np.zeros(4000))) for values in (louder, count))
     assert np.array_equal(
-        _steady(*with_empty, Settings().noise.colour_band_rate),
-        _steady(louder, count, Settings().noise.colour_band_rate),
+        steady(*with_empty, Settings().noise.colour_band_rate),
+        steady(louder, count, Settings().noise.colour_band_rate),
     )
     alone = np.where(np.arange(4)[:, None] == 0, count, 0.0)
-    assert not _steady(
+    assert not steady(
         power * (alone > 0.0), alone, Settings().noise.colour_band_rate
     ).any()  # one part cannot show that the level is steady

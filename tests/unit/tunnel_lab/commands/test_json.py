@@ -82,6 +82,6 @@ def test_effects(tunnel: Tunnel, tmp_path: Path) -> None:
 def test_a_verdict_on_the_residual_is_a_plain_truth_value() -> None:
     values = 1e-3 * np.random.default_rng(2).standard_normal(4000) + 1e-2 * np.sin(np.arange(4000) / 100.0)
     for resolution in (None, 0.01):
-        level = noise_level([Residual(values, 20, 4, 0.3)], SensorProperties(250.0, resolution, None))
+        level = noise_level([Residual(values, 160.0, 4, 0.3)], SensorProperties(250.0, resolution, None))
         assert type(level.departs) is bool
         assert type(level.std) is float
