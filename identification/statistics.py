@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
-from identification.estimate import Estimate, NoiseLevel, Quantity
+from identification.estimate import PARAMETERS, Estimate, NoiseLevel, Quantity
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
-from identification.status import Remark
+from identification.status import Remark, Status, by_severity
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.quantities import PerParameter, PerUnknown, Square, Vector
 from tunnel_sim.vocabulary.record import Array
@@ -269,6 +269,21 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     least = np.array([one.std for name in estimate.parameters if (one := wider[name]) is not None])
     covariance = widened_covariance(estimate.covariance_matrix, least)
     return replace(estimate, runs=tuple(runs), covariance=tuple(map(tuple, covariance.tolist())), **wider)
+
+
+def withheld(estimate: Estimate, remarks: Sequence[Remark]) -> Estimate:
+    """Leave out the coefficients where a remark says that a value in a wrong unit makes them wrong by decades.
+
+    Frequencies and damping ratios of the runs do not depend on the stated values and remain.
+    """
+    if not any(remark.withholds for remark in remarks):
+        return estimate
+    runs = tuple(replace(run, aerodynamic_stiffness=None, aerodynamic_damping=None) for run in estimate.runs)
+    none: dict[str, Any] = dict.fromkeys((*PARAMETERS, "wind_off_inertia", "wind_off_intercept"))
+    statuses = by_severity({*estimate.statuses, Status.COEFFICIENTS_WITHHELD})
+    return replace(
+        estimate, runs=runs, parameters=(), covariance=(), repeatability=None, statuses=statuses, **none
+    )
 
 
 def _reaching(
