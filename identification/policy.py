@@ -16,9 +16,9 @@ REFUSAL_RATE = 1e-6
 REFUSAL_DEVIATIONS = 4.75
 """`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
 
-QUESTION_RATE = 1e-4
-"""Rate of questioning correct statements. It withholds nothing, but it must stay far below one campaign in a
-hundred, for there are several questions."""
+QUESTION_RATE = 1e-5
+"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred possible
+slips less than one correct campaign in a hundred is asked about."""
 
 MISFIT_RATE = 1e-3
 """Rate of false departures of a record, a line or a set of runs from its model; they only widen intervals."""

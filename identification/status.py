@@ -112,6 +112,9 @@ class Outcome(Enum):
 WITHHOLDS = "withholds_coefficients"
 """Figure of a remark that withholds the coefficients, true or absent."""
 
+SYSTEMATIC = "systematic"
+"""Figure of a remark on runs that differ, and not by chance: the words for the difference."""
+
 
 @dataclass(frozen=True)
 class Remark:

@@ -42,6 +42,7 @@ from diagnosis.words.scatter import (
     repeat_steps,
     repeats_words,
     scattering,
+    systematic,
     without_scatter,
 )
 from identification.printing import COEFFICIENTS, Document, significant
@@ -57,6 +58,8 @@ def headline(document: Document) -> tuple[str, str]:
     if document["found"].get("hold"):
         delay = plain(the_effect(delays=True).name)
         words = words.replace(delay, f"{delay} or wrong hold")
+    if kind == "found" and not without_scatter(document["causes"]) and systematic(document):
+        words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
     disturbed = [one["run"] for one in document.get("disturbed", ())]
     return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind
 

@@ -177,14 +177,16 @@ def _spoilt(record: Record) -> tuple[str, str] | None:
     Whether it does is tried: without it the record has three cycles.
     """
     at = clock_jump(record)
-    if at is not None:
-        if _oscillates(without_jump(record, at)):
-            return jump_words(record, at), "correct the clock of the samples after it, or make two runs of the file"
+    if at is not None and _oscillates(without_jump(record, at)):
+        return jump_words(
+            record, at
+        ), "correct the clock of the samples after it, or make two runs of the file"
     standing = standing_for_missing(record.yaw_rad)
     if standing is not None and _oscillates(Record(record.time_s[~standing], record.yaw_rad[~standing])):
+        value = float(record.yaw_rad[standing][0])
         what = (
-            f"{int(standing.sum())} of {standing.size} readings are {float(record.yaw_rad[standing][0]):.6g}, far from "
-            "all others: a value that stands for a missing one hides the oscillation"
+            f"{int(standing.sum())} of {standing.size} readings are {value:.6g}, far from all others: a value that "
+            "stands for a missing one hides the oscillation"
         )
         return what, "leave these samples out, or repair the sensor"
     return None

@@ -17,7 +17,7 @@ from identification import policy
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.examination.slips.motions import Conditions, Fitted, Motions, Trial, fitted
 from identification.examination.slips.run_labels import mending_statements
-from identification.status import Outcome, Remark
+from identification.status import SYSTEMATIC, Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
 Places = tuple[int, ...]
@@ -38,7 +38,7 @@ _KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "s
 class WrongFactor(StatementSlip):
     """One factor on a speed, a density, a spring or a clock makes all runs agree, and no effect does.
 
-    Refused; asked about where chance may explain it once in ten thousand campaigns.
+    Refused; asked about where the evidence is weaker.
     """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
@@ -80,7 +80,7 @@ def _agreeing(m: Motions) -> list[_Found]:
     trials = list(_slips(m))
     for wide in (False, True):
         fits = [(trial, fitted(m, trial, wide=wide)) for trial in trials]
-        judged = [_judged(trial, fit, effects, len(trials)) for trial, fit in fits]
+        judged = [_judged(trial, fit, effects) for trial, fit in fits]
         found = [one for one in judged if one is not None]
         if found:
             level = min(one.level for one in found)
@@ -90,7 +90,7 @@ def _agreeing(m: Motions) -> list[_Found]:
     return []
 
 
-def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted], tried: int) -> _Found | None:
+def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted]) -> _Found | None:
     """A trial that makes the runs agree; None where its number may be an effect's, chance, or none.
 
     The gain of one more number is tested by F with the scatter that remains, with this and the usual scatter of
@@ -107,7 +107,7 @@ def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted], tried: int) ->
     for rate in (policy.REFUSAL_RATE, policy.QUESTION_RATE):
         for level, freedom in tests:
             gain = min(one.squares(level) for one in effects) - fit.squares(level)
-            if gain > float(fdtri(1, freedom, 1.0 - rate / tried)):
+            if gain > float(fdtri(1, freedom, 1.0 - rate)):
                 return _Found(trial, fit, usual, refused=rate == policy.REFUSAL_RATE)
     return None
 
@@ -225,10 +225,6 @@ def _said(m: Motions, found: Sequence[_Found]) -> tuple[Remark, ...]:
     outcome = Outcome.REFUSED if found[0].refused else Outcome.NOTED
     figures: dict[str, Any] = {SYSTEMATIC: said}
     return (Remark(outcome, ids, what, remedy, figures),)
-
-
-SYSTEMATIC = "systematic"
-"""Figure of a remark on runs that differ, and not by chance: the words for the difference."""
 
 
 def _words(m: Motions, trial: Trial, number: float) -> str:

@@ -65,7 +65,9 @@ class StandingForMissing(RecordSlip):
                     f"{counted(count, 'reading')} of {value:.6g} {campaign.sensor.unit}, far from all others, as a "
                     "value that stands for a missing one; left out"
                 )
-                remarks.append(Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable"))
+                remarks.append(
+                    Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")
+                )
                 run = replace(run, record=Record(record.time_s[~standing], record.yaw_rad[~standing]))
             runs.append(run)
         return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
