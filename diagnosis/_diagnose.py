@@ -24,7 +24,7 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
 from diagnosis.remainder.ways import way_for
-from diagnosis.result import Diagnosis
+from diagnosis.result import Coefficients, Diagnosis
 from diagnosis.search.clock import Progress
 from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals import RIVALS
@@ -98,7 +98,8 @@ def diagnose(
         if answer.repeatability is not None and answer.repeatability.outlier:
             say(f"without run {answer.repeatability.outlier}")
             answer = _and_without_outlier(answer, answer.repeatability, chosen, settings, rivals)
-        return _without(replace(answer, remarks=(*short, *answer.remarks)), leave_out).in_words()
+        answer = replace(_withheld(answer), remarks=(*short, *answer.remarks))
+        return _without(answer, leave_out).in_words()
 
 
 def _and_without_outlier(
@@ -112,6 +113,14 @@ def _and_without_outlier(
         return answer
     known = 1.0 if study.answer is None else study.answer.probability
     return replace(answer, repeatability=replace(runs, without_outlier=AnswerWithout(study.causes, known)))
+
+
+def _withheld(answer: Diagnosis) -> Diagnosis:
+    """The answer without coefficients where the examination says that a unit makes them wrong by decades."""
+    if not any(remark.withholds for remark in answer.remarks):
+        return answer
+    sizes = tuple(replace(size, moves={}) for size in answer.sizes)
+    return replace(answer, coefficients=Coefficients({}, {}), hidden=(), trade_off=None, sizes=sizes)
 
 
 def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:

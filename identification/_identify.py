@@ -20,7 +20,7 @@ from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
 from identification.returned import checked_return
 from identification.signal.known_gain import refuse_other_gain
-from identification.statistics import widened_by_contradictions, widened_by_rounding
+from identification.statistics import widened_by_contradictions, widened_by_rounding, withheld
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
 from tunnel_sim.files.as_campaign import as_campaign
@@ -92,7 +92,7 @@ def identify(
             else Estimate(campaign.name, chosen.name, ())
         )
     found = widened_by_rounding(found, remaining.runs)
-    found = widened_by_contradictions(found, remaining, examined.remarks)
+    found = withheld(widened_by_contradictions(found, remaining, examined.remarks), examined.remarks)
     estimate = as_angles(found, campaign.sensor)
     if examined.remarks:  # the estimate includes them, and every run of the campaign, in its order
         of_runs = {run.id: run for run in estimate.runs}

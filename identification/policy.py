@@ -6,6 +6,8 @@ defined where they are used.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 # --- False-alarm rates: how often a correct campaign is called wrong. ---
 
 REFUSAL_RATE = 1e-6
@@ -13,6 +15,10 @@ REFUSAL_RATE = 1e-6
 
 REFUSAL_DEVIATIONS = 4.75
 """`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
+
+QUESTION_RATE = 1e-5
+"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred possible
+slips less than one correct campaign in a hundred is asked about."""
 
 MISFIT_RATE = 1e-3
 """Rate of false departures of a record, a line or a set of runs from its model; they only widen intervals."""
@@ -44,6 +50,10 @@ INERTIA_FACTOR = 1.5
 """Greatest relative error of a nominal inertia, as a factor: it comes from a drawing, without the support and the
 added mass of air. Confusing one spring with two makes 2. Judgement."""
 
+WITHHELD_INERTIA = 5.0
+"""Ratio of the springs' inertia to the stated one from which no coefficients are given: no drawing is so wrong.
+Judgement."""
+
 SAME_PRESSURE = 0.1
 """Relative difference below which dynamic pressures are one setting: speeds are measured to a few per cent."""
 
@@ -73,6 +83,45 @@ repeats to a few parts in ten thousand, and the amplitude of the release may cha
 SCATTER_OF_DAMPING = 0.02
 """Relative scatter of the decay rate between runs of equal statements: bearings repeat to a per cent or two."""
 
+USUAL_SCATTER: Mapping[str, float] = {
+    "wind_speed": 0.003,
+    "spring_stiffness": 0.0005,
+    "mechanical_damping": 0.01,
+}
+"""Relative scatter between runs of a usual rig, one standard deviation: a tunnel keeps its speed to 0.3 %, a spring
+clamped again repeats to 0.05 %, and a bearing with its cable to 1 %."""
+
+LEVELS_OF_SCATTER = (0.02, 5.0)
+"""Least and greatest scatter between runs that chance is believed to cause, in `USUAL_SCATTER`. Judgement."""
+
+AGREEING_SCATTER = 2.0
+"""Greatest scatter, in `USUAL_SCATTER`, of runs that agree with a slip: a large scatter hides which slip it is."""
+
+SCATTER_FREEDOM = 4
+"""Degrees of freedom of `USUAL_SCATTER` where few runs show their scatter: it is known within a factor of two.
+Judgement."""
+
+DAMPING_OF_SPRINGS = 0.1
+"""Relative difference of the damping with the wind off between springs: hysteresis of the springs. Judgement."""
+
+DAMPING_DEPARTURE = 0.5
+"""Such a difference as an effect may cause, dry friction among them. Judgement."""
+
+LEAST_DAMPING_STD = 2e-4
+"""Least relative standard deviation of a decay rate: no fit is more accurate beside small effects. Judgement."""
+
+LEAST_FACTOR: Mapping[str, float] = {
+    "wind_speed": 0.05,
+    "air_density": 0.1,
+    "air_density of a group": 0.05,
+    "spring_stiffness": 0.05,
+    "time_s": 0.01,
+    "idle": 0.1,
+    "along": 0.05,
+}
+"""Least relative error of a statement that is called a slip; smaller ones are calibration or scatter. Of a wind in
+runs that state none, over the least stated wind; along a campaign, from its first to its last run. Judgement."""
+
 LEAST_OF_WIND = 0.005
 """Least relative change of ωn² by the wind that a campaign is designed to measure. Judgement."""
 
@@ -92,11 +141,19 @@ OTHER_SPRING = 1.2
 """Ratio of ωn² of runs of equal statements and swings that only another spring explains: scatter and wear remain
 below a few per cent. Judgement."""
 
+OTHER_NUMBER = 0.05
+"""Relative disagreement of the stated springs from which another numbering is tried: calibrations are closer.
+Judgement."""
+
 OTHER_WIND = (1.02, 1.3)
 """Ratios of ωn² and of the decay rate, both at once, that only another wind speed explains. Judgement."""
 
 NOISE_RATIO = 0.15
 """Tolerance of the ratio of two runs' noise from one sensor."""
+
+ODD_NOISE = 4.0
+"""Ratio of a run's noise to that of the other runs, by which it is odd: an amplifier's next range has 3 to 10 times
+the gain, and the vibration of a rig changes the noise by less. Judgement."""
 
 LEAST_DRIFT = 5e-4
 """Relative change of a clock's rate along a run that is a drift: quartz keeps 1e-4, and a rig's temperature changes

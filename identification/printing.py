@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification.blocks import Block, Paragraph, Table
-from identification.status import Remark, Status
+from identification.status import SYSTEMATIC, Remark, Status
 from tunnel_sim.vocabulary.errors import counted
 
 SYMBOLS: Mapping[str, str] = {
@@ -310,8 +310,11 @@ def repeatability_lines(document: Document) -> list[str]:
     ways = [f"as stated, {', '.join(stated)}"] if stated else []
     told = ""
     if seen:
-        ways.append(f"attributed to chance, {', '.join(seen)}")
+        pattern = any(remark.get("figures", {}).get(SYSTEMATIC) for remark in document["remarks"])
+        ways.append(f"{'as if by chance' if pattern else 'attributed to chance'}, {', '.join(seen)}")
         told = "; tunnel diagnose distinguishes chance from a cause"
+        if pattern:
+            told = ", and a systematic difference is more likely: see the note"
     differs = (
         f"frequency differs by {percent(scatter['frequency'])} and damping by {percent(scatter['damping'])}"
     )

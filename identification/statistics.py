@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
-from identification.estimate import Estimate, Quantity
+from identification.estimate import PARAMETERS, Estimate, NoiseLevel, Quantity
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
-from identification.status import Remark
+from identification.status import Remark, Status, by_severity
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.quantities import PerParameter, PerUnknown, Square, Vector
 from tunnel_sim.vocabulary.record import Array
@@ -324,6 +324,21 @@ def _wider(found: Quantity, share: float) -> Quantity:
         low, high = (hypot(end - found.value, float(ndtri(0.975)) * own) for end in interval)
         interval = (found.value - low, found.value + high)
     return replace(found, std=hypot(found.std, own), interval=interval)
+
+
+def withheld(estimate: Estimate, remarks: Sequence[Remark]) -> Estimate:
+    """Leave out the coefficients where a remark says that a value in a wrong unit makes them wrong by decades.
+
+    Frequencies and damping ratios of the runs do not depend on the stated values and remain.
+    """
+    if not any(remark.withholds for remark in remarks):
+        return estimate
+    runs = tuple(replace(run, aerodynamic_stiffness=None, aerodynamic_damping=None) for run in estimate.runs)
+    none: dict[str, Any] = dict.fromkeys((*PARAMETERS, "wind_off_inertia", "wind_off_intercept"))
+    statuses = by_severity({*estimate.statuses, Status.COEFFICIENTS_WITHHELD})
+    return replace(
+        estimate, runs=runs, parameters=(), covariance=(), repeatability=None, statuses=statuses, **none
+    )
 
 
 def _reaching(

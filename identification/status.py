@@ -67,6 +67,10 @@ class Status(Enum):
     DAMPING_NOT_SEPARABLE = (
         "mechanical and aerodynamic damping cannot be separated: add a wind-off run or a second wind speed"
     )
+    COEFFICIENTS_WITHHELD = (
+        "a value is in a wrong unit, so no coefficients are given: correct it as the note says, or state "
+        "plausible = false under [sensor]"
+    )
     NO_REFERENCE_SIZE = (
         "no frontal_area or reference_length, so the air's stiffness and damping are given per run, without "
         "coefficients: state both under [rig]"
@@ -105,6 +109,13 @@ class Outcome(Enum):
     NOTED = "noted"
 
 
+WITHHOLDS = "withholds_coefficients"
+"""Figure of a remark that withholds the coefficients, true or absent."""
+
+SYSTEMATIC = "systematic"
+"""Figure of a remark on runs that differ, and not by chance: the words for the difference."""
+
+
 @dataclass(frozen=True)
 class Remark:
     """A finding in the records before the estimation.
@@ -125,6 +136,11 @@ class Remark:
         """The remark in one line: runs, what, remedy."""
         word = "run" if len(self.runs) == 1 else "runs"
         return f"{word} {', '.join(self.runs)}: {self.what}; {self.remedy}"
+
+    @property
+    def withholds(self) -> bool:
+        """Whether the coefficients are not given, since a value in a wrong unit makes them wrong by decades."""
+        return bool(self.figures.get(WITHHOLDS))
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; the figures where there are any."""

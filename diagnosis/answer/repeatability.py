@@ -24,12 +24,15 @@ from identification.campaign.between_runs import (
 )
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _AT_MOST = 0.95  # level of a limit
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
 _FEWEST = 5  # fewest runs for an outlier or a drift
+_FEWEST_OF_PATTERN = 4  # fewest runs for a pattern of the plan
+_PATTERN = 0.05  # relative range of a condition that makes a pattern
 _OF_TREND = 2  # numbers of a straight line
 
 
@@ -144,23 +147,50 @@ class _Runs:
         return ScatterLimits(frequency, damping)
 
     def trends(self) -> tuple[Trend, ...]:
-        """Parameters that differ between the runs and follow their order.
+        """Parameters that differ between the runs and follow their order, or a condition of the plan.
 
         The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
-        place in the campaign. Widths are those beside the drift.
+        place in the campaign, or to the condition. Widths are those beside the drift.
         """
-        tried = [place for place in self.kept if self.scatter[place].shown]
+        places = [place for place in self.kept if self.scatter[place].shown]
         rate = self.fitted.settings.scatter.trend_rate
-        found = [self._trend(place, len(tried)) for place in tried]
-        return tuple(one for one in found if one is not None and one.p_value < rate)
+        clearest = []
+        for place in places:
+            patterns = self._patterns(place)
+            tried = len(places) * len(patterns)
+            found = [self._trend(place, along, values, tried) for along, values in patterns.items()]
+            known = [one for one in found if one is not None and one.p_value < rate]
+            clearest += [min(known, key=lambda one: one.p_value)] if known else []
+        return tuple(clearest)
 
-    def _trend(self, place: int, tried: int) -> Trend | None:
+    def _patterns(self, place: int) -> dict[str, PerRun | None]:
+        """Quantities that the deviations of one parameter may follow, from -1/2 to 1/2; None for the order."""
+        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
+        acts = np.array([kind.acts(wind_on=run.wind_on) for run in runs])
+        known = {
+            "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
+            "wind_speed": [run.wind_speed for run in runs],
+            "air_density": [run.air_density for run in runs],
+            "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
+        }
+        found: dict[str, PerRun | None] = {"order": None}
+        for name, given in known.items():
+            values = np.array(given)
+            has = (
+                acts & (values > 0.0) if name == "air_density" else acts
+            )  # without wind no density is stated
+            low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
+            if high - low > _PATTERN * high:
+                found[name] = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
+        return found
+
+    def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
         """The drift of one parameter; None where too few runs have it."""
         runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
         count = sum(kind.acts(wind_on=run.wind_on) for run in runs)
-        if count < _FEWEST:
+        if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):
             return None
-        columns, size = self.columns.with_drift(place)
+        columns, size = self.columns.with_drift(place, values)
         products = RunProducts.of(
             [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
         )
@@ -173,8 +203,8 @@ class _Runs:
         p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
         left = float(widths[list(self.kept).index(place)])
         known = [one.name for one in self.fitted.problem.scatter]
-        only = kind.name in known and drifts(self.fitted, known.index(kind.name))
-        return Trend(kind.name, float(slope), std, p_value, left, only)
+        only = values is None and kind.name in known and drifts(self.fitted, known.index(kind.name))
+        return Trend(kind.name, float(slope), std, p_value, left, only, along)
 
     def _changes(self, index: int) -> Array:
         """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""

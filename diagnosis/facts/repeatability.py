@@ -28,15 +28,17 @@ class Spread:
 
 @dataclass(frozen=True)
 class Trend:
-    """A quantity that drifts over the campaign, in the order of the runs.
+    """A quantity that differs between the runs by a pattern: in their order, or with a condition of the plan.
 
     Args:
         effect: name of the scatter of that quantity.
-        change: of the quantity from the first run to the last one, relative, dimensionless.
+        change: of the quantity from the first run to the last one, or from the least value of the condition to the
+            greatest, relative, dimensionless.
         std: its standard deviation, dimensionless.
         p_value: probability of such an order by chance, times the number of trends sought.
         left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
         only: whether the runs show no scatter of the quantity beside the drift.
+        along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density`` or ``amplitude``.
     """
 
     effect: str
@@ -45,6 +47,7 @@ class Trend:
     p_value: float
     left: float
     only: bool = False
+    along: str = "order"
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ class Repeatability:
         spreads: chance differences between the runs; empty where they repeat.
         runs: every run against the model.
         outlier: id of the run that deviates far beyond the others; empty: none.
-        trends: numbers that drift over the campaign, beyond chance.
+        trends: numbers that differ by a pattern, beyond chance; of each the clearest pattern.
         without_outlier: the answer without that run; None: there is none, or the others cannot be diagnosed.
         limits: of scatter where none was detected or stated; else None.
     """

@@ -25,7 +25,7 @@ from identification.campaign.between_runs import (
     likeliest_widths,
     marginal,
 )
-from tunnel_sim.vocabulary.quantities import PerKind
+from tunnel_sim.vocabulary.quantities import PerKind, PerRun
 from tunnel_sim.vocabulary.record import Array
 
 #: Share of a column's power that deviations of the runs must fail to explain. Smaller differences are
@@ -110,16 +110,17 @@ class RunColumns:
         rows = zip(self.seen, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
-    def with_drift(self, place: int) -> tuple[RunColumns, float]:
+    def with_drift(self, place: int, along: PerRun | None = None) -> tuple[RunColumns, float]:
         """Add a drift of one parameter, whose deviation is proportional to a run's place in the campaign.
 
         Args:
             place: of the parameter among the deviations.
+            along: another quantity in place of the run's place, from -1/2 to 1/2, shape (runs,).
 
         Returns:
             The columns, and the norm of the column for a drift of 1 from the first run to the last.
         """
-        order = np.linspace(-0.5, 0.5, len(self.seen))
+        order = np.linspace(-0.5, 0.5, len(self.seen)) if along is None else along
         return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
 
     def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:

@@ -9,6 +9,7 @@ from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import listed, plain, probability, rounded_up
 from identification.blocks import Table
 from identification.printing import Document, concise, significant, with_std
+from identification.status import SYSTEMATIC
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.quantities import Share
 
@@ -26,6 +27,12 @@ _MEANT = (
     "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
     "them."
 )
+_ALONG = {
+    "spring_stiffness": "stiffness of the spring",
+    "wind_speed": "wind speed",
+    "air_density": "air density",
+    "amplitude": "amplitude",
+}
 _DRIFTS = {
     "wind_speed": "does the lab warm up, or the fan drift?",
     "spring_stiffness": "does the spring warm up, or creep?",
@@ -151,13 +158,22 @@ def scatter_words(document: Document) -> str:
     return " ".join([*said, *_told_apart(spreads, settings_of(document).words)])
 
 
+def systematic(document: Document) -> list[str]:
+    """Words for what the examination found of a pattern in the runs' differences; and the patterns' effects."""
+    remarks = [remark.get("figures", {}).get(SYSTEMATIC) for remark in document.get("remarks", ())]
+    trends = [one["effect"] for one in (document.get("repeatability") or {}).get("trends", ())]
+    return [*filter(None, remarks), *trends]
+
+
 def _start(document: Document) -> str:
     if not document.get("decided", True):
         return "With every answer the runs differ from each other by chance"
     if without_scatter(document["causes"]):
         return "In addition the runs differ by chance"
-    only = "" if document["rest"]["material"] else " only"
     likely = probability(document["credible"][0]["probability"])
+    if systematic(document):
+        return f"The runs differ from each other, and not by chance alone (probability {likely})"
+    only = "" if document["rest"]["material"] else " only"
     return f"The runs differ from each other by chance{only} (probability {likely})"
 
 
@@ -178,6 +194,13 @@ def trend_words(trend: Mapping[str, Any]) -> str:
     change, std = 100.0 * abs(trend["change"]), 100.0 * trend["std"]
     goes = "rises" if trend["change"] > 0.0 else "falls"
     moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
+    along = trend.get("along", "order")
+    if along != "order":
+        moved = f"{with_std(change, std)} % {'higher' if trend['change'] > 0.0 else 'lower'}"
+        return (
+            f"Part of this is not by chance: {NUMBERS[number]} is {moved} at the greatest {_ALONG[along]} than at "
+            f"the least. The remaining scatter is {percent_of(trend['left'])}."
+        )
     if trend.get("only"):
         return f"The runs drift but do not scatter: {moved} ({_DRIFTS[number]})."
     return (

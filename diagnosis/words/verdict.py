@@ -42,9 +42,11 @@ from diagnosis.words.scatter import (
     repeat_steps,
     repeats_words,
     scattering,
+    systematic,
     without_scatter,
 )
 from identification.printing import COEFFICIENTS, Document, significant
+from identification.status import WITHHOLDS
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 
 _UNKNOWN = ["unknown"]
@@ -56,6 +58,8 @@ def headline(document: Document) -> tuple[str, str]:
     if document["found"].get("hold"):
         delay = plain(the_effect(delays=True).name)
         words = words.replace(delay, f"{delay} or wrong hold")
+    if kind == "found" and not without_scatter(document["causes"]) and systematic(document):
+        words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
     disturbed = [one["run"] for one in document.get("disturbed", ())]
     return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind
 
@@ -424,11 +428,19 @@ def _run_words(document: Document, run: Mapping[str, float]) -> str:
     return run_words(run, robot=bool(document["found"].get("robot")))
 
 
+def withholds(remark: Mapping[str, Any]) -> bool:
+    """Whether a remark of a document withholds the coefficients."""
+    return bool(remark.get("figures", {}).get(WITHHOLDS))
+
+
 def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What to do about runs that are left out or refused, each remedy once; a cut run is used and needs nothing."""
+    """What to do about runs that are left out or refused, or whose units are wrong, each remedy once.
+
+    A cut run is used and needs nothing.
+    """
     runs: dict[str, list[str]] = {}
     for remark in remarks:
-        if remark["outcome"] in ("left out", "refused"):
+        if remark["outcome"] in ("left out", "refused") or withholds(remark):
             runs.setdefault(remark["remedy"], []).extend(remark["runs"])
     return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
 
@@ -452,6 +464,8 @@ def next_steps(document: Document) -> list[str]:
         steps.append(f"{words} Add it to the campaign and diagnose again.")
     if step := model_step(document):
         steps.append(f"{step}.")
+    if not causes and any(map(withholds, document.get("remarks", ()))):
+        return [*steps, "Diagnose again: no coefficients are given."]
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):

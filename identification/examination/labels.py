@@ -10,8 +10,9 @@ The stated springs agree where Kr/ωn² with the wind off is the same inertia fo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from scipy.special import chdtri, fdtri, ndtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.status import Outcome, Remark
+from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -265,6 +266,56 @@ class _Springs:
         return float(away @ away) > float(chdtri(self.stiffness.size - 1, policy.MISFIT_RATE))
 
 
+def springs_renumbered(
+    swings: Sequence[Swing], numbered: Callable[[], Sequence[float]]
+) -> tuple[Remark, ...]:
+    """Refuse springs that disagree as stated, and agree if each is its neighbour in a list of numbered springs.
+
+    Args:
+        numbered: reads the stiffnesses of a list, in its order, N m/rad.
+    """
+    still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+    stated = _Springs.of(still)
+    if stated.stiffness.size < 2 or np.ptp(stated.inertia) < np.log1p(policy.OTHER_NUMBER):
+        return ()
+    own = sorted({float(s.run.spring_stiffness or 0.0) for s in swings})
+    for table in (np.array(numbered()), np.array(own)):
+        places = [
+            np.flatnonzero(np.abs(table / value - 1.0) < policy.SPRING_AT_BEST) for value in stated.stiffness
+        ]
+        if any(place.size != 1 for place in places):
+            continue
+        number = np.array([int(place[0]) for place in places])
+        for shift in (-1, 1):
+            inside = (number + shift >= 0) & (number + shift < table.size)
+            meant = table[(number + shift)[inside]]
+            known = int(np.sum(inside))
+            if known < 2 or (known == 2 and not np.all(inside)):
+                continue  # two springs of three may agree by chance
+            inertia = stated.inertia[inside] + np.log(meant / stated.stiffness[inside])
+            std = np.hypot(stated.std[inside], policy.SPRING_AT_BEST)
+            away = inertia - np.average(inertia, weights=std**-2)
+            if float(np.sum((away / std) ** 2)) <= float(chdtri(known - 1, policy.SLIP_AGREES)):
+                return (_renumbered(stated, inside, meant, shift),)
+    return ()
+
+
+def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift: int) -> Remark:
+    """The refusal that names the intended springs."""
+    spread = 100.0 * np.expm1(float(np.ptp(stated.inertia)))
+    pairs = ", ".join(
+        f"{new:g} for {old:g}" for new, old in zip(meant, stated.stiffness[inside], strict=True)
+    )
+    what = (
+        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs, and agrees if all "
+        f"springs are the next {'stiffer' if shift > 0 else 'softer'} ones of the list ({pairs} N m/rad)"
+    )
+    if meant.size == 2:
+        what += "; or one of the two is off"
+    remedy = "correct spring_stiffness, or state plausible = false under [sensor] if the numbers are right"
+    return Remark(Outcome.REFUSED, tuple(name for group in stated.runs for name in group), what, remedy)
+
+
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """Note springs whose stated stiffness does not fit the wind-off frequencies within their tolerance.
 
@@ -327,5 +378,7 @@ def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tupl
         f"yaw_inertia of {stated:.4g} kg m2{slip}"
     )
     remedy = "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]"
-    figures = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
+    figures: dict[str, Any] = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
+    if abs(np.log(found / stated)) > np.log(policy.WITHHELD_INERTIA):
+        figures[WITHHOLDS] = True
     return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures),)

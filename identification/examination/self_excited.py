@@ -38,6 +38,8 @@ class Swing:
             knowledge of a frequency that depends on the amplitude.
         rate: a = ζωn, 1/s; negative where the motion grows.
         rate_std: its standard deviation, 1/s.
+        rate_error: standard deviation of a by the residual's own correlation, and the change of a along the run
+            between its first part and the rest, 1/s.
         zero: the sensor's zero, rad.
         zero_std: its standard deviation, rad.
         time: since the start of the record, thinned, shape (n,), s.
@@ -50,6 +52,7 @@ class Swing:
     stiffness_std: float
     rate: float
     rate_std: float
+    rate_error: float
     zero: float
     zero_std: float
     time: Array
@@ -76,8 +79,8 @@ def swing_of(run: Run) -> Swing | None:
     half_cycle = np.pi / poles.decay.omega_d * residual.size / float(reading.time[-1])
     variance = float(residual @ residual) / max(residual.size - _UNKNOWNS, 1) * max(half_cycle, 1.0)
     rate_std, stiffness_std = np.sqrt(variance) * np.linalg.norm(poles.weights, axis=1)
-    # Change of k between the run's first part and the rest.
-    half, change = 0.5 * float(reading.time[-1]), 0.0
+    # Changes of k and a between the run's first part and the rest.
+    half, change, slowing = 0.5 * float(reading.time[-1]), 0.0, 0.0
     split = half if poles.decay.rate <= 0.0 else min(half, _E_FOLDING / poles.decay.rate)
     at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / poles.decay.omega_d)))
     if min(at, reading.time.size - at) >= _LEAST_SAMPLES:
@@ -89,18 +92,36 @@ def swing_of(run: Run) -> Swing | None:
         )
         if first is not None and rest is not None:
             change = abs(first.decay.stiffness - rest.decay.stiffness)
+            slowing = abs(first.decay.rate - rest.decay.rate)
     return Swing(
         run,
         stiffness=poles.decay.stiffness,
         stiffness_std=float(np.hypot(stiffness_std, change)),
         rate=poles.decay.rate,
         rate_std=float(rate_std),
+        rate_error=float(np.hypot(rate_std * _correlated(residual, half_cycle), slowing)),
         zero=zero,
         zero_std=float(np.sqrt(variance / residual.size)),
         time=reading.time,
         motion=reading.yaw - zero,
         amplitude=envelope_amplitude(poles.decay, fitted[0].angle, fitted[0].rate),
     )
+
+
+def _correlated(residual: Array, half_cycle: float) -> float:
+    """The factor, up to 1, on standard deviations that assume a residual correlated over half a cycle.
+
+    Args:
+        residual: shape (n,), rad.
+        half_cycle: in samples.
+    """
+    block = max(round(half_cycle), 1)
+    count = residual.size // block
+    if block == 1 or count < _LEAST_SAMPLES // 2:
+        return 1.0
+    means = residual[: count * block].reshape(count, block).mean(axis=1)
+    slow = float(means @ means) / count * block / max(float(residual @ residual) / residual.size, 1e-300)
+    return float(np.sqrt(np.clip(slow / block, 1.0 / block, 1.0)))
 
 
 def _poles(reading: Reading, omega: float) -> PencilDecay | None:

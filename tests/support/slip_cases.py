@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import butter, lfilter, lfilter_zi
 
 from tests.support.slip_rig import (
+    DENSITY,
     INERTIA,
     NOISE,
+    RATE,
     SPEEDS,
     SPRINGS,
     ZERO,
@@ -97,12 +100,89 @@ def _holding(begin: int, end: int, value: float | None = None) -> Slip:
     return reading(change, "r1")
 
 
+def _six(off: float = 0.0, **actual: float) -> Campaign:
+    """Two springs at 0, 15 and 25 m/s, with the actual speeds of some runs, stated in round numbers."""
+    return _stated_round([Condition(k, v) for k in SPRINGS for v in (0.0, 15.0, 25.0)], off, actual)
+
+
+def _nine(off: float = 0.0, **actual: float) -> Campaign:
+    """As `_six`, with a third spring."""
+    conditions = [Condition(k, v) for k in (*SPRINGS, 67.98) for v in (0.0, 15.0, 25.0)]
+    return _stated_round(conditions, off, actual)
+
+
+def _stated_round(conditions: list[Condition], off: float, actual: dict[str, float]) -> Campaign:
+    moved = [
+        replace(one, speed=actual.get(f"r{number}", one.speed or off))
+        for number, one in enumerate(conditions, 1)
+    ]
+    data = honest(moved)
+    runs = tuple(
+        replace(run, wind_speed=one.speed, air_density=DENSITY if one.speed else None)
+        for run, one in zip(data.runs, conditions, strict=True)
+    )
+    return replace(data, runs=runs)
+
+
+def _density_along(change: float) -> Slip:
+    """A density that is stated to change along the campaign, as it does not."""
+
+    def slip(data: Campaign) -> Campaign:
+        last = len(data.runs) - 1
+        runs = tuple(
+            replace(run, air_density=DENSITY * (1.0 + change * number / last) if run.wind_on else None)
+            for number, run in enumerate(data.runs)
+        )
+        return replace(data, runs=runs)
+
+    return slip
+
+
+def _springs(*stated: float) -> Slip:
+    """The springs stated as others, in their order."""
+
+    def slip(data: Campaign) -> Campaign:
+        known = sorted({run.spring_stiffness or 0.0 for run in data.runs})
+        meant = dict(zip(known, stated, strict=True))
+        runs = tuple(replace(run, spring_stiffness=meant[run.spring_stiffness or 0.0]) for run in data.runs)
+        return replace(data, runs=runs)
+
+    return slip
+
+
+def _low_passed(corner: float, *names: str) -> Slip:
+    """Readings behind a Butterworth filter of the logger, Hz."""
+    b, a = butter(2, corner, fs=RATE)
+
+    def change(yaw: Array) -> Array:
+        return np.asarray(lfilter(b, a, yaw, zi=lfilter_zi(b, a) * yaw[0])[0])
+
+    return reading(change, *names)
+
+
+def _noisier(std: float, *names: str) -> Slip:
+    rng = np.random.default_rng(19)
+    return reading(lambda yaw: yaw + rng.normal(0.0, std, yaw.size), *names)
+
+
+def _missing(value: float, *names: str) -> Slip:
+    """Some samples of a value that stands for a missing reading."""
+
+    def change(yaw: Array) -> Array:
+        gone = yaw.copy()
+        gone[np.random.default_rng(20).choice(yaw.size, 12, replace=False)] = value
+        return gone
+
+    return reading(change, *names)
+
+
 def _nothing(data: Campaign) -> Campaign:
     return data
 
 
 PLAIN = honest()
 """Four honest runs, the same for all slips."""
+SIX, NINE = _six(), _nine()
 ALL = ("r1", "r2", "r3", "r4")
 ON, OFF = ("r2", "r4"), ("r1", "r3")
 WIND = {"wind_speed": 15.0, "air_density": 1.2}
@@ -171,6 +251,30 @@ TABLE: dict[str, Case] = {
     ),
     "release on the other side": Case(
         honest(release=True), stating("r2", release_angle=-0.26), "the other side", ("r2",), refused=False
+    ),
+    "one run in radians under yaw_deg": Case(
+        SIX, reading(np.radians, "r5"), "radians in a column of degrees", ("r5",)
+    ),
+    "one run low-passed at 6 Hz": Case(SIX, _low_passed(6.0, "r5"), "the logger filtered the run", ("r5",)),
+    "a second day's density 18 % too low": Case(
+        SIX, scaling("r5", "r6", air_density=0.82), "0.984 of r5, r6 as 1.2 kg/m3", ("r5", "r6")
+    ),
+    "idle wind in the runs that state none": Case(
+        _nine(off=4.0), _nothing, "a wind of 4 m/s in r1, r4, r7", ("r1", "r4", "r7")
+    ),
+    "all springs one number up": Case(
+        SIX, _springs(21.02, 51.88), "16.12 for 21.02, 44.84 for 51.88 N m/rad", ("r1", "r4")
+    ),
+    "one speed 10 % low": Case(_six(r3=27.5), _nothing, "25 of r3 as 27.5 m/s", ("r3",)),
+    "density rises along the campaign": Case(
+        SIX, _density_along(0.2), "air_density falling by 17 % from the first run to the last", ("r2", "r6")
+    ),
+    "one clock 10 % fast": Case(PLAIN, clocking(lambda t: 1.1 * t, "r1"), "time_s of r1 10 % fast", ("r1",)),
+    "one clock jumps": Case(
+        PLAIN, clocking(lambda t: t + 30.0 * (t > 4.0), "r2"), "time_s jumps by 30 s after 4 s", ("r2",)
+    ),
+    "a value for missing readings": Case(
+        PLAIN, _missing(-9.99, "r2"), "12 readings of -9.99 rad, far from all others", ("r2",), refused=False
     ),
 }
 
@@ -284,5 +388,42 @@ FURTHER: dict[str, Case] = {
     ),
     "springs in kgf m/rad": Case(
         honest(inertia=INERTIA), scaling(spring_stiffness=1.0 / 9.80665), "in kgf m/rad", OFF, refused=False
+    ),
+    "half of the runs in radians under yaw_deg": Case(
+        PLAIN, reading(np.radians, "r3", "r4"), "radians in a column of degrees", ("r3", "r4")
+    ),
+    "all but one in degrees": Case(
+        honest([Condition(k, v, release=0.05) for k in SPRINGS for v in SPEEDS]),
+        reading(np.degrees, "r1", "r2", "r4"),
+        "radians in a column of degrees",
+        ("r3",),
+    ),
+    "one run low-passed at 15 Hz": Case(SIX, _low_passed(15.0, "r2"), "the logger filtered the run", ("r2",)),
+    "one wind-off run low-passed at 30 Hz": Case(
+        NINE, _low_passed(30.0, "r4"), "the logger filtered the run", ("r4",)
+    ),
+    "one run of ten times the noise": Case(
+        SIX, _noisier(10.0 * NOISE, "r4"), "the noise is 10 times as large", ("r4",), refused=False
+    ),
+    "a second day's density 15 % too high": Case(
+        NINE, scaling("r8", "r9", air_density=1.15), "1.38 of r8, r9 as 1.2 kg/m3", ("r8", "r9")
+    ),
+    "the first day's density 15 % too low": Case(
+        NINE, scaling("r2", "r3", air_density=0.85), "1.02 of r2, r3 as 1.2 kg/m3", ("r2", "r3")
+    ),
+    "idle wind of 6 m/s": Case(_nine(off=6.0), _nothing, "a wind of 6 m/s in r1, r4, r7", ("r1", "r4", "r7")),
+    "two springs one number down": Case(
+        SIX, _springs(6.12, 35.02), "16.12 for 6.12, 44.84 for 35.02 N m/rad", ("r1", "r4")
+    ),
+    "one speed 10 % high": Case(_six(r5=13.5), _nothing, "15 of r5 as 13.5 m/s", ("r5",)),
+    "density falls along the campaign": Case(
+        NINE, _density_along(-0.15), "air_density rising by 17 % from the first run to the last", ("r2", "r9")
+    ),
+    "one clock 10 % slow": Case(PLAIN, clocking(lambda t: 0.9 * t, "r3"), "time_s of r3 10 % slow", ("r3",)),
+    "one clock 4 % fast with the wind on": Case(
+        NINE, clocking(lambda t: 1.04 * t, "r5"), "time_s of r5 4 % fast", ("r5",)
+    ),
+    "clock jumps by days": Case(
+        PLAIN, clocking(lambda t: t + 86400.0 * (t > 2.0), "r3"), "time_s jumps by 8.64e+04 s", ("r3",)
     ),
 }  # fmt: skip

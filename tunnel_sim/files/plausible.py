@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import SensorProperties
@@ -30,6 +31,13 @@ _TWO_TURNS = 4.0 * np.pi
 # differences are allowed: a run with times may have its own sample rate.
 _TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
 _SLIP_TOLERANCE = 0.1
+_JUMP = 50.0  # usual steps: a longer gap in a record without an oscillation is a jump of the clock
+_JOINED = 6  # samples on each side of a jump, through which a cubic must pass,
+_SHORT = 400  # or this part of the record
+_NEAR = 20  # part of the record on each side, in which the body must move
+_MOVING = 0.1  # of the range of the readings
+_CONTINUES = 0.02  # of the range near the jump
+_BEYOND = 1.0  # ranges of the other readings: a value farther away stands for a missing one
 MINIMUM_CYCLES = 3.0
 # The count is uncertain, most with heavy damping or a drifting sensor; a run of three cycles must pass.
 CYCLE_TOLERANCE = 0.25
@@ -134,9 +142,11 @@ def checked_record(
     cycles = count_cycles(record) if drive is None else 0.0
     if drive is None and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
         what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
+        remedy = "record for longer after the release, or leave the run out"
         if not cycles > 0.0:
             what = "no oscillation is visible in the record, so it has fewer than three cycles"
-        remedy = "record for longer after the release, or leave the run out"
+        if spoilt := _spoilt(record):
+            what, remedy = spoilt
         raise TunnelError(what, where=where, remedy=remedy)
     step = record.sample_interval
     if judged and angle:  # rates and accelerations may have any size
@@ -149,6 +159,8 @@ def checked_record(
         return record
     per_cycle = reading.size / cycles
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
+    if per_cycle < LEAST_SAMPLES_PER_CYCLE and (spoilt := _spoilt(record)):
+        raise TunnelError(spoilt[0], where=where, remedy=spoilt[1])
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
             f"{per_cycle:.1f} samples per cycle: {_LOOKS} too low a sample rate, and the motion may be the alias "
@@ -157,6 +169,89 @@ def checked_record(
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
     return record
+
+
+def _spoilt(record: Record) -> tuple[str, str] | None:
+    """What hides an oscillation, and the remedy: a jump of the clock, or a value that stands for a missing one.
+
+    Whether it does is tried: without it the record has three cycles.
+    """
+    at = clock_jump(record)
+    if at is not None and _oscillates(without_jump(record, at)):
+        return jump_words(
+            record, at
+        ), "correct the clock of the samples after it, or make two runs of the file"
+    standing = standing_for_missing(record.yaw_rad)
+    if standing is not None and _oscillates(Record(record.time_s[~standing], record.yaw_rad[~standing])):
+        value = float(record.yaw_rad[standing][0])
+        what = (
+            f"{int(standing.sum())} of {standing.size} readings are {value:.6g}, far from all others: a value that "
+            "stands for a missing one hides the oscillation"
+        )
+        return what, "leave these samples out, or repair the sensor"
+    return None
+
+
+def _oscillates(record: Record) -> bool:
+    return bool(count_cycles(record) >= MINIMUM_CYCLES - CYCLE_TOLERANCE)
+
+
+def clock_jump(record: Record) -> int | None:
+    """The sample after which the times jump while the reading continues; None where there is none.
+
+    Across samples that are missing a swing does not continue with the same value and slope.
+    """
+    steps = np.diff(record.time_s)
+    at = int(np.argmax(steps))
+    usual = float(np.median(steps))
+    if not steps[at] > _JUMP * usual:
+        return None
+    joined, near = max(_JOINED, steps.size // _SHORT), max(_JOINED, steps.size // _NEAR)
+    first, last = max(at + 1 - joined, 0), min(at + 1 + joined, steps.size + 1)
+    before, after = record.yaw_rad[first : at + 1], record.yaw_rad[at + 1 : last]
+    if min(before.size, after.size) < 3:
+        return at if steps[at] > record.duration - _JUMP * usual * steps.size else None
+    # a cubic through the samples on both sides, on a clock without the jump
+    place = np.arange(last - first, dtype=np.float64)
+    both = np.concatenate((before, after))
+    left = both - np.polyval(np.polyfit(place, both, 3), place)
+    moving = float(np.ptp(record.yaw_rad[max(at - near, 0) : at + near]))
+    if moving < _MOVING * float(np.ptp(record.yaw_rad)):
+        return None  # at rest any reading continues
+    return at if float(np.abs(left).max()) < _CONTINUES * moving else None
+
+
+def without_jump(record: Record, at: int) -> Record:
+    """A record whose times go on without the jump after a sample."""
+    steps, time = np.diff(record.time_s), record.time_s.copy()
+    time[at + 1 :] -= steps[at] - float(np.median(steps))
+    return Record(time, record.yaw_rad)
+
+
+def jump_words(record: Record, at: int) -> str:
+    """The jump of the clock after a sample, in words."""
+    steps = np.diff(record.time_s)
+    return (
+        f"time_s jumps by {steps[at]:.4g} s after {record.time_s[at]:.6g} s (sample {at + 2}), "
+        f"{steps[at] / float(np.median(steps)):.3g} usual steps, while the reading continues"
+    )
+
+
+def standing_for_missing(reading: Readings) -> NDArray[np.bool_] | None:
+    """Which readings have a value far from all others, such as -9.99; None where there are none, or most have it.
+
+    Args:
+        reading: shape (n,).
+    """
+    for value in (float(reading.min()), float(reading.max())):
+        standing = np.asarray(reading == value)
+        rest = reading[~standing]
+        if 2 * rest.size < reading.size or rest.size < _JOINED:
+            continue
+        nearest = min(abs(value - float(rest.min())), abs(value - float(rest.max())))
+        if nearest > _BEYOND * float(np.ptp(rest)) > 0.0:
+            return standing
+    return None
 
 
 def _check(said: str, value: float, allowed: Range, where: str) -> None:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
+from identification.examination.labels import (
+    exchanged_labels,
+    inertia_off_the_springs,
+    springs_off_the_line,
+    springs_renumbered,
+)
 from identification.examination.self_excited import growing_runs
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.status import Remark
+from tunnel_sim.files.rig_file import load_rig
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,17 @@ class LabelsExchanged(StatementSlip):
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """As `exchanged_labels`."""
         return exchanged_labels(seen.swings)
+
+
+@dataclass(frozen=True)
+class SpringsRenumbered(StatementSlip):
+    """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """As `springs_renumbered`; not where the campaign states that its values are right."""
+        if seen.campaign.sensor.plausible is False:
+            return ()
+        return springs_renumbered(seen.swings, lambda: list(load_rig().springs.values()))
 
 
 @dataclass(frozen=True)

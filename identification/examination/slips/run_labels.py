@@ -215,9 +215,10 @@ class WrongLabel(StatementSlip):
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Try every label of every run."""
-        return _found(seen, self._trials)
+        return _found(seen, self.trials)
 
-    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+    def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+        """Every label of every suspect."""
         for label in self.labels:
             for place in suspects:
                 yield from _relabelled(statements, label, (place,))
@@ -231,9 +232,10 @@ class WrongLabels(StatementSlip):
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Try all exchanges, and every label of every setting and of every pair."""
-        return _found(seen, self._trials)
+        return _found(seen, self.trials)
 
-    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+    def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+        """All exchanges, and every label of every setting and of every pair of suspects."""
         count = len(statements.runs)
         for keys in (("spring",), ("speed",), ("spring", "speed")):
             for i, j in itertools.combinations(range(count) if count <= _MOST_PAIRED else suspects, 2):
@@ -262,11 +264,17 @@ def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(values == value).tolist()) for value in np.unique(values)]
 
 
-def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
-    """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
+def mending_statements(seen: Seen) -> list[Statements]:
+    """Statements with other labels that the frequencies agree with, of the runs that state a spring."""
+    slips = (WrongLabel(), WrongLabels())
+    return [trial.labels for slip in slips for trial, _ in _mended(seen, slip.trials)[1]]
+
+
+def _mended(seen: Seen, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:
+    """The stated labels, and the trials that agree, each with its sum of squares."""
     swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
     if len(swings) < _FEWEST:
-        return ()
+        return None, []
     statements = Statements.of(swings)
     stated = agreement(statements)
     suspects = np.argsort(-stated.away)[:_MOST_SUSPECTS]
@@ -281,7 +289,13 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
         found = agreement(trial.labels)
         if found.good and (stated.gross or stated.squares - found.squares > gain):
             mended.append((trial, found.squares))
-    if not mended:
+    return statements, mended
+
+
+def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
+    """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
+    statements, mended = _mended(seen, trials)
+    if statements is None or not mended:
         return ()
     limit = min(squares for _, squares in mended) + _TIE
     mended = [(trial, squares) for trial, squares in mended if squares <= limit]

@@ -11,13 +11,17 @@ from identification.examination.slips.between_runs import (
     LabelsExchanged,
     MotionGrows,
     SpringOffTheLine,
+    SpringsRenumbered,
 )
 from identification.examination.slips.clock import DriftingClock
 from identification.examination.slips.coupling import CoupledSensor
 from identification.examination.slips.equal_statements import EqualStatementsDiffer
+from identification.examination.slips.factors import WrongFactor
 from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
+from identification.examination.slips.odd_noise import OddNoise
 from identification.examination.slips.resolution import ResolutionTooCoarse
 from identification.examination.slips.run_labels import WrongLabel, WrongLabels
+from identification.examination.slips.spoilt import ClockJumps, StandingForMissing
 from identification.examination.slips.still_air import WindExchanged, WindNotSeen
 from identification.examination.slips.tails import ConstantTail, StuckReading
 from identification.examination.slips.twins import RepeatedRecord
@@ -28,6 +32,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 #: Sought in the records as given.
 RECORD_SLIPS: tuple[RecordSlip, ...] = (
+    StandingForMissing(),
+    ClockJumps(),
     RepeatedRecord(),
     WrappedAngle(),
     ResolutionTooCoarse(),
@@ -38,12 +44,15 @@ RECORD_SLIPS: tuple[RecordSlip, ...] = (
 #: Sought in the measured oscillations; the search ends at the first refusal.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
     MotionGrows(),
+    AngleInDegrees(),
+    OddNoise(),
+    SpringsRenumbered(),
+    WrongFactor(),
     WrongLabel(),
     WrongLabels(),
     LabelsExchanged(),
     EqualStatementsDiffer(),
     WindExchanged(),
-    AngleInDegrees(),
     CoupledSensor(),
     DriftingClock(),
     MirroredRun(),

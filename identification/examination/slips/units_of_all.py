@@ -9,7 +9,7 @@ import numpy as np
 from identification import policy
 from identification.examination.slips.base import Seen, StatementSlip
 from identification.examination.slips.fits import Statements, agreement
-from identification.status import Outcome, Remark
+from identification.status import WITHHOLDS, Outcome, Remark
 
 _KEEP = "or state plausible = false under [sensor]"
 _SLENDER = 12.0  # Izz of a uniform rod of mass m and length l is m l²/12
@@ -53,7 +53,8 @@ class YawMomentTooLarge(StatementSlip):
             f"{policy.GREATEST_YAW_MOMENT:g}: a value is in a wrong unit (spring_stiffness in N mm/rad or N cm/rad"
             ", wind_speed, air_density or a size)"
         )
-        return (Remark(Outcome.NOTED, tuple(windy), what, f"give them in SI units, {_KEEP}"),)
+        remedy = f"give them in SI units, {_KEEP}"
+        return (Remark(Outcome.NOTED, tuple(windy), what, remedy, {WITHHOLDS: True}),)
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class InertiaOfNoBody(StatementSlip):
             f"reference_length has at a density of {density:.2g} kg/m3{looks}"
         )
         remedy = f"check the units of spring_stiffness, time_s, frontal_area and reference_length, {_KEEP}"
-        return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy),)
+        return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, {WITHHOLDS: True}),)
 
 
 def _judged(seen: Seen) -> bool:

@@ -1,0 +1,251 @@
+"""One factor on the statements of a run, or of a group of runs, with which frequency and damping of all runs agree.
+
+The air's part of k grows as ρV² and of a as ρV, and a wrong clock changes both of them wholly, so that the kinds of
+factors are told apart. What an effect does to all runs of one wind speed alike is not a slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri, fdtri
+
+from identification import policy
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.motions import Conditions, Fitted, Motions, Trial, fitted
+from identification.examination.slips.run_labels import mending_statements
+from identification.status import SYSTEMATIC, Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
+
+Places = tuple[int, ...]
+Changed = Callable[[Conditions, float], Conditions]
+_FEWEST = 4  # runs
+_MOST_RUNS = 40  # that are tried one by one, and from which on groups begin
+_MOST_SAID = 3
+_LARGEST = 0.7  # of a decrease: greater slips are units and labels
+_IDLE = 0.25  # of the least stated wind: a first guess
+_LAGS = (0.1, -0.1)  # radians of phase: first guesses
+_CERTAIN = 1e6  # degrees of freedom of a bound
+_UNITS = {"wind_speed": "m/s", "air_density": "kg/m3", "spring_stiffness": "N m/rad"}
+_ALONG = " along"
+_KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "spring": "spring_stiffness"}
+
+
+@dataclass(frozen=True)
+class WrongFactor(StatementSlip):
+    """One factor on a speed, a density, a spring or a clock makes all runs agree, and no effect does.
+
+    Refused; asked about where the evidence is weaker.
+    """
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Try factors on every run, on groups and along the campaign; labels that agree as well go first."""
+        swings = [s for s in seen.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
+        if len(swings) < _FEWEST:
+            return ()
+        motions = Motions.of(swings)
+        found = _agreeing(motions)
+        if not found or _labels_agree(seen, motions, found[0]):
+            return ()
+        return _said(motions, found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A slip that all runs agree with, and that the stated conditions and every single effect do not.
+
+    Args:
+        level: of the scatter between runs, over the usual one.
+        refused: whether chance explains it less than once in a lifetime.
+    """
+
+    trial: Trial
+    fit: Fitted
+    level: float
+    refused: bool
+
+
+def _agreeing(m: Motions) -> list[_Found]:
+    """The slips that the runs agree with about equally well, the best first; none where they may agree without.
+
+    Springs as stated come first; then springs that may be off.
+    """
+    stated = fitted(m, wide=True)
+    if stated.freedom < 2 or stated.squares(policy.LEVELS_OF_SCATTER[0]) <= stated.freedom:
+        return []
+    effects = [stated, *(fitted(m, one, wide=True) for one in _effects(m))]
+    trials = list(_slips(m))
+    for wide in (False, True):
+        fits = [(trial, fitted(m, trial, wide=wide)) for trial in trials]
+        judged = [_judged(trial, fit, effects) for trial, fit in fits]
+        found = [one for one in judged if one is not None]
+        if found:
+            level = min(one.level for one in found)
+            limit = min(one.fit.squares(level) for one in found) + float(chdtri(1, policy.DIFFERENCE_RATE))
+            ties = [one for one in found if one.fit.squares(level) <= limit]
+            return sorted(ties, key=lambda one: one.fit.squares(level))
+    return []
+
+
+def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted]) -> _Found | None:
+    """A trial that makes the runs agree; None where its number may be an effect's, chance, or none.
+
+    The gain of one more number is tested by F with the scatter that remains, with this and the usual scatter of
+    rigs, and with the greatest scatter that chance is believed to cause.
+    """
+    size = abs(fit.number) if trial.kind == "idle" else fit.number
+    if fit.freedom < 1 or abs(size) < trial.least or not -_LARGEST < size < 1.0 / (1.0 - _LARGEST):
+        return None
+    if fit.squares(policy.AGREEING_SCATTER) > float(chdtri(fit.freedom, policy.SLIP_AGREES)):
+        return None
+    own, known = fit.level(), policy.SCATTER_FREEDOM
+    usual = float(np.sqrt((known + fit.freedom * own**2) / (known + fit.freedom)))
+    tests = ((own, fit.freedom), (usual, known + fit.freedom), (policy.LEVELS_OF_SCATTER[1], _CERTAIN))
+    for rate in (policy.REFUSAL_RATE, policy.QUESTION_RATE):
+        for level, freedom in tests:
+            gain = min(one.squares(level) for one in effects) - fit.squares(level)
+            if gain > float(fdtri(1, freedom, 1.0 - rate)):
+                return _Found(trial, fit, usual, refused=rate == policy.REFUSAL_RATE)
+    return None
+
+
+def _labels_agree(seen: Seen, m: Motions, best: _Found) -> bool:
+    """Whether another label of a run, or an exchange, agrees as well as the best factor."""
+    limit = best.fit.squares(best.level) + float(chdtri(1, policy.DIFFERENCE_RATE))
+    for labels in mending_statements(seen):
+        if labels.speed.size != m.stated.size:
+            continue
+        conditions = replace(m.conditions, speed=labels.speed, density=labels.density, clock=labels.clock)
+        values, place = np.unique(labels.spring, return_inverse=True)
+        other = replace(
+            m, stated=labels.spring, place=np.asarray(place), springs=values.size, conditions=conditions
+        )
+        if fitted(other).squares(best.level) <= limit:
+            return True
+    return False
+
+
+def _scaled(key: str, places: Places) -> Changed:
+    """A factor 1 + e on a condition of some runs."""
+
+    def change(c: Conditions, number: float) -> Conditions:
+        values = getattr(c, key).copy()
+        values[list(places)] *= 1.0 + number
+        return replace(c, **{key: values})
+
+    return change
+
+
+def _along(key: str, order: Array) -> Changed:
+    """A condition that changes in proportion to the place of the run in the campaign."""
+    return lambda c, number: replace(c, **{key: getattr(c, key) * (1.0 + number * order)})
+
+
+def _blowing(places: Places, unit: float) -> Changed:
+    """A wind in runs that state none, in units of the least stated wind."""
+
+    def change(c: Conditions, number: float) -> Conditions:
+        speed = c.speed.copy()
+        speed[list(places)] = abs(number) * unit
+        return replace(c, speed=speed)
+
+    return change
+
+
+def _slips(m: Motions) -> Iterator[Trial]:
+    """All tried slips: of single runs, of groups, a wind in runs that state none, and along the campaign."""
+    count, windy = m.stiffness.size, m.conditions.speed > 0.0
+    on, off = (tuple(np.flatnonzero(some).tolist()) for some in (windy, ~windy))
+    least = policy.LEAST_FACTOR
+    for place in range(count) if count <= _MOST_RUNS else ():
+        for key in ("speed", "density", "clock", "spring") if windy[place] else ("clock", "spring"):
+            yield Trial(_scaled(key, (place,)), (place,), _KINDS[key], least[_KINDS[key]])
+    groups = list(dict.fromkeys(_groups(m)))
+    for group in groups:
+        blown = tuple(place for place in group if windy[place])
+        if 1 < len(blown) < len(on) - 1:
+            yield Trial(_scaled("density", blown), blown, "air_density", least["air_density of a group"])
+            yield Trial(_scaled("speed", blown), blown, "wind_speed", least["wind_speed"])
+        if 1 < len(group) < count - 1:
+            yield Trial(_scaled("clock", group), group, "time_s", least["time_s"])
+    if on and off:
+        unit = float(m.conditions.speed[list(on)].min())
+        for group in dict.fromkeys([off, *(tuple(p for p in group if not windy[p]) for group in groups)]):
+            if group:
+                yield Trial(_blowing(group, unit), group, "idle", least["idle"], _IDLE)
+    if len(on) > 2:
+        order = np.arange(count) / max(count - 1, 1) - 0.5
+        for key in ("density", "speed"):
+            yield Trial(_along(key, order), on, _KINDS[key] + _ALONG, least["along"])
+
+
+def _groups(m: Motions) -> Iterator[Places]:
+    """The runs of each spring, of each stated density, and all runs up to one and from one on."""
+    for values in (m.stated, m.conditions.density):
+        for value in np.unique(values):
+            yield tuple(np.flatnonzero(values == value).tolist())
+    count = m.stiffness.size
+    for first in range(2, count - 1) if count <= _MOST_RUNS else ():
+        yield tuple(range(first, count))
+        yield tuple(range(first))
+
+
+def _effects(m: Motions) -> Iterator[Trial]:
+    """Effects that change the runs of each wind speed alike: an offset, a dependence on the speed, and a lag."""
+    on = m.conditions.speed > 0.0
+    if not on.any():
+        return
+    speeds = np.where(on, m.conditions.speed, 1.0)
+    usual, omega = float(np.median(speeds[on])), float(np.sqrt(np.median(m.stiffness)))
+    places = tuple(np.flatnonzero(on).tolist())
+    logs = np.where(on, np.log(speeds / usual), 0.0)
+    phase = np.where(on, usual / (omega * speeds), 0.0)
+    yield Trial(lambda c, e: replace(c, speed=c.speed + e * usual * on), places)
+    yield Trial(lambda c, e: replace(c, moment=c.moment + e * logs), places)
+    for start in _LAGS:
+        yield Trial(lambda c, e: replace(c, lag=e * phase), places, start=start)
+
+
+def _said(m: Motions, found: Sequence[_Found]) -> tuple[Remark, ...]:
+    """The remark on the best slips."""
+    best: dict[tuple[Places, str], _Found] = {}
+    for one in found:
+        best.setdefault((one.trial.places, one.trial.kind), one)
+    shown = list(best.values())[:_MOST_SAID]
+    ids = tuple(dict.fromkeys(m.swings[place].run.id for one in shown for place in one.trial.places))
+    said = ", or with ".join(_words(m, one.trial, one.fit.number) for one in shown)
+    what = f"the stated values contradict frequency and damping of the runs, which agree with {said}"
+    keys = dict.fromkeys(
+        "wind_speed" if one.trial.kind == "idle" else one.trial.kind.removesuffix(_ALONG) for one in shown
+    )
+    remedy = f"correct {' or '.join(keys)}, or leave {'the run' if len(ids) == 1 else 'these runs'} out"
+    outcome = Outcome.REFUSED if found[0].refused else Outcome.NOTED
+    figures: dict[str, Any] = {SYSTEMATIC: said}
+    return (Remark(outcome, ids, what, remedy, figures),)
+
+
+def _words(m: Motions, trial: Trial, number: float) -> str:
+    """The slip with its size."""
+    ids = ", ".join(m.swings[place].run.id for place in trial.places)
+    percent = f"{100.0 * abs(number):.2g} %"
+    if trial.kind == "time_s":
+        return f"time_s of {ids} {percent} {'fast' if number > 0.0 else 'slow'}"
+    if trial.kind == "idle":
+        unit = float(m.conditions.speed[m.conditions.speed > 0.0].min())
+        return f"a wind of {abs(number) * unit:.2g} m/s in {ids}, which state none"
+    if trial.kind.endswith(_ALONG):
+        goes = "rising" if number > 0.0 else "falling"
+        return f"{trial.kind.removesuffix(_ALONG)} {goes} by {percent} from the first run to the last"
+    stated = {
+        "wind_speed": m.conditions.speed,
+        "air_density": m.conditions.density,
+        "spring_stiffness": m.stated,
+    }[trial.kind][list(trial.places)]
+    given = list(dict.fromkeys(stated.tolist()))
+    if len(given) > 1:
+        return f"{trial.kind} of {ids} {percent} {'higher' if number > 0.0 else 'lower'}"
+    meant = given[0] * (1.0 + number)
+    return f"{trial.kind} = {given[0]:.4g} of {ids} as {meant:.3g} {_UNITS[trial.kind]}"

@@ -1,0 +1,85 @@
+"""A single run whose noise or bandwidth differs from all other runs: another range, sensor, cable or filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from identification import policy
+from identification.examination.self_excited import Swing
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array, evenly_spaced
+
+_FEWEST = 4  # runs
+_ABOVE = 8.0  # times the frequency of the motion: its harmonics have ended
+_BELOW = 0.45  # of the lowest sample rate
+_LEAST_BINS = 16  # of a record in a band: their median scatters by a quarter
+_SPREAD = 3.0  # greatest ratio of the powers of the other runs: they have one noise
+
+
+@dataclass(frozen=True)
+class OddNoise(StatementSlip):
+    """One run has far less or far more noise than all others, in some band of frequencies. Named.
+
+    A run with less noise is refused: a filter smooths its start, which looks like other oscillations and moments.
+    A run with more noise is noted, unless the wind may cause it.
+    """
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Compare the median power of all runs in octaves above the motion; a line of hum does not change it."""
+        if len(seen.swings) < _FEWEST:
+            return ()
+        bands, power = _powers(seen.swings)
+        if not bands.size:
+            return ()
+        windy = np.array([0.5 * (s.run.air_density or 0.0) * s.run.wind_speed**2 for s in seen.swings])
+        for place, swing in enumerate(seen.swings):
+            others = np.delete(power, place, axis=0)
+            if np.any(others.max(axis=0) > _SPREAD * others.min(axis=0)):
+                continue
+            level = np.exp(np.mean(np.log(others), axis=0))
+            ratio = np.sqrt(power[place] / level)
+            calmer = int(np.sum(np.delete(windy, place) >= windy[place]))
+            if float(ratio.min()) < 1.0 / policy.ODD_NOISE:
+                return (_less(swing, bands, ratio),)
+            if float(ratio.max()) > policy.ODD_NOISE and calmer >= 1:
+                what = f"the noise is {float(ratio.max()):.2g} times as large as that of every other run"
+                remedy = "check the sensor's range, its cable and the unit, or leave the run out"
+                return (Remark(Outcome.NOTED, (swing.run.id,), what, remedy),)
+        return ()
+
+
+def _less(swing: Swing, bands: Array, ratio: Array) -> Remark:
+    """The refusal of a run with less noise, from the lowest such band on."""
+    first = float(bands[int(np.flatnonzero(ratio < 1.0 / policy.ODD_NOISE)[0])])
+    what = (
+        f"above {first:.2g} Hz its noise is 1/{1.0 / float(ratio.min()):.2g} of that of every other run: the "
+        "logger filtered the run, or its file was smoothed"
+    )
+    remedy = "record or export it with the bandwidth of the others, or leave the run out"
+    return Remark(Outcome.REFUSED, (swing.run.id,), what, remedy)
+
+
+def _powers(swings: tuple[Swing, ...]) -> tuple[Array, Array]:
+    """Lower ends of octaves above the motion, shape (bands,), Hz, and their powers, shape (runs, bands)."""
+    highest = max(float(np.sqrt(max(s.stiffness, 0.0))) for s in swings) / (2.0 * np.pi)
+    records = [evenly_spaced(swing.run.record) for swing in swings]
+    top = _BELOW * min(record.sample_rate for record in records)
+    count = int(np.log2(top / (_ABOVE * highest))) if highest > 0.0 else 0
+    if count < 1:
+        return np.zeros(0), np.zeros((len(swings), 0))
+    edges = top * 2.0 ** np.arange(-count, 1)
+    rows = []
+    for record in records:
+        window = np.hanning(record.yaw_rad.size)
+        spectrum = np.abs(np.fft.rfft(window * (record.yaw_rad - record.yaw_rad.mean()))) ** 2
+        spectrum /= float(np.sum(window**2)) * record.sample_rate
+        frequency = np.fft.rfftfreq(record.yaw_rad.size, 1.0 / record.sample_rate)
+        inside = [spectrum[(frequency >= low) & (frequency < high)] for low, high in pairwise(edges.tolist())]
+        if any(one.size < _LEAST_BINS for one in inside):
+            return np.zeros(0), np.zeros((len(swings), 0))
+        rows.append([float(np.median(one)) for one in inside])
+    return edges[:-1], np.maximum(np.array(rows), 1e-300)
