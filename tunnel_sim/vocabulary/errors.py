@@ -82,6 +82,10 @@ EXTRAS = {
 """The modules of each extra of ``pyproject.toml`` that a command needs."""
 
 
+REINSTALLING = ".venv/bin/pip install . in the clone of the project"
+"""The command that builds and installs the project again, with the versions that it requires."""
+
+
 def installing(extra: str) -> str:
     """The command that installs an extra of `EXTRAS` in a clone of the project, which no package index has."""
     return f".venv/bin/pip install '.[{extra}]' in the clone of the project"
