@@ -10,7 +10,13 @@ from importlib.metadata import version
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
-from diagnosis.answer.coefficients import Answers, before_the_causes, coefficients, possible_answers
+from diagnosis.answer.coefficients import (
+    Answers,
+    before_the_causes,
+    coefficients,
+    correlation,
+    possible_answers,
+)
 from diagnosis.answer.friction_curve import friction_curve
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
@@ -91,7 +97,8 @@ def assemble(
     answers = possible_answers(study, kinds)
     after = coefficients(answers, study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
-    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
+    shared = correlation(answers, after)
+    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), correlation=shared)
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
     rivals = _rivals(study)
     fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]

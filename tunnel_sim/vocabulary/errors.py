@@ -71,8 +71,8 @@ def one_of(names: Sequence[str]) -> str:
 
 EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
-    "frames": ("pandas", "xarray"),
-    "arviz": ("arviz",),
+    "frames": ("pandas", "pyarrow", "xarray", "uncertainties"),
+    "arviz": ("arviz_base",),
     "film": ("imageio", "imageio_ffmpeg"),
     "cluster": ("dask", "distributed"),
     "bench": ("nicegui",),

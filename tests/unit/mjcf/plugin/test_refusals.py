@@ -172,7 +172,5 @@ def test_another_version_of_mujoco_is_refused(tmp_path: Path) -> None:
 
 def test_another_version_of_the_engine_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mujoco, "__version__", "4.0.1")
-    with pytest.raises(
-        TunnelError, match=r"MuJoCo 4\.0\.1 is installed.*for 4\.0\.0; reinstall: run"
-    ):
+    with pytest.raises(TunnelError, match=r"MuJoCo 4\.0\.1 is installed.*for 4\.0\.0; reinstall: run"):
         load_plugin.__wrapped__()
