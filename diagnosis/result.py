@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import polars as pl
 
 from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
@@ -22,7 +23,7 @@ from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
 from identification.blocks import as_notebook, as_text
-from identification.estimate import as_pandas, wide_frame
+from identification.estimate import AsNumber, as_pandas, correlated, wide_frame
 from identification.status import Remark
 from identification.trade_off import TradeOff
 from tunnel_sim.files.writing import as_json
@@ -32,6 +33,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
+    from uncertainties import UFloat
 
 SCHEMA_VERSION = 1
 _LAST = (
@@ -42,8 +44,8 @@ _LAST = (
 
 
 @dataclass(frozen=True)
-class ParameterEstimate:
-    """A value with its standard deviation and unit.
+class ParameterEstimate(AsNumber):
+    """A value with its standard deviation and unit; ``float`` and NumPy take it as its value.
 
     Args:
         value: estimate, in ``unit``.
@@ -232,6 +234,8 @@ class Coefficients:
         covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
             empty without a named lag.
         note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
+        correlation: of those after, in their order, by the noise of the readings, the small causes and the rivals;
+            the other parts of their variances count as independent. Shape (n, n); empty where it is not known.
     """
 
     before: Mapping[str, ParameterEstimate]
@@ -239,6 +243,7 @@ class Coefficients:
     in_phase: Mapping[str, ParameterEstimate] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
     note: str = ""
+    correlation: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -411,8 +416,23 @@ class Diagnosis:
         return pl.DataFrame(rows, schema={**kinds, "unit": pl.String}, orient="row")
 
     def to_pandas(self) -> DataFrame:
-        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        """`to_frame` for pandas; needs the extra ``frames``."""
         return as_pandas(self.to_frame())
+
+    def to_uncertainties(self) -> dict[str, UFloat]:
+        """The coefficients after the causes are added, for the package uncertainties, with their covariance.
+
+        Those at a bound, and those that the runs do not determine, are left out.
+
+        Raises:
+            TunnelError: where uncertainties, of the extra ``frames``, is not installed.
+        """
+        after = self.coefficients.after
+        kept = [i for i, one in enumerate(after.values()) if one.std is not None]
+        values = {name: one for name, one in after.items() if one.std is not None}
+        std = np.array([one.std for one in values.values()])
+        correlation = np.array(self.coefficients.correlation or np.eye(len(after)))[np.ix_(kept, kept)]
+        return correlated(values, correlation * np.outer(std, std))
 
     def candidates_frame(self) -> pl.DataFrame:
         """A row for each answer weighed: effect, probability, excess_after and closed, as in `Candidate`."""

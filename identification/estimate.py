@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import polars as pl
+from numpy.typing import DTypeLike, NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
 from identification.blocks import as_notebook, as_text
@@ -23,12 +24,13 @@ from identification.status import by_severity as by_severity
 from identification.trade_off import TradeOff
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.errors import TunnelError, installing
+from tunnel_sim.vocabulary.errors import TunnelError, installing, library
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
-    from arviz import InferenceData
     from pandas import DataFrame
+    from uncertainties import UFloat
+    from xarray import DataTree
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 UNITS: Mapping[str, str] = {
@@ -46,9 +48,24 @@ Statuses = Annotated[
 """In JSON: the names of the statuses, in lower case."""
 
 
+class AsNumber:
+    """A value that is taken as a number: by ``float`` and by NumPy."""
+
+    value: float
+
+    def __float__(self) -> float:
+        """The value, in its unit."""
+        return float(self.value)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """The value as an array without dimensions."""
+        del copy  # it is always new
+        return np.array(self.value, dtype=dtype)
+
+
 @dataclass(frozen=True)
-class Quantity:
-    """An estimated value.
+class Quantity(AsNumber):
+    """An estimated value; ``float`` and NumPy take it as its value.
 
     Args:
         value: in the unit.
@@ -312,10 +329,19 @@ class Estimate:
         return self.coefficients_frame() if known else self.runs_frame()
 
     def to_pandas(self) -> DataFrame:
-        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        """`to_frame` for pandas; needs the extra ``frames``."""
         return as_pandas(self.to_frame())
 
-    def to_arviz(self, rng: np.random.Generator, draws: int = 4000) -> InferenceData:
+    def to_uncertainties(self) -> dict[str, UFloat]:
+        """The coefficients of ``parameters`` by name for the package uncertainties, with their covariance.
+
+        Raises:
+            TunnelError: where uncertainties, of the extra ``frames``, is not installed.
+        """
+        values = {name: getattr(self, name) for name in self.parameters}
+        return correlated(values, self.covariance_matrix)
+
+    def to_arviz(self, rng: np.random.Generator, draws: int = 4000) -> DataTree:
         """Draws from the normal distribution of the values for ArviZ; needs the extra ``arviz``.
 
         Args:
@@ -327,12 +353,9 @@ class Estimate:
             ``omega_n`` (rad/s) and ``zeta`` (1) of the identified runs over the dimension ``run``, independent.
 
         Raises:
-            TunnelError: where arviz is not installed.
+            TunnelError: where arviz-base, a part of ArviZ 1, is not installed.
         """
-        try:
-            from arviz import from_dict  # only here: an extra
-        except ModuleNotFoundError as error:
-            raise TunnelError("arviz is not installed", remedy=f"run {installing('arviz')}") from error
+        from_dict = library("arviz_base", "to_arviz", "arviz").from_dict
         std = np.sqrt(np.diag(self.covariance_matrix))
         powers, axes = np.linalg.eigh(self.covariance_matrix / np.outer(std, std))
         own = rng.standard_normal((draws, std.size)) * np.sqrt(np.maximum(powers, 0.0))
@@ -343,11 +366,11 @@ class Estimate:
             found = [getattr(run, name) for run in runs]
             own = rng.standard_normal((1, draws, len(runs)))
             posterior[name] = np.array([q.value for q in found]) + own * np.array([q.std for q in found])
-        data: InferenceData = from_dict(
-            posterior=posterior,
+        data: DataTree = from_dict(
+            {"posterior": posterior},
             coords={"run": [run.id for run in runs]},
-            dims={"omega_n": ["run"], "zeta": ["run"]},
-            posterior_attrs={"campaign": self.campaign, "estimator": self.estimator},
+            dims={"omega_n": ["run"], "zeta": ["run"]} if runs else {},
+            attrs={"posterior": {"campaign": self.campaign, "estimator": self.estimator}},
         )
         return data
 
@@ -413,6 +436,19 @@ def as_pandas(frame: pl.DataFrame) -> DataFrame:
     except ModuleNotFoundError as error:
         raise TunnelError("pandas is not installed", remedy=f"run {installing('frames')}") from error
     return DataFrame(frame.to_dict(as_series=False))
+
+
+def correlated(values: Mapping[str, Any], covariance: Array) -> dict[str, UFloat]:
+    """Values for the package uncertainties, of the extra ``frames``.
+
+    Args:
+        values: by name, as `AsNumber`.
+        covariance: of the values in their order, in the products of their units, shape (n, n).
+    """
+    made = library("uncertainties", "to_uncertainties", "frames").correlated_values
+    if not values:
+        return {}
+    return dict(zip(values, made([float(one) for one in values.values()], covariance), strict=True))
 
 
 def wide_frame(

@@ -5,6 +5,7 @@ The names below load on first use: importing this package imports neither MuJoCo
 
 from typing import TYPE_CHECKING
 
+import tunnel_sim.forks  # noqa: F401  # notes what is loaded at every fork
 from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:

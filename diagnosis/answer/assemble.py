@@ -15,6 +15,7 @@ from diagnosis.answer.coefficients import (
     as_identified,
     before_the_causes,
     coefficients,
+    correlation,
     in_phase,
     possible_answers,
 )
@@ -106,7 +107,7 @@ def assemble(
     phase, covariance = in_phase(study.stated)
     before = before_the_causes(study.nominal, {**after, **phase}) if study.causes else after
     sized = (sized_coefficients(one, rig) for one in (before, after, phase))
-    found = Coefficients(*sized, covariance)
+    found = Coefficients(*sized, covariance, correlation=correlation(answers, after))
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
     rivals = _rivals(study)
     fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]

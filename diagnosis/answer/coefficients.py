@@ -16,6 +16,7 @@ from diagnosis.answer.linear_theory import (
     Beside,
     alone,
     beside,
+    coefficient_gradients,
     coefficient_move,
     coefficients_of,
     starts_beside,
@@ -214,6 +215,37 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         if estimates[name].std is not None:
             estimates[name] = replace(estimates[name], interval=centre.interval)
     return estimates
+
+
+def correlation(answers: Answers, found: Mapping[str, ParameterEstimate]) -> tuple[tuple[float, ...], ...]:
+    """The correlation of the coefficients by noise, small causes and rivals; see `Coefficients`.
+
+    Args:
+        found: the coefficients averaged over the answers.
+
+    Returns:
+        In the order of the coefficients, shape (n, n).
+    """
+    weights, means, noise = [], [], np.zeros((len(found), len(found)))
+    for one in answers.possible:
+        values, known = [_value(one.fit, name) for name in found], coefficients_of(one.fit)
+        if one.probability <= 0.0 or None in values:
+            continue
+        small, places = one.small or alone(one.fit), [known.index(name) for name in found]
+        gradients = coefficient_gradients(one.fit)[places]
+        noise += one.probability * gradients @ one.fit.stated_covariance @ gradients.T
+        weights.append(one.probability * small.weights)
+        means.append(np.array(values) + small.moves[:, places])
+    if not means:
+        return ()
+    weight, mean = np.concatenate(weights), np.concatenate(means)
+    away = mean - weight @ mean / weight.sum()
+    shared = (noise + (away.T * weight) @ away) / weight.sum()
+    whole = np.maximum([(one.std or 0.0) ** 2 for one in found.values()], np.diag(shared))
+    scale = np.sqrt(np.maximum(whole, 1e-300))
+    shared = shared / np.outer(scale, scale)
+    np.fill_diagonal(shared, 1.0)
+    return tuple(tuple(row) for row in shared.tolist())
 
 
 def as_identified(

@@ -54,6 +54,7 @@ class PatchedModel:
         differences: where the native element follows another law, and causes left out.
         zero: the reading less the joint's position, rad; the median of the runs.
         notes: the differences in sentences; empty until they are written.
+        native: the nearest model of MuJoCo's own elements; None where this one has no others.
     """
 
     model: JointModel
@@ -63,9 +64,12 @@ class PatchedModel:
     zero: float
     closure: NativeClosure
     notes: tuple[str, ...] = ()
+    native: PatchedModel | None = None
 
     def write(self, path: Path | str) -> Path:
         """Write the patched model to an MJCF file, which it replaces, completely or not at all.
+
+        MuJoCo reads a model with the plugin, which has a ``native`` one beside it, after `tunnel_sim.load_plugin`.
 
         Raises:
             TunnelError: when it cannot be written.
@@ -90,4 +94,7 @@ class PatchedModel:
             "closed": self.closure.native_closed,
             "closed_by_fit": self.closure.fit_closed,
             "closed_on": self.closure.on,
+            "native": None
+            if self.native is None
+            else {"written": as_json(self.native.written), "closed": self.native.closure.native_closed},
         }

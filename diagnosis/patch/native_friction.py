@@ -44,6 +44,24 @@ class NativeFriction:
     differences: tuple[Fact, ...] = ()
 
 
+def nearest_polynomial(powers: Array, wanted: Array, least: Array) -> Array:
+    """Coefficients of least squares with lower bounds; without them where they are met.
+
+    Args:
+        powers: shape (n, m).
+        wanted: shape (n,).
+        least: shape (m,), infinite where there is none.
+    """
+    sizes = np.max(np.abs(powers), axis=0)
+    found: Array = np.linalg.lstsq(powers / sizes, wanted, rcond=1e-12)[0] / sizes
+    if np.all(found >= least):
+        return found
+    from scipy.optimize import lsq_linear  # only here: the bounds seldom matter
+
+    bounded: Array = lsq_linear(powers / sizes, wanted, (least * sizes, np.inf)).x / sizes
+    return bounded
+
+
 def native_friction(
     parameters: Mapping[str, float], rates: Array, law: JointLaw, damping: float, may_miss: float
 ) -> NativeFriction:
@@ -58,9 +76,12 @@ def native_friction(
         rates: positive rates in the runs, rad/s, shape (n,).
         law: of the joint as the model has it.
         damping: to be written in addition to that of the joint, N m s/rad.
-        may_miss: greatest error of a polynomial, as a share of the greatest friction.
+        may_miss: greatest error of a polynomial, as a share of the greatest friction; infinite: no plugin.
     """
     friction = friction_of(parameters)
+    if friction.load and may_miss == np.inf:
+        plain = native_friction({**parameters, "friction_load": 0.0}, rates, law, damping, may_miss)
+        return replace(plain, differences=(*plain.differences, Fact("friction against load")))
     if friction.load:
         rest = {name: value for name, value in parameters.items() if name != "friction_load"}
         return _with_load(parameters, native_friction(rest, rates, law, damping, may_miss), law)
@@ -70,15 +91,21 @@ def native_friction(
     if law.slide:
         left_out = "friction against rate" if terms else "presliding"
         return NativeFriction(moment, differences=(Fact(left_out),))
+    if not terms and may_miss == np.inf:
+        return NativeFriction(moment)
     if not terms:
         contact = (("friction_moment", moment, "N m"), ("presliding", friction.presliding, "rad"))
         return NativeFriction(contact=contact, differences=(_by_plugin("friction's presliding"),))
     wanted = friction.sliding(rates)
     powers = np.vander(rates / rates[-1], 4, increasing=True)
-    found = np.linalg.lstsq(powers, wanted, rcond=1e-12)[0]
+    least = np.array([0.0, -(law.damping + damping) * rates[-1], -np.inf, -np.inf])
+    free = np.full(4, -np.inf)
+    found = nearest_polynomial(powers, wanted, least if may_miss == np.inf else free)
     missed = float(np.max(np.abs(powers @ found - wanted)) / np.max(wanted))
     found = found / rates[-1] ** np.arange(4)
-    if missed < may_miss and found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0:
+    if missed < may_miss and (
+        may_miss == np.inf or (found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0)
+    ):
         figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
         return NativeFriction(float(found[0]), found[1:], differences=(Fact("polynomial", figures),))
     values = {"F": moment, "F0": friction.at_rest} | {

@@ -23,7 +23,7 @@ from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
-from diagnosis.patch.native_friction import native_friction
+from diagnosis.patch.native_friction import native_friction, nearest_polynomial
 from diagnosis.search.study import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
@@ -31,6 +31,7 @@ from tunnel_sim.engine.joint_patch import (
     JointPatch,
     Start,
     creep_rate,
+    history_of,
     inertia_of_steps,
     patched,
     patched_xml,
@@ -69,6 +70,8 @@ def found_law(
     noise: float,
     index: int = 0,
     actuator: ActuatorPatch | None = None,
+    *,
+    native_only: bool = False,
 ) -> FoundLaw:
     """The law of a fit, in the units of the measured campaign.
 
@@ -78,6 +81,7 @@ def found_law(
         noise: of the sensor, rad; 0: not written.
         index: of that run, with the wind off.
         actuator: changes of the actuator that drives the joint; None: none.
+        native_only: whether every moment is written as the nearest native element, however far it is.
     """
     data = problem.data
     assert isinstance(data.model, Joint | LooseJoint)
@@ -91,7 +95,7 @@ def found_law(
     rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     differences: list[Fact] = []
-    may_miss = data.settings.answer.patched_misses
+    may_miss = np.inf if native_only else data.settings.answer.patched_misses
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
@@ -104,6 +108,9 @@ def found_law(
     # the part of the program that effects add to the model's own
     own_program = problem.stated(common, release, data.runs[index]).program
     program = physics.program[len(own_program) :]
+    if native_only and program:
+        program = ()
+        differences.append(Fact("own law left out"))
     if own_program and program:
         program = (_number("number"), 0.0, *program)
     known = {"Kr": physics.spring_stiffness, **physics.parameters}
@@ -121,12 +128,14 @@ def found_law(
             }
             wanted = -formula.value({**values, name: grid})
             columns, greatest = np.array(forms).T, np.max(np.abs(wanted))
-            sizes = np.max(np.abs(columns), axis=0)
-            found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-12)[0]
-            found[np.abs(found) < 1e-9 * greatest] = 0.0
-            found /= sizes
+            least = np.full(len(forms), -np.inf)
+            if native_only and name == "r":
+                least[0] = -(native[0] + law.damping)
+            found = nearest_polynomial(columns, wanted, least)
+            found[np.abs(found) * np.max(np.abs(columns), axis=0) < 1e-9 * greatest] = 0.0
             missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-            if missed < may_miss and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
+            falls = name == "r" and native[0] + law.damping + found[0] < 0.0
+            if native_only or (missed < may_miss and not falls):
                 native += found
                 if missed >= 1e-6:
                     figures = {"moment": words, "missed_percent": 100.0 * missed}
@@ -363,6 +372,22 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
         TunnelError: when the engine refuses the patched model, or its motion diverges.
     """
     chosen = study.chosen
+    nominal_out = predict_held_out(study.nominal)
+    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    found, needs_plugin = _written_model(study, model, nominal_out, chosen_out)
+    if not needs_plugin:
+        return found
+    native, _ = _written_model(study, model, nominal_out, chosen_out, native_only=True)
+    shares = {"percent": found.closure.native_closed, "native_percent": native.closure.native_closed}
+    said = Fact("by plugin", {name: 100.0 * share for name, share in shares.items()})
+    return replace(found, native=native, differences=(*found.differences, said))
+
+
+def _written_model(
+    study: Study, model: JointModel, nominal_out: HeldOut, chosen_out: HeldOut, *, native_only: bool = False
+) -> tuple[PatchedModel, bool]:
+    """The model with the answer, and whether it needs the plugin; arguments of `native_closure` and `found_law`."""
+    chosen = study.chosen
     problem, change = chosen.problem, study.similarity
     noise = (
         change.own(study.prepared.noise.std, change.reading) if not study.campaign.sensor.derivative else 0.0
@@ -381,7 +406,8 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     def law(common: Array) -> FoundLaw:
         release = chosen.point.release[still]
-        identified = found_law(problem, common, release, noise, still, actuated(common))
+        made = actuated(common)
+        identified = found_law(problem, common, release, noise, still, made, native_only=native_only)
         if given is None:
             return identified
         steps = inertia_of_steps(given, float(given.dof_damping[0]) + identified.patch.damping[0])
@@ -395,8 +421,6 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
         by = actuator.index if actuator is not None and start.run in runs else None
         return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration, by)
 
-    nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     native = frozenset[str]() if actuated(chosen.point.common) is None else runs
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     identified = law(chosen.point.common)
@@ -408,6 +432,9 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
         )
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
+    if (made := identified.patch.actuator) is not None and made.delay > 0.0:
+        samples = history_of(made.delay, model.law.step)
+        differences += (Fact("delayed control", {"index": made.index, "samples": samples}),)
     own = list(chosen.point.release)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         common = chosen.point.common
@@ -417,4 +444,5 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     spec, written = patched(model, identified.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
-    return PatchedModel(model, spec, written, differences, zero, closure)
+    found = PatchedModel(model, spec, written, differences, zero, closure)
+    return found, identified.patch.by_plugin

@@ -163,6 +163,12 @@ PATCH: Mapping[str, Sentence] = {
     "its greatest moment within the records.",
     "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it. Call "
     "tunnel_sim.load_plugin() before MuJoCo reads the file.",
+    "by plugin": "MuJoCo reads this patch only with the plugin. In native elements alone, by --native or .native, "
+    "the model explains {native_percent:.3g} % of the gap instead of {percent:.3g} %.",
+    "own law left out": "An effect of your own is left out: only the plugin has it.",
+    "delayed control": "No file holds the past of a delayed control, which MuJoCo starts as 0. Before a run is "
+    "replayed, fill it with the first control, here of the key frame: "
+    "mujoco.mj_initCtrlHistory(model, data, {index}, None, numpy.full(({samples}, 1), data.ctrl[{index}])).",
     "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it acts as a damper, "
     "and a joint at rest by friction creeps. Its time constant is set to two steps, the shortest allowed.",
     "presliding": "The presliding of the friction is left out: it has no native element, and the plugin acts on "

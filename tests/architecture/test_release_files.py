@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.architecture.test_landing import unknown
+from tunnel_sim.engine.model import BUILT_FOR
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -36,6 +37,16 @@ def test_the_recipe_has_the_dependencies_and_the_version_of_the_project():
     wanted["python"] = PROJECT["project"]["requires-python"]
     assert requirements("run") == wanted
     assert f'version = "{PROJECT["project"]["version"]}"' in (ROOT / "recipe" / "meta.yaml").read_text()
+
+
+def test_the_engine_is_the_version_that_the_plugin_is_built_against():
+    """An exact version, the same in the building and in the running environment, and in all extras."""
+    project = PROJECT["project"]
+    named = [*PROJECT["build-system"]["requires"], *project["dependencies"]]
+    named += [line for extra in project["optional-dependencies"].values() for line in extra]
+    pins = {line.partition("==")[2] for line in named if line.startswith("mujoco")}
+    assert pins == {BUILT_FOR} == {requirements("host")["mujoco-python"]}
+    assert re.fullmatch(r"\d+\.\d+\.\d+", BUILT_FOR)
 
 
 def test_the_citation_has_the_version_of_the_project():

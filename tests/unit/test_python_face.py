@@ -145,7 +145,6 @@ def test_a_run_is_a_dataset(data: Campaign) -> None:
     assert dataset.attrs["wind_speed"] == run.wind_speed
 
 
-@pytest.mark.filterwarnings("ignore::FutureWarning")  # of ArviZ 0.23, on its own future
 def test_draws_have_the_moments_of_the_estimate(estimate: Estimate) -> None:
     posterior = estimate.to_arviz(np.random.default_rng(1), draws=20_000).posterior
     assert estimate.cn_beta is not None
@@ -167,11 +166,54 @@ def test_draws_have_the_moments_of_the_estimate(estimate: Estimate) -> None:
 def test_a_missing_library_is_named(
     data: Campaign, estimate: Estimate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("pandas", "xarray", "arviz"):
+    for name in ("pandas", "xarray", "arviz_base", "uncertainties"):
         monkeypatch.setitem(__import__("sys").modules, name, None)
     with pytest.raises(TunnelError, match=r"pandas is not installed.*\[frames\]"):
         estimate.to_pandas()
     with pytest.raises(TunnelError, match=r"xarray is not installed.*\[frames\]"):
         data.runs[0].to_xarray()
-    with pytest.raises(TunnelError, match=r"arviz is not installed.*\[arviz\]"):
+    with pytest.raises(TunnelError, match=r"needs the package arviz_base.*\[arviz\]"):
         estimate.to_arviz(np.random.default_rng(0))
+    with pytest.raises(TunnelError, match=r"needs the package uncertainties.*\[frames\]"):
+        estimate.to_uncertainties()
+
+
+def test_a_quantity_is_a_number(estimate: Estimate, found: Diagnosis) -> None:
+    for one in (estimate.cn_beta, found.coefficients.after["cn_beta"]):
+        assert one is not None
+        assert float(one) == np.asarray(one) == one.value
+        np.testing.assert_array_equal(np.asarray([one, one], dtype=np.float64), [one.value] * 2)
+        assert 2.0 * np.asarray(one) == 2.0 * one.value
+
+
+def test_uncertain_values_have_the_covariance(estimate: Estimate, found: Diagnosis) -> None:
+    from uncertainties import correlation_matrix, covariance_matrix
+
+    values = estimate.to_uncertainties()
+    assert tuple(values) == estimate.parameters
+    np.testing.assert_allclose(
+        covariance_matrix(list(values.values())), estimate.covariance_matrix, rtol=1e-6
+    )
+    ratio = values["cn_beta"] / values["yaw_inertia"]
+    first, second = estimate.parameters.index("cn_beta"), estimate.parameters.index("yaw_inertia")
+    matrix = estimate.covariance_matrix
+    share = np.array([1.0 / values["cn_beta"].n, -1.0 / values["yaw_inertia"].n])
+    pair = matrix[np.ix_([first, second], [first, second])]
+    assert ratio.s / abs(ratio.n) == pytest.approx(np.sqrt(share @ pair @ share))
+    after = found.to_uncertainties()
+    for name, one in found.coefficients.after.items():
+        assert (after[name].n, after[name].s) == pytest.approx((one.value, one.std))
+    matrix = np.array(correlation_matrix(list(after.values())))
+    np.testing.assert_allclose(matrix, found.coefficients.correlation, atol=1e-9)
+    assert np.all(np.abs(matrix[~np.eye(len(after), dtype=bool)]) <= 1.0)
+    assert Estimate("c", "own", ()).to_uncertainties() == {}
+
+
+def test_parquet_is_read_by_pandas(found: Diagnosis, tmp_path: Path) -> None:
+    import pandas
+
+    found.to_frame().write_parquet(tmp_path / "answer.parquet")
+    assert (
+        pandas.read_parquet(tmp_path / "answer.parquet")["quantity"].tolist()
+        == found.to_frame()["quantity"].to_list()
+    )

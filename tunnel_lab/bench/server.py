@@ -25,7 +25,8 @@ from tunnel_lab.bench.refusals import add_refusals, refusal, say_odd_messages
 from tunnel_lab.bench.uploads import NEW, add_uploads, drop_zone, too_large
 from tunnel_lab.bench.workspace import STAGES, closed, open_session, read_diagnosis, sessions
 from tunnel_lab.terminal.outputs import say
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.files.reading import as_described
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 if TYPE_CHECKING:
@@ -162,6 +163,14 @@ async def _answer(send: Send, status: int, *headers: tuple[bytes, bytes], body: 
     await send({"type": "http.response.body", "body": body})
 
 
+def _report(page: bytes | str) -> HTMLResponse:
+    """A report, which may come from elsewhere with its campaign, and so must not act as a page of the bench."""
+    from tunnel_lab.report import security_policy
+
+    headers = {"cache-control": "no-store", "content-security-policy": security_policy()}
+    return HTMLResponse(page, headers=headers)
+
+
 def add_pages(folder: Path) -> None:
     """Add the pages of a workspace, and its other addresses."""
     add_refusals(app)
@@ -189,16 +198,19 @@ def add_pages(folder: Path) -> None:
         if not session.report.is_file():
             why = closed(session, "report") or "Open the page Report first: it writes the report."
             raise HTTPException(_CONFLICT, why)
-        return HTMLResponse(session.report.read_bytes(), headers={"cache-control": "no-store"})
+        return _report(session.report.read_bytes())
 
     @app.get("/{name}/fit.html")
     def fit(name: str) -> HTMLResponse:
         from tunnel_lab.report import render_fit
 
-        document = read_diagnosis(open_session(folder, name))
+        session = open_session(folder, name)
+        document = read_diagnosis(session)
         if document is None:
             raise HTTPException(_CONFLICT, "Diagnose the campaign first.")
-        return HTMLResponse(render_fit(document), headers={"cache-control": "no-store"})
+        with as_described("cannot be drawn", shown(session.diagnosis), "diagnose the campaign again"):
+            page = render_fit(document)
+        return _report(page)
 
     @ui.page("/{name}/{stage}")
     def stage(name: str, stage: str, request: Request) -> Response | None:

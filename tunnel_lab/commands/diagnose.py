@@ -113,6 +113,14 @@ def diagnose(
             panel="A model of your own",
         ),
     ] = None,
+    native: Annotated[
+        bool,
+        Option(
+            "--native",
+            help="Write --patch in MuJoCo's own elements alone, as near as they come.",
+            rich_help_panel="A model of your own",
+        ),
+    ] = False,
     propose: Annotated[
         Path | None,
         output_file("--propose", ".toml", help="Write the formula proposed for the residual gap."),
@@ -161,6 +169,8 @@ def diagnose(
     if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir or actuator)):
         what = "--model and --joint belong together, and --free, --actuator, --patch and --asset-dir to them"
         raise TunnelError(what, remedy="give both")
+    if native and patch is None:
+        raise TunnelError("--native says how --patch is written", remedy="give --patch too, or leave it out")
     whole, left_out = given_campaign(campaign), split_names(leave_out)
     data = whole.without(left_out)
     hashes = file_hashes(campaign)
@@ -178,7 +188,7 @@ def diagnose(
     if json is not None and not to_stdout:
         write_json(json, document)
     if patch is not None:
-        write_patch(answer, patch)
+        write_patch(answer, patch, native=native)
     if (report or summary) and answer.data is not None:
         from tunnel_lab.report import Byline, write_report, write_summary
 
@@ -224,15 +234,23 @@ def diagnose_with_progress(
         return diagnosis.diagnose(campaign, leave_out=leave_out, kinds=kinds, progress=show_step, model=model)
 
 
-def write_patch(answer: Diagnosis, path: Path) -> None:
-    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when there is none."""
+def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
+    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when there is none.
+
+    Args:
+        native: whether in MuJoCo's own elements alone.
+    """
     from diagnosis.words.cautions import UNPATCHED
 
     if answer.model is None:
         said = zip(answer.cautions, answer.found.cautions, strict=True)
         reason = next((caution.rstrip(".") for caution, fact in said if fact.kind == "unpatched"), UNPATCHED)
         raise TunnelError(reason, where="--patch", remedy="leave out --patch for the answer alone")
-    answer.model.write(path)
+    nearest = answer.model.native
+    if nearest is not None and not native:  # before it is written: plain MuJoCo refuses the file
+        notes = zip(answer.model.notes, answer.model.differences, strict=True)
+        say(next(f"Note: {note}" for note, fact in notes if fact.kind == "by plugin"), stderr=True)
+    (answer.model if nearest is None or not native else nearest).write(path)
 
 
 def compare(

@@ -13,6 +13,7 @@ from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, split_names
 from tunnel_lab.terminal.outputs import say, say_written
 from tunnel_lab.terminal.progress import bar
+from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, installing, library, shown
 
 if TYPE_CHECKING:
@@ -119,15 +120,15 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
     from tunnel_lab.report.where import fit_pages
 
     document, drawn = read_document(file), dict[str, "Figure"]()
-    if not names or "fit" in names:
-        pages = fit_pages(document, runs)
-        if not pages:
-            raise TunnelError(
-                "has no curves to draw", where=shown(file), remedy="diagnose the campaign again"
-            )
-        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
-    drawn |= {name: draw(document, name) for name in names if name != "fit"}
-    repeats = None if names else repeatability_figure(document)
+    where, again = shown(file), "diagnose the campaign again"
+    with as_described("cannot be drawn", where, again):
+        if not names or "fit" in names:
+            pages = fit_pages(document, runs)
+            if not pages:
+                raise TunnelError("has no curves to draw", where=where, remedy=again)
+            drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
+        drawn |= {name: draw(document, name) for name in names if name != "fit"}
+        repeats = None if names else repeatability_figure(document)
     return drawn if repeats is None else drawn | {"repeatability": repeats}
 
 

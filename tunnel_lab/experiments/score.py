@@ -5,6 +5,7 @@ A baseline is a table of trials. It contains its grid, to be repeatable.
 
 from __future__ import annotations
 
+import io
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from tunnel_lab.experiments.figures import trials_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_sim.files.kept_process import read_apart
 from tunnel_sim.files.reading import (
     as_described,
     check_count,
@@ -42,6 +44,7 @@ from tunnel_sim.files.reading import (
     read_regular,
 )
 from tunnel_sim.files.writing import json_line, write_whole
+from tunnel_sim.sandbox import Message
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import shown
 
@@ -212,13 +215,8 @@ def read_trials(path: Path) -> Results:
     where, remedy = shown(path), "write one with tunnel score --write-baseline"
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
     with as_described("is not a table of trials", where, remedy):
-        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
-        wrong = [name for name, kind in TRIAL_COLUMNS.items() if schema.get(name) != kind]
-        if wrong or "grid" not in schema:
-            raise ValueError(", ".join(wrong) or "grid")
-        table = read_frame(content, where, remedy, tuple(TRIAL_COLUMNS))
-        # Every row has the same grid; one is enough.
-        text = read_frame(content, where, remedy, ("grid",))["grid"][0]
+        found, (rows,) = read_apart(_trials, {"where": where, "remedy": remedy}, content, where)
+        table, text = pl.read_ipc(rows), found["grid"]
         grid = Grid.from_json_dict(parse_json(text, where, remedy))
         odd = table.filter(~_possible()).height
         if odd or table.is_empty():
@@ -230,6 +228,20 @@ def read_trials(path: Path) -> Results:
             if set(mine.iter_rows()) != wanted:
                 raise ValueError("cells outside the grid")
     return Results(grid, tuple(names), table)
+
+
+def _trials(given: dict[str, str], contents: list[bytes]) -> Message:
+    """The grid of a file of trials, and its table in Arrow's format, decoded in a process with limits."""
+    where, remedy, content = given["where"], given["remedy"], contents[0]
+    with as_described("is not a table of trials", where, remedy):
+        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+        wrong = [name for name, kind in TRIAL_COLUMNS.items() if schema.get(name) != kind]
+        if wrong or "grid" not in schema:
+            raise ValueError(", ".join(wrong) or "grid")
+        rows = io.BytesIO()
+        read_frame(content, where, remedy, tuple(TRIAL_COLUMNS)).write_ipc(rows)
+        # Every row has the same grid; one is enough.
+        return {"grid": read_frame(content, where, remedy, ("grid",))["grid"][0]}, [rows.getvalue()]
 
 
 def _possible() -> pl.Expr:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         find_browser,
         render_fit,
         render_report,
+        security_policy,
         write_report,
         write_summary,
     )
@@ -21,7 +22,7 @@ else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            ".page": "Byline draw render_fit render_report write_report find_browser write_summary",
+            ".page": "Byline draw find_browser render_fit render_report security_policy write_report write_summary",
         },
     )
 
@@ -31,6 +32,7 @@ __all__ = [
     "find_browser",
     "render_fit",
     "render_report",
+    "security_policy",
     "write_report",
     "write_summary",
 ]

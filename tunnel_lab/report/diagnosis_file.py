@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, validate
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.units import dimension
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
 Excess = Annotated[float, Field(description="a ratio to the noise variance")]
 Table = dict[str, Any]
+ReadingUnit = Literal["rad", "rad/s", "rad/s2"]
+
+
+def _known(unit: str) -> str:
+    try:
+        dimension(unit)
+    except TunnelError as error:
+        raise ValueError(error.what) from None
+    return unit
+
+
+Unit = Annotated[OneLine, AfterValidator(_known), Field(description="a unit such as 'N m/rad'")]
 Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
 
 
@@ -25,7 +39,7 @@ class Part(StrictModel):
 class _Estimate(Part):
     value: float
     std: Annotated[float, Field(ge=0.0)] | None
-    unit: OneLine
+    unit: Unit
     bound: OneLine | None = None
     determined: bool = True
     interval: list[float] | None = Field(
@@ -36,7 +50,12 @@ class _Estimate(Part):
     )
 
 
+class _Misfit(Part):
+    unit: ReadingUnit = Field(description="'rad', 'rad/s' or 'rad/s2'")
+
+
 class _Gap(Part):
+    misfit: _Misfit | None = None
     excess_before: Excess
     excess_after: Excess
     closed: Share
@@ -60,6 +79,7 @@ class _Run(Part):
 
 class _Maps(Part):
     runs: list[_Run]
+    unit: ReadingUnit = Field(default="rad", description="'rad', 'rad/s' or 'rad/s2'")
 
 
 class _Spread(Part):

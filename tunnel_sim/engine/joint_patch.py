@@ -72,6 +72,11 @@ class JointPatch:
     kp: float | None = None
     noise: float = 0.0
 
+    @property
+    def by_plugin(self) -> bool:
+        """Whether MuJoCo's own elements do not suffice."""
+        return bool(self.program or self.contact)
+
 
 @dataclass(frozen=True)
 class Start:
@@ -121,7 +126,7 @@ def patched(
         servo, share = spec.actuators[model.law.actuator.index], -patch.kp / model.law.actuator.servo[1]
         servo.gainprm[0] *= share
         servo.biasprm[1] *= share
-    if patch.program or patch.contact:
+    if patch.by_plugin:
         if model.law.slide:
             raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
         plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
@@ -147,8 +152,12 @@ def patched(
         if (known := spec.key(name)) is not None:
             spec.delete(known)
         key = spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
-        if patch.actuator is not None and patch.actuator.lag > 0.0 and start.drive is not None:
-            key.act = [start.drive.values[0]]
+        if patch.actuator is not None and start.drive is not None:
+            first = float(start.drive.values[0])
+            # no key frame holds the history of a delayed control: the note on it takes this control
+            key.ctrl = [first if i == patch.actuator.index else 0.0 for i in range(before.nu)]
+            if patch.actuator.lag > 0.0:
+                key.act = [first]
     with _refusals(model):
         after = spec.compile()
     old, new = _attributes(before), _attributes(after)
@@ -175,8 +184,17 @@ def _write_actuator(spec: mujoco.MjSpec, patch: ActuatorPatch) -> None:
         actuator.dynprm[0] = patch.lag
     if patch.delay > 0.0:
         actuator.delay = patch.delay
-        actuator.nsample = math.ceil(patch.delay / spec.option.timestep) + _SPARE
+        actuator.nsample = history_of(patch.delay, spec.option.timestep)
         actuator.interp = 1
+
+
+def history_of(delay: float, timestep: float) -> int:
+    """The samples of a delayed control that an actuator keeps.
+
+    Args:
+        delay, timestep: s.
+    """
+    return math.ceil(delay / timestep) + _SPARE
 
 
 def _refusals(model: JointModel) -> AbstractContextManager[None]:

@@ -20,14 +20,24 @@ from numpy.typing import NDArray
 from tunnel_sim.physics.moment_law import native_library, state_vector
 from tunnel_sim.physics.run_settings import RunSettings, spring_end_angle
 from tunnel_sim.physics.steps import check_stable
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import REINSTALLING, TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig, WorkingSection, davis_vertices
+
+BUILT_FOR = "4.0.0"
+"""The version of MuJoCo that the plugin is built against, as ``pyproject.toml`` requires."""
 
 
 @functools.cache
 def load_plugin() -> None:
-    """Register the plugin with MuJoCo; a second call does nothing."""
+    """Register the plugin with MuJoCo; a second call does nothing.
+
+    Raises:
+        TunnelError: where another version of MuJoCo is installed than the plugin is built against.
+    """
+    if mujoco.__version__ != BUILT_FOR:
+        what = f"MuJoCo {mujoco.__version__} is installed, and the engine plugin was built for {BUILT_FOR}"
+        raise TunnelError(what, remedy=f"reinstall: run {REINSTALLING}")
     mujoco.mj_loadPluginLibrary(str(native_library("vwt_plugin")))
 
 

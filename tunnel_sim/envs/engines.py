@@ -78,17 +78,19 @@ class OneRun:
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
         """Integrate a control period: angle (rad) and rate (rad/s) at samples and end, shape (1, samples + 1)."""
         assert self._model is not None
-        model, data, at = self._model.mj, self._data, self._model.yaw_address
-        angle, rate = np.empty((1, self._samples + 1)), np.empty((1, self._samples + 1))
-        angle[0, 0], rate[0, 0] = data.qpos[at], data.qvel[at]
+        model, data, at, steps = self._model.mj, self._data, self._model.yaw_address, self._steps
+        qpos, qvel, userdata = data.qpos, data.qvel, data.userdata
+        angle, rate = [qpos[at]], [qvel[at]]
+        departures = [None] * self._samples if operation is None else operation.wind_departure[0].tolist()
         if operation is not None:
             data.qfrc_applied[at] = operation.moment[0]
-        for j in range(self._samples):
-            if operation is not None:
-                data.userdata[0] = operation.wind_departure[0, j]
-            mujoco.mj_step(model, data, self._steps)
-            angle[0, j + 1], rate[0, j + 1] = data.qpos[at], data.qvel[at]
-        return angle, rate
+        for departure in departures:
+            if departure is not None:
+                userdata[0] = departure
+            mujoco.mj_step(model, data, steps)
+            angle.append(qpos[at])
+            rate.append(qvel[at])
+        return np.array([angle]), np.array([rate])
 
     def get_state(self, row: int) -> Array:
         """MuJoCo's state of a run, as from ``mj_getState`` for `STATE`, shape (n,)."""

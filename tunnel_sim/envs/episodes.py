@@ -125,7 +125,7 @@ class Episodes:
             self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
             operation = Operation(speeds - self._stated_speed[:, None], moment)
         angle, rate = self._engine.advance(operation)
-        wild = ~(np.max(np.abs(angle), axis=1) <= self._limit)
+        wild = ~(np.abs(angle).max(axis=1) <= self._limit)
         if wild.any():
             angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
         readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)

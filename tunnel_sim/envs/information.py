@@ -8,10 +8,12 @@ cubic through both ends. Source: S. M. Kay, Fundamentals of Statistical Signal P
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.arguments import EnvError, Number, checked_names
@@ -92,6 +94,85 @@ class Prior:
         return np.array([getattr(self, name) * own.get(name, 1.0) for name in UNKNOWNS])
 
 
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """The linear maps of one step at one wind speed of each run.
+
+    In each sample interval a sensitivity gets a kick to its value and one to its rate.
+
+    Args:
+        sums: to the kicks per unit by the angle and by its rate, from angles and rates at both ends of an interval,
+            shape (runs, 4, 4).
+        push: kicks by a unit moment, shape (runs, 2 samples).
+        shares: of the sensitivities in the three kinds of kicks, shape (runs, 3, DYNAMIC).
+        response: to the sensitivities at the samples and the end, and their rate at the end, from those at the
+            start, their rates, and the kicks, shape (runs, samples + 2, 2 samples + 2).
+    """
+
+    sums: Array
+    push: Array
+    shares: Array
+    response: Array
+
+    @classmethod
+    def of(cls, runs: Array, wind_speed: Array, samples: int, interval: float) -> _Step:
+        """The maps; ``runs`` as in `Information.start`, ``wind_speed`` in m/s, shape (runs,)."""
+        stiffness, damping, by_angle, by_rate, air_stiffness, air_damping, inverse = runs
+        a = 0.5 * (damping - air_damping * wind_speed)
+        k = stiffness - air_stiffness * wind_speed**2
+        count = len(wind_speed)
+        at = np.concatenate(([0.5 * interval], interval * np.arange(samples + 1)))
+        # The last entry of every run is the zero of responses to later kicks.
+        solution = np.zeros((count, 4 * len(at) + 1))
+        parts = solution[:, :-1].reshape(count, 4, len(at))
+        parts[:, 0], parts[:, 1], parts[:, 2], parts[:, 3] = propagator(a[:, None], k[:, None], at)
+        kicks = np.ones((count, 1, 5))
+        kicks[:, 0, :4] = solution[:, [2 + len(at), len(at), 2 + 3 * len(at), 3 * len(at)]]
+        made = np.matmul(kicks, _weights(interval))[:, 0]
+        push = np.repeat(made[:, 16:], samples, axis=1)
+        shares = np.zeros((count, 3, DYNAMIC))
+        shares[:, 0, 0], shares[:, 1, 0], shares[:, 2, 0] = (
+            inverse * k,
+            2.0 * inverse * a,
+            -(inverse**2),
+        )  # −β̈/Izz
+        shares[:, 1, 1] = -inverse
+        shares[:, 0, 4], shares[:, 1, 5] = by_angle * wind_speed**2, by_rate * wind_speed
+        return cls(made[:, :16].reshape(count, 4, 4), push, shares, solution[:, _places(samples)])
+
+
+@functools.cache
+def _weights(interval: float) -> Array:
+    """`_Step.sums`, row by row, and `_Step.push` of value and rate, by the sine and its rate in an interval.
+
+    Rows: the sine after a whole and a half interval, its rate after them, and 1. Columns of ``sums``: the angle at
+    both ends, and its rate. Shape (5, 18).
+    """
+    h, found = interval, np.zeros((5, 18))
+    w = h / 6.0
+    for row, (first, middle) in enumerate(((0, 1), (2, 3))):
+        by_angle, by_rate = found[:, 4 * row : 4 * row + 4], found[:, 8 + 4 * row : 12 + 4 * row]
+        by_angle[first, 0] = by_rate[first, 2] = found[first, 16 + row] = w
+        by_angle[middle] = 4.0 * w * np.array([0.5, 0.5, 0.125 * h, -0.125 * h])
+        by_rate[middle] = 4.0 * w * np.array([-1.5 / h, 1.5 / h, -0.25, -0.25])
+        found[middle, 16 + row] = 4.0 * w
+        if row:
+            by_angle[4, 1] = by_rate[4, 3] = found[4, 17] = w
+    return found
+
+
+@functools.cache
+def _places(samples: int) -> NDArray[np.intp]:
+    """Places of the entries of `_Step.response` among the solutions of `_Step.of`."""
+    width = samples + 2
+    row = np.append(np.arange(samples + 1), samples)[:, None]  # intervals from the start
+    of_rate = np.append(np.zeros(samples + 1, dtype=np.intp), 1)[:, None]
+    lag = row - 1 - np.arange(samples)  # intervals from the kick
+    places = [(2 * of_rate + part) * width + 1 + row for part in (0, 1)]
+    places += [np.where(lag >= 0, (2 * of_rate + part) * width + 1 + lag, 4 * width) for part in (0, 1)]
+    return np.concatenate(places, axis=1)
+
+
 class Information:
     """The Fisher information of many runs in progress, and the sensitivities behind it; ``row`` is a run's index.
 
@@ -105,9 +186,8 @@ class Information:
         self._samples, self._interval, self._variance, self._prior = samples, interval, variance, prior
         self._runs = np.ones((7, count))
         self._x = np.zeros((2, count, DYNAMIC))  # sensitivity of the angle, and its rate
-        self._speed = np.full(count, np.nan)  # for which the propagators are valid
-        self._propagator = np.zeros((6, count))
-        self._decay = np.zeros((2, count))
+        self._speed = np.full(count, np.nan)  # for which the matrices of `_Step` are valid
+        self._step = _Step.of(np.zeros((7, count)), np.zeros(count), samples, interval)
         size = len(UNKNOWNS)
         self._scale = np.ones((count, size))  # the prior standard deviations are the units of the matrices
         self.scaled = np.tile(np.eye(size), (count, 1, 1))
@@ -144,48 +224,31 @@ class Information:
             moment: applied by the operator, shape (runs,), N m.
         """
         if not np.array_equal(wind_speed, self._speed):
-            stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
-            a = 0.5 * (damping - air_damping * wind_speed)
-            k = stiffness - air_stiffness * wind_speed**2
-            self._speed, self._decay = wind_speed.copy(), np.stack((a, k))
-            whole = propagator(a, k, self._interval)
-            half = propagator(a, k, 0.5 * self._interval)
-            self._propagator = np.stack((*whole, half[1], half[3]))
-        # Contribution of u to value and rate in each interval: kicks, shape (2, samples, runs, DYNAMIC).
-        h = self._interval
-        a, k = self._decay
-        _, f01, _, f11, m01, m11 = self._propagator
-        _, _, stiffness, damping, _, _, inverse = self._runs
-        begin, end = angle[:, :-1], angle[:, 1:]
-        rate0, rate1 = rate[:, :-1], rate[:, 1:]
-        sums = np.empty(
-            (2, 2, self._samples, len(wind_speed))
-        )  # of value, rate; driven by the angle, its rate
-        for drive, (u0, middle, u1) in enumerate(
-            (
-                (begin.T, (0.5 * (begin + end) + 0.125 * h * (rate0 - rate1)).T, end.T),
-                (rate0.T, (1.5 * (end - begin) / h - 0.25 * (rate0 + rate1)).T, rate1.T),
-            )
-        ):
-            sums[0, drive] = (h / 6.0) * (f01 * u0 + 4.0 * m01 * middle)
-            sums[1, drive] = (h / 6.0) * (f11 * u0 + 4.0 * m11 * middle + u1)
-        push = (h / 6.0) * np.stack((f01 + 4.0 * m01, f11 + 4.0 * m11 + 1.0)) * (moment * inverse)
-        kicks = np.zeros((2, self._samples, len(wind_speed), DYNAMIC))
-        by_angle, by_rate = sums[:, 0], sums[:, 1]
-        kicks[..., 0] = inverse * (k * by_angle + 2.0 * a * by_rate - push[:, None])  # −β̈/Izz
-        kicks[..., 1] = -inverse * by_rate
-        kicks[..., 4] = stiffness * wind_speed**2 * by_angle
-        kicks[..., 5] = damping * wind_speed * by_rate
-        f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
-        x, v = self._x
-        out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the sensitivity to the zero remains 1
-        for j in range(self._samples):
-            out[j, :, :4], out[j, :, 5:] = x[:, :4], x[:, 4:]
-            x, v = f00 * x + f01 * v + kicks[0, j], f10 * x + f11 * v + kicks[1, j]
-        self._x = np.stack((x, v))
-        of_reading = out.transpose(1, 2, 0)  # (runs, 7, samples)
-        of_reading *= self._scale[:, :, None]
-        self.scaled += np.matmul(of_reading, of_reading.transpose(0, 2, 1)) / self._variance
+            self._speed = wind_speed.copy()
+            self._step = _Step.of(self._runs, wind_speed, self._samples, self._interval)
+        step, count, samples = self._step, len(wind_speed), self._samples
+        drive = np.empty((count, 4, samples))
+        drive[:, 0], drive[:, 1], drive[:, 2], drive[:, 3] = (
+            angle[:, :-1],
+            angle[:, 1:],
+            rate[:, :-1],
+            rate[:, 1:],
+        )
+        sums = np.matmul(
+            step.sums, drive
+        )  # of value and rate by the angle, then of value and rate by its rate
+        kicks = np.empty((count, 2 * samples, 3))
+        kicks[:, :, :2] = sums.reshape(count, 2, 2 * samples).transpose(0, 2, 1)
+        kicks[:, :, 2] = step.push * moment[:, None]
+        given = np.zeros((count, 2 * samples + 2, DYNAMIC))
+        given[:, 0], given[:, 1] = self._x
+        given[:, 2:] = np.matmul(kicks, step.shares)
+        found = np.matmul(step.response, given)
+        self._x = np.stack((found[:, samples], found[:, samples + 1]))
+        of_reading = np.ones((count, samples, DYNAMIC + 1))  # the sensitivity to the zero remains 1
+        of_reading[:, :, :4], of_reading[:, :, 5:] = found[:, :samples, :4], found[:, :samples, 4:]
+        of_reading *= self._scale[:, None]
+        self.scaled += np.matmul(of_reading.transpose(0, 2, 1), of_reading) / self._variance
         before, self.known = self.known, half_log_det(self.scaled)
         return np.maximum(self.known - before, 0.0)
 
@@ -209,10 +272,11 @@ class Information:
 
 
 def half_log_det(information: Array) -> Array:
-    """½ log det of information, shape (n, m, m), about the last two unknowns: shape (n,), nats."""
-    rest = information
-    for _ in range(information.shape[-1] - 2):
-        column = rest[:, 1:, 0]
-        rest = rest[:, 1:, 1:] - column[:, :, None] * (column / rest[:, 0, 0, None])[:, None, :]
-    determinant = rest[:, 0, 0] * rest[:, 1, 1] - rest[:, 0, 1] * rest[:, 1, 0]
-    return np.asarray(0.5 * np.log(determinant))
+    """½ log det of information, shape (n, m, m), about the last two unknowns: shape (n,), nats; else NaN."""
+    try:
+        root = np.linalg.cholesky(information)
+    except np.linalg.LinAlgError:
+        if len(information) == 1:
+            return np.full(1, np.nan)
+        return np.concatenate([half_log_det(one[None]) for one in information])
+    return np.asarray(np.log(root[:, -2, -2] * root[:, -1, -1]))

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY, RIG_KEYS, RUN_KEYS
+from tunnel_sim.files.kept_process import check_polars
 from tunnel_sim.files.run_files import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
@@ -47,6 +48,7 @@ def _of_campaign(campaign: Campaign) -> dict[str, float]:
 
 def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     """One row for each sample, with the run's id and conditions and the rig's sizes."""
+    check_polars()
     frames = [
         pl.DataFrame(_record(campaign, run)).select(
             pl.lit(as_text_cell(run.id)).alias("run"),

@@ -44,6 +44,8 @@ class Reader:
             number of samples; None where such files are not run files.
         read_tables: the tables of an instrument's file, from its content and its name for messages; it runs in a
             process with limits. None where such files are imported as text.
+        run_apart: whether run files, too, are read in that process, because damaged ones make a library print or
+            end its process.
     """
 
     kind: str
@@ -51,6 +53,7 @@ class Reader:
     magic: tuple[bytes, ...] = ()
     read_run: Callable[[bytes, str, int], FileTable] | None = None
     read_tables: Callable[[bytes, str], list[Table]] | None = None
+    run_apart: bool = False
 
 
 READERS: Mapping[str, str] = {

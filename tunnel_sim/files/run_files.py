@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from tunnel_sim.files.kept_process import check_polars, read_apart
 from tunnel_sim.files.readers import RUN_ENDINGS, FileTable, Reader, load_reader, run_endings
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, is_blank, read_regular
 from tunnel_sim.files.writing import encoded
+from tunnel_sim.forks import polars_works
+from tunnel_sim.sandbox import Message, Work
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import Drive
@@ -63,10 +67,60 @@ def read_table(
 ) -> RunTableValues:
     """Read finite times, readings and an input from a run file; ``timed``: the times are required."""
     missing = "put the file there or correct 'file' in campaign.toml"
-    known = COLUMNS[quantity]
-    holds = f"give it a column {' or '.join(known)}, and time_s unless [sensor] sample_rate is given"
-    held = _held(path, where, missing, most, holds)
-    names = held.names
+    holds = (
+        f"give it a column {' or '.join(COLUMNS[quantity])}, and time_s unless [sensor] sample_rate is given"
+    )
+    given = {"timed": timed, "quantity": quantity, "most": most}
+    found, values = _read(_table, given, path, where, missing, holds)
+    arrays = dict(zip(found["values"], values, strict=True))
+    column, driven = found["column"], found["input_column"]
+    reading = np.deg2rad(arrays[column]) if "_deg" in column else arrays[column]
+    return RunTableValues(arrays.get("time_s"), reading, column, driven, driven and arrays[driven])
+
+
+def read_input(path: Path, where: str) -> tuple[Times, InputColumn, PerSample]:
+    """Read the input of a driven run, and its increasing times, from a file that need not contain a reading."""
+    missing, holds = "put the file beside the plan or correct 'file'", "give it a header line and samples"
+    found, (time, values) = _read(_input, {"most": limits.RUN_SAMPLES}, path, where, missing, holds)
+    if time.size < 2 or not np.all(np.diff(time) > 0.0):
+        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
+    return time, found["input_column"], values
+
+
+def _read(
+    work: Work, given: dict[str, Any], path: Path, where: str, missing: str, holds: str
+) -> tuple[dict[str, Any], list[Array]]:
+    """The columns of a run file, read here, or in the kept process where its reader or Polars needs that."""
+    ending = path.suffix.lower()
+    readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
+    reader, _ = _reader(ending, where)
+    contents = [read_regular(path, reader.limit, where=where, missing=missing, readable=readable)]
+    if is_blank(contents[0]):
+        raise TunnelError("the file is empty", where=where, remedy=holds)
+    given = {**given, "ending": ending, "where": where}
+    here = polars_works() and not reader.run_apart
+    found, arrays = work(given, contents) if here else read_apart(work, given, contents[0], where)
+    return found, [np.frombuffer(array) for array in arrays]
+
+
+def _reader(ending: str, where: str) -> tuple[Reader, Callable[[bytes, str, int], FileTable]]:
+    reader = load_reader(ending)
+    if reader is None or reader.read_run is None:
+        what = f"unsupported file type '{one_line(ending)}'"
+        raise TunnelError(what, where=where, remedy=f"use {' or '.join(run_endings())}")
+    return reader, reader.read_run
+
+
+def _held(given: dict[str, Any], contents: list[bytes]) -> FileTable:
+    _, read_run = _reader(given["ending"], given["where"])
+    return read_run(contents.pop(), given["where"], given["most"])
+
+
+def _table(given: dict[str, Any], contents: list[bytes]) -> Message:
+    """The columns of times, readings and input of a run file, for `read_table`."""
+    held = _held(given, contents)
+    timed, where, quantity = given["timed"], given["where"], given["quantity"]
+    known, names = COLUMNS[quantity], held.names
     driven = _input_column(names, where)
     found = [name for name in known if name in names]
     if len(found) > 1:
@@ -96,42 +150,30 @@ def read_table(
         remedy = "record the run again or leave it out"
         raise TunnelError("the file has no samples", where=where, remedy=remedy)
     values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
-    reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
-    given = None if driven is None else values[driven]
-    return RunTableValues(values.get("time_s"), reading, column, driven, given)
+    return {"column": column, "input_column": driven, "values": used}, _parts(values.values())
 
 
-def _held(
-    path: Path, where: str, missing: str, most: int, holds: str = "give it a header line and samples"
-) -> FileTable:
-    reader = load_reader(path.suffix.lower())
-    if reader is None or reader.read_run is None:
-        what = f"unsupported file type '{one_line(path.suffix)}'"
-        raise TunnelError(what, where=where, remedy=f"use {' or '.join(run_endings())}")
-    readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
-    content = read_regular(path, reader.limit, where=where, missing=missing, readable=readable)
-    if is_blank(content):
-        raise TunnelError("the file is empty", where=where, remedy=holds)
-    return reader.read_run(content, where, most)
-
-
-def read_input(path: Path, where: str) -> tuple[Times, InputColumn, PerSample]:
-    """Read the input of a driven run, and its increasing times, from a file that need not contain a reading."""
-    held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
+def _input(given: dict[str, Any], contents: list[bytes]) -> Message:
+    """The times and the input of a file, for `read_input`."""
+    held = _held(given, contents)
+    where = given["where"]
     column = _input_column(held.names, where)
     if column is None or "time_s" not in held.names:
         what = f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}"
         raise TunnelError(what, where=where, remedy="give it time_s in s and one input column")
-    time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
-    if time.size < 2 or not np.all(np.diff(time) > 0.0):
-        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
-    return time, column, values
+    values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
+    return {"input_column": column}, _parts(values)
+
+
+def _parts(values: Iterable[Array]) -> list[memoryview]:
+    return [np.ascontiguousarray(array).data for array in values]
 
 
 def table_bytes(
     record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
 ) -> bytes:
     """The content of a run file, in the format of the path, with readings in radians, to the last digit."""
+    check_polars()
     given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
     table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
     # CSV values have the fewest digits that are read as the same float.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import REINSTALLING, TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 #: Parameters of the moments of gravity, which load a joint: greatest moment and angle of rest.
@@ -25,16 +25,14 @@ def native_library(stem: str) -> Path:
     try:
         distribution = importlib.metadata.distribution("virtual-wind-tunnel")
     except importlib.metadata.PackageNotFoundError as error:
-        raise TunnelError(
-            "the package is not installed", remedy="run .venv/bin/pip install . in its clone"
-        ) from error
+        raise TunnelError("the package is not installed", remedy=f"run {REINSTALLING}") from error
     folder = Path(str(distribution.locate_file("tunnel_sim/native")))
     for ending in (".so", ".dylib", ".dll"):
         path = folder / f"lib{stem}{ending}"
         if path.is_file():
             return path
     what = f"the compiled library {stem} is missing"
-    raise TunnelError(what, where=str(folder), remedy="reinstall the package")
+    raise TunnelError(what, where=str(folder), remedy=f"reinstall: run {REINSTALLING}")
 
 
 @functools.cache

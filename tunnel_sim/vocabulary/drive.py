@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from tunnel_sim.vocabulary.columns import read_only_column
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, INPUTS, Input, InputColumn
-from tunnel_sim.vocabulary.record import Array, Record, read_only
+from tunnel_sim.vocabulary.record import Array, Record
 
 Hold = Literal["zero", "linear"]
 """Between samples the input keeps its value, or is linear."""
@@ -50,8 +51,8 @@ class Drive:
     servo_kv: float | None = None
 
     def __post_init__(self) -> None:
-        """Copy the values and make them read-only."""
-        object.__setattr__(self, "values", read_only(self.values))
+        """Copy the values, check that they are numbers, and make them read-only."""
+        object.__setattr__(self, "values", read_only_column(self.values, self.column, "Drive"))
 
     @property
     def stated(self) -> dict[str, float | str | None]:

@@ -71,8 +71,8 @@ def one_of(names: Sequence[str]) -> str:
 
 EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
-    "frames": ("pandas", "xarray"),
-    "arviz": ("arviz",),
+    "frames": ("pandas", "pyarrow", "xarray", "uncertainties"),
+    "arviz": ("arviz_base",),
     "film": ("imageio", "imageio_ffmpeg"),
     "cluster": ("dask", "distributed"),
     "bench": ("nicegui",),
@@ -80,6 +80,10 @@ EXTRAS = {
     "train": ("stable_baselines3",),
 }
 """The modules of each extra of ``pyproject.toml`` that a command needs."""
+
+
+REINSTALLING = ".venv/bin/pip install . in the clone of the project"
+"""The command that builds and installs the project again, with the versions that it requires."""
 
 
 def installing(extra: str) -> str:

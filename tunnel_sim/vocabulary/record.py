@@ -6,28 +6,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tunnel_sim.vocabulary.columns import Array as Array
+from tunnel_sim.vocabulary.columns import read_only as read_only
+from tunnel_sim.vocabulary.columns import read_only_column
+from tunnel_sim.vocabulary.errors import TunnelError
 
 #: Deviation of the times from a uniform clock, in steps, up to which they are uniform. At ten samples per cycle it
 #: moves a reading by 0.6 % of the swing.
 CLOCK_TOLERANCE = 0.01
 _GAP = 4.0  # mean intervals: a longer step is a gap
-
-
-def read_only(values: ArrayLike) -> Array:
-    """A read-only float64 copy, or the values themselves where they are one already."""
-    if type(values) is np.ndarray and values.dtype == np.float64 and _is_constant(values):
-        return values
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array
-
-
-def _is_constant(values: np.ndarray) -> bool:
-    owner = values if values.base is None else values.base
-    return not values.flags.writeable and isinstance(owner, np.ndarray) and not owner.flags.writeable
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +28,11 @@ class Record:
         yaw_rad: sensor reading, shape (n,), rad, nose-right positive; the sensor's zero is unknown. Where the
             campaign's sensor measures a rate or an acceleration, rad/s or rad/s².
 
+    Lists and columns of pandas and Polars are taken, too; dates and durations become seconds from the first sample.
     The arrays are copied and made read-only.
+
+    Raises:
+        TunnelError: for columns of other values, missing values, times that do not increase, and other sizes.
     """
 
     time_s: Array
@@ -47,12 +40,16 @@ class Record:
 
     def __post_init__(self) -> None:
         """Copy, freeze and check the arrays."""
-        object.__setattr__(self, "time_s", read_only(self.time_s))
-        object.__setattr__(self, "yaw_rad", read_only(self.yaw_rad))
-        if self.time_s.ndim != 1 or self.time_s.shape != self.yaw_rad.shape or self.time_s.size < 2:
-            raise ValueError(
-                "time_s and yaw_rad must be one-dimensional, equally long and of two samples or more"
-            )
+        where = "Record"
+        object.__setattr__(self, "time_s", read_only_column(self.time_s, "time_s", where, times=True))
+        object.__setattr__(self, "yaw_rad", read_only_column(self.yaw_rad, "yaw_rad", where))
+        if self.time_s.shape != self.yaw_rad.shape or self.time_s.size < 2:
+            what = f"{self.time_s.size} times and {self.yaw_rad.size} readings"
+            raise TunnelError(what, where=where, remedy="give as many readings as times, two or more")
+        later = self.time_s[1:] > self.time_s[:-1]
+        if not later.all():
+            what = f"time_s does not increase at index {int(np.argmin(later)) + 1}"
+            raise TunnelError(what, where=where, remedy="sort the samples, and give each time once")
 
     def __repr__(self) -> str:
         """The samples, the range of the readings, and where to go from here, in three lines."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import pkgutil
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,31 +15,25 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.formats.labview import MAGIC, read_labview_tables
 from tunnel_sim.files.importing.formats.text import TEXT, read_text_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
+from tunnel_sim.files.kept_process import read_apart
 from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import PACKED, check_count, is_blank, read_regular, unpacked
-from tunnel_sim.sandbox import LimitReached, Message, Sandbox
+from tunnel_sim.forks import polars_works
+from tunnel_sim.sandbox import Message
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
-_lock = threading.Lock()
-_kept: list[Sandbox] = []
 
+def read_guarded(
+    reader: str | None, content: bytes, where: str, choices: ImportChoices
+) -> tuple[list[Table], dict[str, str]]:
+    """The tables of a file, read in the kept process, and what a table of text is known to be.
 
-def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
-    """The tables of a file by the reader at ``module:name``, read in a process that is kept for the next file."""
-    seconds = limits.READER_SECONDS + len(content) / limits.READER_PACE
-    with _lock:
-        if _kept and not _kept[0].usable:
-            _kept.pop().end()
-        if not _kept:
-            _kept.append(Sandbox(_prepare, limits.READER_MEMORY, files=True))
-        try:
-            found, arrays = _kept[0].do(_read, {"reader": reader, "where": where}, [content], seconds)
-        except LimitReached as error:
-            remedy = "split it if it is large; if it is damaged, export it again, or as text"
-            raise TunnelError(f"reading it {error}", where=where, remedy=remedy) from None
-        except TunnelError as error:
-            raise TunnelError(error.what, where=where, remedy=error.remedy) from None
+    Args:
+        reader: its place ``module:name``; None: text.
+    """
+    dialect = {"delimiter": choices.delimiter, "decimal": choices.decimal}
+    found, arrays = read_apart(_read, {"reader": reader, "where": where, "dialect": dialect}, content, where)
     values = (np.frombuffer(array) for array in arrays)
     tables = []
     for table in found["tables"]:
@@ -47,23 +41,33 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
         listed = {key: tuple(table[key]) for key in ("said", "native")}
         apart = tuple(tuple(column) for column in table["apart"])
         tables.append(Table(**table | listed | {"channels": channels, "apart": apart}))
-    return tables
+    return tables, found["known"]
 
 
-def _prepare() -> None:
-    """Load what every reader needs: this module."""
-
-
-def _read(request: dict[str, str], contents: list[bytes]) -> Message:
+def _read(request: dict[str, Any], contents: list[bytes]) -> Message:
     """The tables of a file, as JSON and the values of all columns."""
-    tables = pkgutil.resolve_name(request["reader"]).read_tables(contents.pop(), request["where"])
+    known: dict[str, str] = {}
+    content, where = contents.pop(), request["where"]
+    if request["reader"] is None:
+        tables, known = _text_tables(content, where, ImportChoices(**request["dialect"]))
+    else:
+        tables = pkgutil.resolve_name(request["reader"]).read_tables(content, where)
     described = [
         {field.name: getattr(table, field.name) for field in fields(Table)}
         | {"channels": [(channel.name, channel.unit, channel.place) for channel in table.channels]}
         for table in tables
     ]
     columns = [np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels]
-    return {"tables": described}, [column.data for column in columns]
+    return {"tables": described, "known": known}, [column.data for column in columns]
+
+
+def _text_tables(
+    content: bytes, where: str, choices: ImportChoices
+) -> tuple[list[Table], dict[str, str]]:
+    """The tables of a file of text, and what they are known to be; LabVIEW's have headers of their own."""
+    if content.startswith(MAGIC):
+        return read_labview_tables(content, where)
+    return read_text_tables(content, where, choices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +113,10 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
             what = f"is not {reader.kind}" + (f": it begins like {really}" if really else "")
             remedy = "give the file the ending of its format, or export it again"
             raise TunnelError(what, where=where, remedy=remedy)
-    known: dict[str, str] = {}
-    if place is None and content.startswith(MAGIC):
-        tables, known = read_labview_tables(content, where)
-    elif place is None:
-        tables, known = read_text_tables(content, where, choices)
+    if place is None and polars_works():
+        tables, known = _text_tables(content, where, choices)
     else:
-        tables = read_guarded(place, content, where)
+        tables, known = read_guarded(place, content, where, choices)
     readable = []
     for table in (table for table in tables if table.channels):
         channels, said = [], [*table.said]

@@ -292,6 +292,11 @@ def test_gear_play_before_a_spring_is_written_for_the_plugin(tmp_path: Path) -> 
     assert answer.model is not None
     assert answer.model.closure.native_closed > 0.99
     assert any("vwt.yaw_moment adds it" in note for note in answer.model.notes)
+    nearest = answer.model.native
+    assert nearest is not None
+    assert nearest.closure.native_closed < answer.model.closure.native_closed
+    mujoco.MjModel.from_xml_string(nearest.write(tmp_path / "native.xml").read_text())  # without the plugin
+    assert "yaw_moment" not in (tmp_path / "native.xml").read_text()
 
 
 @pytest.mark.slow

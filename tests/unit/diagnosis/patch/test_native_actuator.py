@@ -15,6 +15,7 @@ from diagnosis.model.joint import with_law
 from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.patched_model import found_law
+from diagnosis.words.cautions import PATCH, said
 from tests.reference.robot_joints import MOTOR, NOISE, TIME, multisine, robot, robot_campaign
 from tests.support.robots import own_model
 from tunnel_sim.effects import effect_class
@@ -23,6 +24,7 @@ from tunnel_sim.engine.joint_patch import (
     ActuatorPatch,
     JointPatch,
     Start,
+    history_of,
     patched,
     patched_xml,
     simulate_joint,
@@ -82,6 +84,38 @@ def test_a_native_actuator_moves_the_joint_as_its_law(
     half_a_step = 2.0 * np.pi * 4.0 * 0.5e-3
     assert np.max(np.abs(native.angle - law.angle)) < half_a_step * np.max(np.abs(law.angle))
     assert np.max(np.abs(native.angle - law.angle)) < 0.2 * size
+
+
+def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
+    tmp_path: Path, swung: Campaign
+) -> None:
+    model = own_model(tmp_path, swung, robot(TRUE, option='timestep="0.001" integrator="Euler"'))
+    assert model.law.actuator is not None
+    drive = DriveMoment(TIME, 0.2 + multisine(3, 0.3), model.law.actuator.gain)
+    start = Start("r1", 0.0, 0.1, 0.5, drive)
+    patch = JointPatch(model.law.inertia, actuator=ActuatorPatch(0, lag=0.02, delay=0.0125))
+    engine = mujoco.MjModel.from_xml_string(patched_xml(patched(model, patch, [start])[0], model, tmp_path))
+    wanted = simulate_joint(engine, model.law.rest, start, 0.5, 0).angle
+
+    samples = history_of(0.0125, engine.opt.timestep)
+    note = said(PATCH, {"kind": "delayed control", "index": 0, "samples": samples})
+    call = note[note.index("mujoco.mj_init") :].rstrip(".")
+
+    def replayed(*, filled: bool) -> np.ndarray:
+        data, found = mujoco.MjData(engine), []
+        mujoco.mj_resetDataKeyframe(engine, data, 0)
+        if filled:
+            exec(call, {"mujoco": mujoco, "numpy": np, "model": engine, "data": data})
+        for control in drive.means(engine.opt.timestep * np.arange(wanted.size + 1)):
+            found.append(data.qpos[0] - model.law.rest)
+            data.ctrl[0] = control
+            mujoco.mj_step(engine, data)
+        return np.array(found[: wanted.size])
+
+    assert engine.actuator_history[0, 0] == samples
+    left = [np.max(np.abs(replayed(filled=filled) - wanted)) for filled in (True, False)]
+    assert left[1] > 3e-3
+    assert left[0] < 0.1 * left[1]  # the first control is that at the start, not the mean over the first step
 
 
 def test_what_is_written_is_read_by_mujoco_and_stated(tmp_path: Path, swung: Campaign) -> None:

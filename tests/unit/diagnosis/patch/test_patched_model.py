@@ -95,6 +95,10 @@ def test_the_patched_model_moves_as_the_fit_does(
     patch = found_law(problem, common, own, 0.0)
     kinds = {one.kind for one in patch.differences}
     assert said in kinds if said else kinds.isdisjoint({"no native element", "polynomial"})
+    nearest = found_law(problem, common, own, 0.0, native_only=True)
+    assert not nearest.patch.by_plugin
+    assert {one.kind for one in nearest.differences}.isdisjoint({"no native element"})
+    assert patch.patch.by_plugin or nearest == patch  # what is native already stays as it is
     compiled = patched(model, patch.patch)[0].compile()
 
     def simulate(common: Array, start: Start, duration: float) -> Motion:

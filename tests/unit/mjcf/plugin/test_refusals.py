@@ -12,7 +12,9 @@ import pytest
 
 from tests.skips import PLATFORM
 from tests.support.small_model import NUMERICS, small_model
+from tunnel_sim.engine.model import load_plugin
 from tunnel_sim.physics.moment_law import parameter_names
+from tunnel_sim.vocabulary.errors import TunnelError
 
 pytestmark = pytest.mark.usefixtures("in_a_folder_of_its_own")
 
@@ -166,3 +168,9 @@ def test_another_version_of_mujoco_is_refused(tmp_path: Path) -> None:
         [sys.executable, "-c", script, str(built), str(model)], capture_output=True, text=True, check=True
     )
     assert "built against MuJoCo 1 but loaded by" in outcome.stdout
+
+
+def test_another_version_of_the_engine_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mujoco, "__version__", "4.0.1")
+    with pytest.raises(TunnelError, match=r"MuJoCo 4\.0\.1 is installed.*for 4\.0\.0; reinstall: run"):
+        load_plugin.__wrapped__()

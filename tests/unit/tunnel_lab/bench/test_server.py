@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tunnel_lab.bench import server
 from tunnel_lab.bench.server import Guard
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
@@ -113,3 +114,11 @@ def test_a_refusal_is_one_line_and_does_not_echo_the_request() -> None:
         assert start["status"] in (403, 413, 421)
         assert body["body"].count(b"\n") == 1
         assert b"<" not in body["body"]
+
+
+def test_a_report_is_served_without_the_rights_of_the_bench() -> None:
+    policy = server._report(b"<p>").headers["content-security-policy"]
+    stated = dict(part.strip().partition(" ")[::2] for part in policy.split(";"))
+    assert stated["sandbox"] == "allow-scripts"  # without allow-same-origin: it has no cookie and no address
+    assert stated["default-src"] == "'none'"
+    assert "unsafe" not in stated["script-src"]

@@ -18,7 +18,7 @@ import pytest
 from tests.marks import slow
 from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document
-from tunnel_lab.report import Byline, render_report, write_report, write_summary
+from tunnel_lab.report import Byline, render_report, security_policy, write_report, write_summary
 
 pytestmark = IN_A_BROWSER
 
@@ -58,6 +58,22 @@ def opened(browser: Any, report: Path, request: pytest.FixtureRequest) -> Iterat
     tab.context.close()
     assert tab.complaints == []
     assert {url.partition(":")[0] for url in tab.requests} <= {"file", "data"}
+
+
+def test_with_the_policy_of_the_bench_its_own_scripts_run_and_no_other(browser: Any, report: Path) -> None:
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    foreign = report.read_text().replace("</body>", "<script>document.title = 'foreign'</script></body>")
+    headers = {"content-security-policy": security_policy()}
+    page.route("**", lambda route: route.fulfill(body=foreign, content_type="text/html", headers=headers))
+    page.goto("http://127.0.0.1/report.html")
+    page.click("#fold")
+    page.wait_for_function("document.querySelectorAll('.uplot').length === 5")
+    assert page.title() != "foreign"
+    assert page.evaluate("origin") == "null"
+    assert len(complaints) == 1, complaints  # on the foreign script
+    page.close()
 
 
 WIDTHS = [{"width": width, "color_scheme": "light"} for width in (390, 1200)]

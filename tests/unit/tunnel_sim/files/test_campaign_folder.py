@@ -360,7 +360,6 @@ def test_a_campaign_written_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytes
         ({"runs": (campaign().runs[0],) * 2}, "used twice"),
         ({"runs": (replace(campaign().runs[1], air_density=None),)}, "without air_density"),
         ({"runs": (replace(campaign().runs[0], record=decay(duration=1.0)),)}, "fewer than three"),
-        ({"runs": (replace(campaign().runs[0], record=decay(noise=np.nan)),)}, "NaN"),
         ({"name": ""}, "blank"),
         ({"sensor": SensorProperties(sample_rate=0.2)}, "sample_rate"),
     ],

@@ -67,7 +67,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
     return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))
 
 
-PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
+PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables, run_apart=True)
 _COMPRESSED = 15  # data type of an element compressed by zlib
 _HEADER = 128  # bytes before the first element of version 5
 

@@ -11,7 +11,8 @@ import pytest
 from tests.skips import PLATFORM
 from tests.support.odd_readers import TABLES
 from tunnel_sim import TunnelError, sandbox
-from tunnel_sim.files.importing import source as guard
+from tunnel_sim.files import kept_process as guard
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.source import read_guarded
 from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.vocabulary import limits
@@ -20,7 +21,7 @@ READER = "tests.support.odd_readers:ODD"
 
 
 def read(content: bytes) -> list[Table]:
-    return read_guarded(READER, content, "log.h5")
+    return read_guarded(READER, content, "log.h5", ImportChoices())[0]
 
 
 def test_tables_come_back_as_they_were() -> None:
