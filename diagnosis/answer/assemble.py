@@ -17,6 +17,7 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.passive import within_bounds
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
@@ -91,7 +92,7 @@ def assemble(
     begun = time.perf_counter()
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)
-    after = coefficients(answers, study.campaign)
+    after = within_bounds(coefficients(answers, study.campaign), study)
     before = before_the_causes(study.nominal, after) if study.causes else after
     found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}

@@ -252,6 +252,23 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     return tuple(sizes)
 
 
+def damping_ratio(fit: Fit) -> float | None:
+    """The damping ratio of the fitted motion as a whole over three cycles from half of the largest swing.
+
+    Returns:
+        Of the first run; None where its motion there is not a decay.
+    """
+    data = fit.problem.data
+    release = fit.point.release.copy()
+    release[:, :2] = _SHARE * data.swing, 0.0
+    run, frequency = data.runs[0], resonance(fit, 0)
+    count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
+    decay = _decay(
+        run.interval, fit.problem.predict([Point(fit.point.common, release)])[0][0][:count], frequency
+    )
+    return None if decay is None or decay[1] <= 0.0 else decay[1]
+
+
 def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:
     """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are not a decay."""
     if curve.size < _FEWEST or not np.all(np.isfinite(curve)):
