@@ -17,6 +17,7 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.parameter_errors import parameter_errors
 from diagnosis.answer.passive import within_bounds
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.trade_off import least_separated
@@ -87,8 +88,8 @@ def assemble(
         closes: the explained share of the gap; None: it is computed.
     """
     chosen, settings, similarity = study.chosen, study.settings, study.similarity
-    weighed = candidates(study, excess_base(study))
     closes = closes or closing(study)
+    weighed = candidates(study, excess_base(study), parameter_errors(study, closes))
     begun = time.perf_counter()
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)

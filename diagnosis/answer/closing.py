@@ -11,6 +11,7 @@ from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.facts.closure import Confirmation, Waterfall
 from diagnosis.result import GapSummary
 from diagnosis.search.study import Study
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,15 @@ class Closing:
         gap: before and after, by MuJoCo.
         steps: the same as the causes are added.
         seconds: wall time by step, s.
+        shifts: MuJoCo's readings of the answer's model minus those of the fits, in noise standard deviations of
+            block means, by run id.
     """
 
     gap: GapSummary
     steps: Waterfall
     confirmation: Confirmation
     seconds: Mapping[str, float]
+    shifts: Mapping[str, Array]
 
 
 def closing(study: Study) -> Closing:
@@ -41,7 +45,7 @@ def closing(study: Study) -> Closing:
     gap = held_out_totals(gap_summary(study, base, shown), steps)
     gap = replace(gap, closed_ahead=share_ahead(study, nominal_out.residuals.keys()))
     seconds = {"confirmation": reported - begun, "waterfall": time.perf_counter() - reported}
-    return Closing(gap, steps, shown.confirmation, seconds)
+    return Closing(gap, steps, shown.confirmation, seconds, shown.shifts)
 
 
 def confirmed(study: Study) -> tuple[Study, Closing]:
