@@ -11,6 +11,7 @@ import numpy as np
 
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
+from diagnosis.answer.closing import Closing, confirmed
 from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
@@ -89,8 +90,9 @@ def diagnose(
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
         say("explained share")  # the place, and the answer without the remainder
+        study, closes = confirmed(study)
         patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
-        answer = _assembled(study, chosen, patched, unpatched)
+        answer = _assembled(study, chosen, closes, patched, unpatched)
         if chosen.limit_cycles:
             answer = limit_cycle_answer(answer, chosen.remarks)
         else:
@@ -154,7 +156,7 @@ def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tupl
 
 
 def _assembled(
-    study: Study, chosen: Chosen, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
+    study: Study, chosen: Chosen, closes: Closing, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
 ) -> Diagnosis:
     """The answer in the units of the campaign, without the remainder and without words."""
     in_view = (Fact(study.caution),) if study.caution else ()
@@ -162,7 +164,8 @@ def _assembled(
     lead = map(as_stated, study.model.lead_words(study.similarity))
     beyond = () if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)
     left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead, *beyond)
-    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds, _identified(study, chosen))
+    identified = _identified(study, chosen)
+    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds, closes, identified)
     noted = (
         *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),
         *hum_noted(study.campaign, study.prepared.hum, study.similarity),

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
-from diagnosis.facts.decision import Decision, decision
+from diagnosis.facts.decision import Decision, Predictions, decision
 from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
@@ -107,6 +107,8 @@ class GapSummary:
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
+        closed_ahead: share of the gap in the later half of driven runs that the causes explain, fitted to the
+            earlier half; None where runs are held out whole, or are not driven.
     """
 
     detected: bool
@@ -119,6 +121,7 @@ class GapSummary:
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
     misfit: Misfit | None = None
+    closed_ahead: float | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
@@ -309,10 +312,15 @@ class Diagnosis:
     @property
     def decision(self) -> Decision:
         """Whether the answer is decided, and the common part of the likely answers."""
-        chosen = settings_of({"provenance": self.provenance}).answer
-        answers, place = [(c.effect, c.probability) for c in self.candidates], self.found.place
-        elsewhere = place is not None and place.elsewhere
-        return decision(answers, chosen, self.gap.closed, elsewhere=elsewhere)
+        chosen, gap = settings_of({"provenance": self.provenance}).answer, self.gap
+        predictions = Predictions(
+            held_out=gap.closed,
+            ahead=gap.closed_ahead,
+            patched=None if self.model is None else self.model.judged(chosen),
+            left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
+            elsewhere=self.found.place is not None and self.found.place.elsewhere,
+        )
+        return decision([(c.effect, c.probability) for c in self.candidates], chosen, predictions)
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""

@@ -249,9 +249,28 @@ def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
     if found is None:
         return ""
     first, second = (_parameter_label(name, symbols) for name in found["parameters"])
-    return (
+    return _together(found, second, symbols) + (
         f"What trades off: {first} and {second} are poorly separable in these runs (correlation "
         f"{_correlation(found['correlation'])}): {found['remedy']}."
+    )
+
+
+def _together(found: Document, second: str, symbols: Mapping[str, str]) -> str:
+    """The combination of two parameters that the runs determine, and its split, in a sentence; else empty."""
+    given = found.get("together")
+    if given is None:
+        return ""
+    label = _parameter_label(given["quantity"], symbols)
+    whole = f"the whole damping ratio, {label}" if given["quantity"] == "zeta" else label
+    ends = given["of_second"]
+    apart = max(ends[1] - ends[0], 1e-6 * abs(ends[1])) or 1.0
+    digits = 2 + max(math.floor(math.log10(max(abs(ends[1]), apart) / apart)), 0)
+    low, high = (significant(end, digits) for end in ends)
+    unit = "" if given["unit"] == "1" else f" {given['unit']}"
+    size = f"{with_std(given['value'], given['std'])}{unit}"
+    return (
+        f"What the runs determine: {whole} + {significant(given['factor'], 3)} × {second} = {size}; of it "
+        f"{second} contributes {low} to {high}{unit}. "
     )
 
 

@@ -6,6 +6,7 @@ separated by a run that changes a condition on which they depend with different 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,56 @@ import numpy as np
 from identification.policy import TRADE_OFF_CORRELATION
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+
+_REACH = 1.96  # standard deviations of a normal distribution on each side of its mean, 0.95 in all
+
+
+@dataclass(frozen=True)
+class Combination:
+    """The combination of two parameters that the runs determine: the first and a multiple of the second.
+
+    Args:
+        quantity: name of the first, or of the quantity that both add up to.
+        factor: of the second in it, in ``unit`` per unit of the second.
+        value, std: of the combination, in ``unit``.
+        unit: of the combination.
+        of_second: interval of 0.95 of the second's contribution within the bounds of both, in ``unit``.
+    """
+
+    quantity: str
+    factor: float
+    value: float
+    std: float
+    unit: str
+    of_second: tuple[float, float]
+
+    @classmethod
+    def of(
+        cls, quantity: str, values: Array, covariance: Array, bounds: Array, unit: str
+    ) -> Combination | None:
+        """The combination of least variance.
+
+        Args:
+            values: of both parameters, shape (2,), the first in the unit.
+            covariance: of them, shape (2, 2).
+            bounds: least and greatest value of each, shape (2, 2).
+
+        Returns:
+            None where the parameters do not add up: where a larger one needs a larger other.
+        """
+        factor = -float(covariance[0, 1] / covariance[1, 1])
+        if not factor > 0.0:
+            return None
+        whole = float(values[0] + factor * values[1])
+        std = math.sqrt(max(float(covariance[0, 0] + factor * covariance[0, 1]), 0.0))
+        own, reach = float(values[1]), _REACH * math.sqrt(float(covariance[1, 1]))
+        low = max(own - reach, bounds[1, 0], (whole - bounds[0, 1]) / factor)
+        high = min(own + reach, bounds[1, 1], (whole - bounds[0, 0]) / factor)
+        ends = (
+            factor * float(min(low, own)),
+            factor * float(max(high, own)),
+        )  # the estimate itself is possible
+        return cls(quantity, factor, whole, std, unit, ends)
 
 
 @dataclass(frozen=True)
@@ -24,11 +75,14 @@ class TradeOff:
         parameters: names of both, in the order of the fit; for effects ``effect.parameter``.
         correlation: of their errors, −1 to 1, dimensionless.
         remedy: the run that would separate them, as a clause in the imperative.
+        together: the combination that the runs determine; None where the two do not add up, or one of them shapes
+            a law.
     """
 
     parameters: tuple[str, str]
     correlation: float
     remedy: str
+    together: Combination | None = None
 
 
 @dataclass(frozen=True)

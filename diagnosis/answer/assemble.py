@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
+from diagnosis.answer.closing import Closing, closing
 from diagnosis.answer.coefficients import (
     Answers,
     as_identified,
@@ -20,20 +21,21 @@ from diagnosis.answer.coefficients import (
     possible_answers,
 )
 from diagnosis.answer.friction_curve import friction_curve
-from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
+from diagnosis.answer.held_out import excess_base
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.parameter_errors import parameter_errors
+from diagnosis.answer.passive import within_bounds
 from diagnosis.answer.repeatability import repeatability
-from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.facts.closure import Confirmation, NoiseSummary, Waterfall
+from diagnosis.facts.closure import NoiseSummary, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Remainder
 from diagnosis.likelihood.compression import in_shorter_blocks
-from diagnosis.result import Coefficients, Diagnosis, GapSummary, Where
+from diagnosis.result import Coefficients, Diagnosis, Where
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.where.described import described, nowhere
@@ -84,6 +86,7 @@ def assemble(
     left_out: Sequence[Fact] = (),
     patched: PatchedModel | None = None,
     kinds: Sequence[type[Effect]] = (),
+    closes: Closing | None = None,
     identified: Estimate | None = None,
 ) -> Diagnosis:
     """Compose the answer.
@@ -93,15 +96,16 @@ def assemble(
         left_out: caveats on runs and effects that were left out.
         patched: the given model with the causes written into it.
         kinds: the effects that may act unnamed beside those of an answer.
+        closes: the explained share of the gap; None: it is computed.
         identified: the estimate of the same runs, where no cause but scatter acts.
     """
     chosen, settings, similarity = study.chosen, study.settings, study.similarity
-    weighed = candidates(study, excess_base(study))
-    closes = _closes(study)
+    closes = closes or closing(study)
+    weighed = candidates(study, excess_base(study), parameter_errors(study, closes))
     begun = time.perf_counter()
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)
-    after = coefficients(answers, study.campaign)
+    after = within_bounds(coefficients(answers, study.campaign), study)
     if identified is not None:
         after = as_identified(after, identified, study.campaign, similarity)
     phase, covariance = in_phase(study.stated)
@@ -152,30 +156,6 @@ def assemble(
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats, rest),
     )
-
-
-@dataclass(frozen=True)
-class _Closes:
-    """The explained share of the gap on held-out readings."""
-
-    gap: GapSummary
-    steps: Waterfall
-    confirmation: Confirmation
-    seconds: Mapping[str, float]  # by step
-
-
-def _closes(study: Study) -> _Closes:
-    """The gap before and after by MuJoCo, and as the causes are added."""
-    base, chosen = excess_base(study), study.chosen
-    nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
-    begun = time.perf_counter()
-    shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
-    reported = time.perf_counter()
-    steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
-    gap = held_out_totals(gap_summary(study, base, shown), steps)
-    seconds = {"confirmation": reported - begun, "waterfall": time.perf_counter() - reported}
-    return _Closes(gap, steps, shown.confirmation, seconds)
 
 
 def _remains(study: Study, found: Coefficients, answers: Answers, steps: Waterfall) -> Remainder:

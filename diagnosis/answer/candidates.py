@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -84,8 +84,12 @@ def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
 _AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it is at the bound
 
 
-def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
+def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tuple[Candidate, ...]:
     """The answers, with their residual gap in the fitted runs by the fits' own integrator.
+
+    Args:
+        errors: standard deviations of the answer's parameters beside those of the noise, by ``effect.parameter``,
+            in their units.
 
     Returns:
         Answers, ``none`` and ``unknown`` among them: the answer first, then the most probable ones. Their
@@ -106,7 +110,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
             continue
         name = " + ".join(sorted({*study.beside, *answer.effects}))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
-        answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
+        answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer, errors)))
     if not study.answers:
         whole = excess + base.hum + base.extra
         closed = float(np.clip(1.0 - max(excess, 0.0) / max(whole, 1e-9), 0.0, 1.0))
@@ -135,8 +139,14 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
     return found | dict.fromkeys(read_off, 1.0 - chosen.detection_rate)
 
 
-def _parameters(study: Study, answer: Answer | None = None) -> dict[str, ParameterEstimate]:
-    """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect."""
+def _parameters(
+    study: Study, answer: Answer | None = None, errors: Mapping[str, float] = {}
+) -> dict[str, ParameterEstimate]:
+    """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect.
+
+    Args:
+        errors: as in `candidates`.
+    """
     estimates: dict[str, ParameterEstimate] = {}
     prepared, hum = study.prepared, study.prepared.hum
     if hum is not None:
@@ -155,7 +165,8 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
         inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
         for name in problem.effect_names:
             bound = fit.bound(name)
-            std = None if bound else fit.std(name) * inflate
+            further = errors.get(name, 0.0) if fit is study.chosen else 0.0
+            std = None if bound else math.hypot(fit.std(name) * inflate, further)
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
             undetermined = study.settings.answer.undetermined_from
             estimates[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
@@ -250,6 +261,23 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         )
         sizes.append(size)
     return tuple(sizes)
+
+
+def damping_ratio(fit: Fit) -> float | None:
+    """The damping ratio of the fitted motion as a whole over three cycles from half of the largest swing.
+
+    Returns:
+        Of the first run; None where its motion there is not a decay.
+    """
+    data = fit.problem.data
+    release = fit.point.release.copy()
+    release[:, :2] = _SHARE * data.swing, 0.0
+    run, frequency = data.runs[0], resonance(fit, 0)
+    count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
+    decay = _decay(
+        run.interval, fit.problem.predict([Point(fit.point.common, release)])[0][0][:count], frequency
+    )
+    return None if decay is None or decay[1] <= 0.0 else decay[1]
 
 
 def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
-from diagnosis.facts.closure import ON_BOTH, ON_RUNS, ON_STRETCHES, Step, Waterfall
+from diagnosis.facts.closure import ON_BOTH, ON_RUNS, ON_STRETCHES, Step, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
@@ -106,6 +107,41 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
             if left.any():
                 found[run.id][left] = residual[left]
     return found
+
+
+def share_ahead(study: Study, whole: Collection[str]) -> float | None:
+    """Share of the gap in the later half of driven runs that the answer explains, fitted to the earlier half.
+
+    Stretches between fitted ones test interpolation only. The later half of a free decay has other amplitudes than
+    the earlier half; the input of a driven run has no such order.
+
+    Args:
+        whole: ids of the runs that can be held out as a whole.
+
+    Returns:
+        None where no driven run is held out in stretches, the later halves show no gap, or a random moment is part
+        of the answer, which nothing predicts.
+    """
+    nominal, chosen = study.nominal, study.chosen
+    runs = nominal.problem.data.runs
+    ahead = [run.drive is not None and run.id not in whole for run in runs]
+    if not study.named or study.random is not None or chosen is nominal or not any(ahead):
+        return None
+    seen = [
+        np.arange(run.reading.size) < (run.reading.size // 2 if later else run.reading.size)
+        for run, later in zip(runs, ahead, strict=True)
+    ]
+    left = []
+    for fitted in (nominal, chosen):
+        try:
+            _, residuals = fit_seen(fitted, seen)
+        except np.linalg.LinAlgError:
+            return None if fitted is nominal else 0.0
+        left.append(np.concatenate([r[~known] for r, known in zip(residuals, seen, strict=True)]))
+    before, after = (float(np.mean(one**2)) for one in left)
+    if chdtrc(left[0].size, left[0].size * before) >= study.settings.answer.remains_rate:
+        return None
+    return share_closed(before - 1.0, after - 1.0) if np.isfinite(after) else 0.0
 
 
 @dataclass(frozen=True)

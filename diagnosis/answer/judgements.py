@@ -64,9 +64,10 @@ def cautions(
 
 
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
-    """The parts of the records that no fit uses, and the effects that no half of the records confirms."""
+    """The parts of the records that no fit uses, and the effects that other readings do not confirm."""
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
+        *((Fact("needless", {"effects": study.needless}),) if study.needless else ()),
         *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
         *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )

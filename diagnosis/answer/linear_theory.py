@@ -48,7 +48,25 @@ def coefficients_of(fit: Fit) -> tuple[str, ...]:
 
 
 def coefficient_move(fit: Fit, name: str) -> float:
-    """Half the difference between the coefficients of two halves of the data, beyond chance.
+    """The move (`move_of_halves`) of a coefficient, in its unit."""
+    return move_of_halves(fit, fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name))
+
+
+def parameter_shift(fit: Fit, shifts: Sequence[Array]) -> Array:
+    """The change of the common parameters by a change of the readings, shape (common,), in their units.
+
+    Args:
+        shifts: of the readings, in noise standard deviations, by run, shape (n,).
+    """
+    _, slope, _ = normal_equations(fit.jacobian, list(shifts), products=fit.products)
+    return np.asarray(fit.covariance @ slope, np.float64)
+
+
+def move_of_halves(fit: Fit, gradient: Array) -> float:
+    """Half the difference between a quantity from two halves of the data, beyond chance.
+
+    Args:
+        gradient: of the quantity to the common parameters, shape (common,).
 
     The data are halved by amplitude, by time, by wind speed and by spring, and the halves that differ most count.
     The difference is that of one Gauss–Newton step from the fit: the scores of a fit sum to zero, so the two
@@ -58,10 +76,9 @@ def coefficient_move(fit: Fit, name: str) -> float:
     some causes.
 
     Returns:
-        The move in the coefficient's unit, less the contribution of noise (2 standard deviations, in quadrature);
+        The move in the quantity's unit, less the contribution of noise (2 standard deviations, in quadrature);
         0 where noise explains it.
     """
-    gradient = fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name)
     chosen = fit.settings.answer
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     # the remaining step of the fit itself

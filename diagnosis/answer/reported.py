@@ -152,6 +152,7 @@ class Reported:
         after: of the answer's model, held out where possible, else from its fit to all runs.
         held_out: ids of the runs that could be held out.
         confirmation: agreement of MuJoCo and the fits' integrator on these.
+        shifts: MuJoCo's block means of the answer's model minus those of the fits' integrator.
     """
 
     before: Mapping[str, Array]
@@ -159,6 +160,7 @@ class Reported:
     after: Mapping[str, Array]
     held_out: frozenset[str]
     confirmation: Confirmation
+    shifts: Mapping[str, Array]
 
 
 def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
@@ -192,6 +194,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
         after=after,
         held_out=frozenset(chosen_out.residuals),
         confirmation=confirm(comparisons, nominal.settings.answer.integrator_tolerance),
+        shifts=dict(zip(comparisons[-1].ids, comparisons[-1].shifts, strict=True)),
     )
 
 

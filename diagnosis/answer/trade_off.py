@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.answer.units import own_estimate, own_parameters
 from diagnosis.likelihood.least_squares import Fit
-from identification.trade_off import ROLES, Role, Setting, TradeOff, trade_off
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.result import ParameterEstimate
+from identification.trade_off import ROLES, Combination, Role, Setting, TradeOff, trade_off
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -20,9 +25,52 @@ def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
     A parameter at the end of its range is not free, and is excluded.
     """
     free = [place for place, name in enumerate(fit.problem.names) if fit.bound(name) is None]
-    names = [fit.problem.names[place] for place in free]
+    names, of = [fit.problem.names[place] for place in free], roles(fit)
     covariance = fit.stated_covariance[np.ix_(free, free)]
-    return trade_off(names, covariance, roles(fit), Setting.of(campaign), fit.settings.answer.trades_off_from)
+    found = trade_off(names, covariance, of, Setting.of(campaign), fit.settings.answer.trades_off_from)
+    if found is None or any(of[name].amplitude is None for name in found.parameters):
+        return found
+    return replace(found, together=_together(fit, campaign, found.parameters))
+
+
+def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combination | None:
+    """The combination of two parameters that a fit determines, in the units of the measured campaign.
+
+    The mechanical damping of a body on a spring is stated as a damping ratio.
+    """
+    problem, data = fit.problem, fit.problem.data
+    places = [problem.names.index(name) for name in pair]
+    inflated = fit.stated_covariance[np.ix_(places, places)] * (1.0 + max(fit.excess, 0.0))
+    scales, units = zip(*(_own_scale(fit, campaign, name) for name in pair), strict=True)
+    quantity, scale = pair[0], np.array(scales)
+    inertia, _, stiffness = linear_coefficients(fit, 0)
+    unit = units[0]
+    if pair[0] == "mechanical_damping" and data.model.restored and stiffness > 0.0:
+        quantity, unit, scale[0] = "zeta", "1", 0.5 / math.sqrt(inertia * stiffness)
+    bounds = np.array([[end[place] for end in problem.bounds] for place in places])
+    return Combination.of(
+        quantity,
+        scale * fit.point.common[places],
+        inflated * np.outer(scale, scale),
+        bounds * scale[:, None],
+        unit,
+    )
+
+
+def _own_scale(fit: Fit, campaign: Campaign, name: str) -> tuple[float, str]:
+    """Factor from a fit's parameter to the same in the units of the measured campaign, and its unit there."""
+    data, (given,) = fit.problem.data, [one for one in fit.problem.parameters.common if one.name == name]
+    one = ParameterEstimate(1.0, None, given.unit)
+    if not given.effect:
+        return own_estimate(one, data.similarity).value, given.unit
+    known = {
+        other: replace(one, value=1.0 if other == name else fit.value(other), unit=unit)
+        for other, unit in (
+            (o.name, o.unit) for o in fit.problem.parameters.common if o.effect == given.effect
+        )
+    }
+    found = own_parameters(known, campaign, data.similarity, data.model)[name]
+    return found.value, found.unit
 
 
 def roles(fit: Fit) -> Mapping[str, Role]:

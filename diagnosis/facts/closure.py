@@ -34,6 +34,10 @@ class Misfit:
         """Root mean square in ``unit`` of an excess in noise variances of a sample; below zero it is chance."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
+    def of_swing(self, excess: float) -> float | None:
+        """The same as a share of the swing; None where the readings do not move."""
+        return self.rms(excess) / self.swing if self.swing > 0.0 else None
+
 
 def share_closed(before: float, after: float) -> float:
     """Explained share of a gap, 0 to 1.

@@ -1,4 +1,4 @@
-"""Whether an answer is decided, and the common part of the likely answers."""
+"""Whether an answer is decided, by probability and by prediction, and the common part of the likely answers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,53 @@ from typing import Any
 
 from diagnosis.settings import AnswerSettings
 from tunnel_sim.effects import known_effects
+from tunnel_sim.files.writing import as_json
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A prediction by which a probable answer fails.
+
+    Args:
+        kind: ``held out``, ``ahead``, ``patched``, ``left`` or ``elsewhere``, as in `Predictions`.
+        share: that was found, a fraction; None where the place is in doubt.
+    """
+
+    kind: str
+    share: float | None
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """The success of the answer's predictions, beside its probability; None: not known, or nothing to predict.
+
+    Args:
+        held_out: share of the gap that it explains on held-out readings.
+        ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
+        patched: share of the gap that the user's model explains, with the answer written into it.
+        left: root mean square residual over that of the readings about their mean, a ratio.
+        elsewhere: whether the residuals show a place at which none of its causes acts.
+    """
+
+    held_out: float | None = None
+    ahead: float | None = None
+    patched: float | None = None
+    left: float | None = None
+    elsewhere: bool = False
+
+    def doubts(self, chosen: AnswerSettings) -> tuple[Doubt, ...]:
+        """The reasons not to decide on the answer, the most basic first."""
+        shares = {"held out": self.held_out, "ahead": self.ahead, "patched": self.patched}
+        found = [
+            Doubt(kind, share)
+            for kind, share in shares.items()
+            if share is not None and share < chosen.predicted_from
+        ]
+        if self.left is not None and self.left > chosen.left_of_swing:
+            found.append(Doubt("left", self.left))
+        if self.elsewhere:
+            found.append(Doubt("elsewhere", None))
+        return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -15,12 +62,12 @@ class Decision:
     """The decision that the probabilities of the answers allow.
 
     Args:
-        decided: whether the answer is probable enough, and predicts held-out readings.
+        decided: whether the answer is probable enough, and its predictions leave no doubt.
         credible: the fewest answers that together are credible, with their probabilities, most probable first.
         effects: effects common to the likely answers, with their probabilities.
         channels: channels on which all likely answers act, with their probabilities.
-        unpredictive: the answer, where it is probable enough but does not predict them; else empty.
-        elsewhere: the answer, where it is probable enough but the residuals show another place; else empty.
+        unpredictive: the answer, where it is probable enough but its predictions leave a doubt; else empty.
+        doubts: the reasons for that.
     """
 
     decided: bool
@@ -28,33 +75,28 @@ class Decision:
     effects: Mapping[str, float]
     channels: Mapping[str, float]
     unpredictive: str = ""
-    elsewhere: str = ""
+    doubts: tuple[Doubt, ...] = ()
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The fields ``decided``, ``unpredictive``, ``elsewhere``, ``credible`` and ``common`` of a document."""
+        """The fields ``decided``, ``unpredictive``, ``doubts``, ``credible`` and ``common`` of a document."""
         return {
             "decided": self.decided,
             "unpredictive": self.unpredictive,
-            "elsewhere": self.elsewhere,
+            "doubts": as_json(self.doubts),
             "credible": [{"effect": effect, "probability": value} for effect, value in self.credible],
             "common": {"effects": dict(self.effects), "channels": dict(self.channels)},
         }
 
 
 def decision(
-    answers: Sequence[tuple[str, float]],
-    chosen: AnswerSettings,
-    closed: float | None = None,
-    *,
-    elsewhere: bool = False,
+    answers: Sequence[tuple[str, float]], chosen: AnswerSettings, predictions: Predictions = Predictions()
 ) -> Decision:
     """Judge the answers by their probabilities, and the first of them by its predictions and its place.
 
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
-        closed: share of the gap that the answer explains on held-out readings; None: not known.
-        elsewhere: whether the residuals show a place at which none of its causes acts.
+        predictions: of the first answer; they count where it names effects.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):
@@ -69,11 +111,11 @@ def decision(
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
     first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
-    predicts = not names_effects or closed is None or closed >= chosen.predicted_from
+    doubts = predictions.doubts(chosen) if probable and names_effects else ()
     return Decision(
-        decided=probable and predicts and not (names_effects and elsewhere),
-        unpredictive=first if probable and not predicts else "",
-        elsewhere=first if probable and names_effects and elsewhere else "",
+        decided=probable and not doubts,
+        unpredictive=first if doubts else "",
+        doubts=doubts,
         credible=tuple(credible),
         effects=_common(causes, chosen.in_common),
         channels=_common(

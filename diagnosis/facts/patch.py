@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from diagnosis.facts.found import Fact
+from diagnosis.settings import AnswerSettings
 from tunnel_sim.files.writing import as_json
 
 if TYPE_CHECKING:
@@ -24,12 +25,14 @@ class NativeClosure:
         before: mean squared residual of the nominal model, in units of a block mean's noise variance.
         fit: of the fits' own integrator with the causes, in the same unit.
         native: of the patched model, simulated by the engine, in the same unit.
+        p_value: of the residual of the nominal model, a probability.
     """
 
     before: float
     fit: float
     native: float
     on: str
+    p_value: float = 0.0
 
     @property
     def fit_closed(self) -> float:
@@ -43,6 +46,9 @@ class NativeClosure:
 
     def _closed(self, after: float) -> float:
         return min(max(1.0 - max(after - 1.0, 0.0) / max(self.before - 1.0, 1e-9), 0.0), 1.0)
+
+
+_OMISSIONS = frozenset({"rod", "friction against load", "friction against rate", "presliding", "air"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +71,18 @@ class PatchedModel:
     closure: NativeClosure
     notes: tuple[str, ...] = ()
     native: PatchedModel | None = None
+
+    def judged(self, chosen: AnswerSettings) -> float | None:
+        """Share of the gap that the patched model explains, as a judgement on the causes.
+
+        Returns:
+            None where its runs do not show the gap; or where a part of the causes cannot be written into the
+            model, and the fit, which has that part, leaves next to nothing of the gap.
+        """
+        omits = any(fact.kind in _OMISSIONS for fact in self.differences)
+        excused = omits and 1.0 - self.closure.fit_closed < chosen.patch_excused
+        shown = self.closure.p_value < chosen.remains_rate
+        return self.closure.native_closed if shown and not excused else None
 
     def write(self, path: Path | str) -> Path:
         """Write the patched model to an MJCF file, which it replaces, completely or not at all.

@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from diagnosis.answer.held_out import HeldOut, predict_held_out, predict_stretches, turns_of
 from diagnosis.facts.closure import ON_RUNS, ON_STRETCHES
@@ -270,7 +271,9 @@ def native_closure(
     nominal_power, fit_power, native_power = (
         float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, engine)
     )
-    return NativeClosure(nominal_power, fit_power, native_power, ON_RUNS if held else ON_STRETCHES)
+    count = sum(left.size for left in before)
+    p_value = float(chdtrc(count, count * nominal_power))
+    return NativeClosure(nominal_power, fit_power, native_power, ON_RUNS if held else ON_STRETCHES, p_value)
 
 
 def _restarted(

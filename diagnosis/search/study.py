@@ -83,6 +83,7 @@ class Study:
         gap: whether there is a gap, and where.
         answers: the answer first, then the most probable ones; empty without a gap.
         refused: by names of refused answers, the effects that no half of the records confirms.
+        needless: effects of the likeliest set that do not reduce the residual on held-out readings.
         rivals: causes weighed from outside the vocabulary.
         disturbed: disturbed runs, which are left out from the disturbance on.
         between_runs: for an unknown cause, the nominal fit to runs that differ; None where they do not.
@@ -96,6 +97,7 @@ class Study:
     gap: Gap
     answers: tuple[Answer, ...] = ()
     refused: Mapping[Names, Names] = field(default_factory=dict)
+    needless: Names = ()
     rivals: tuple[FoundRival, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
     between_runs: Fit | None = None
@@ -189,6 +191,28 @@ class Study:
         key = tuple(sorted(effects))
         return next((answer for answer in self.answers if answer.effects == key), None)
 
+    def of_part(self, names: Names) -> Study:
+        """The study without its answer and the sets that contain it, whose answer is a part of it.
+
+        The others keep their odds. ``unknown`` is the answer where it is more probable than all sets together, or
+        the part was not weighed.
+
+        Args:
+            names: of the part, sorted.
+        """
+        kept = [answer for answer in self.answers if not {*answer.effects} >= {*self.fitted}]
+        unknown = next((answer for answer in kept if answer.effects == UNKNOWN), Answer(UNKNOWN, 1.0, 0.0))
+        part, total = self.of(names), sum(answer.probability for answer in kept) or 1.0
+        least = self.settings.weighing.unknown_from * total
+        known = part is not None and part.hypothesis is not None and unknown.probability < least
+        first = part if part is not None and known else unknown
+        answers = (first, *(answer for answer in kept if answer is not first))
+        return replace(
+            self,
+            answers=tuple(replace(answer, probability=answer.probability / total) for answer in answers),
+            needless=tuple(sorted({*self.needless, *self.fitted} - {*names})),
+        )
+
     @classmethod
     def of_sets(cls, sets: Sets, gap: Gap, clock: Clock) -> Study:
         """The study whose answers are sets; the first of them and its parts are fitted to whole runs.
@@ -207,8 +231,8 @@ class Study:
             prepared,
             gap,
             tuple(answers),
-            sets.refused,
-            sets.rivals,
+            refused=sets.refused,
+            rivals=sets.rivals,
             between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
             caution=sets.view.caution,
             left_by_all=sets.left_by_all,

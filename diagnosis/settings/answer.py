@@ -132,6 +132,20 @@ class AnswerSettings:
         "judgement",
         "An answer that predicts less is fitted to chance.",
     )
+    patch_excused: float = setting(
+        0.001,
+        "Share of the gap that the fit leaves, below which a part of the causes that cannot be written into the "
+        "user's model excuses the patched model.",
+        "judgement",
+        "Simulated joints: a right law leaves 0.0001, a wrong one 0.007 or more.",
+    )
+    left_of_swing: float = setting(
+        0.1,
+        "Maximum root mean square residual of a decided answer, as a share of that of the readings about their "
+        "mean.",
+        "judgement",
+        "A model that misses a tenth of the motion lacks a part of it.",
+    )
     credible_from: float = setting(
         0.9, "Total probability of the stated set of likely answers.", "convention"
     )

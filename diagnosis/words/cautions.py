@@ -95,6 +95,10 @@ CAUTIONS: Mapping[str, Sentence] = {
     "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
     "causes may therefore differ from those of identify, which uses the whole record.",
     "unresolved": _unresolved,
+    "needless": lambda given: (
+        f"{plain(*given['effects']).capitalize()} was fitted and left out of the answer: with it the residual on "
+        "held-out readings is no smaller than without it."
+    ),
     "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (

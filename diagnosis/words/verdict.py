@@ -194,13 +194,29 @@ def undecided_words(document: Document) -> str:
     together = probability(sum(one["probability"] for one in credible))
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
-        said += f"{best} fits best, but does not predict held-out readings. "
-    if document.get("elsewhere"):
-        best, runs = _among_answers(document["elsewhere"]).capitalize(), document["where"]["runs"]
-        named = 0 < len(runs) <= settings_of(document).words.runs_listed
-        look = _runs(runs) if named else "the runs"
-        said += f"{best} fits best, but the residuals point elsewhere: look at {look} there first. "
+        doubts = [DOUBTS[one["kind"]](one["share"]) for one in document["doubts"]]
+        said += f"{best} fits best, but {' and '.join(doubts)}. "
+        if any(one["kind"] == "elsewhere" for one in document["doubts"]):
+            runs = document["where"]["runs"]
+            named = 0 < len(runs) <= settings_of(document).words.runs_listed
+            said += f"Look at {_runs(runs) if named else 'the runs'} there first. "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
+
+
+def _little(explained: float) -> str:
+    return f"explains only {share(explained)}" if explained > 0.0 else "explains nothing"
+
+
+DOUBTS: Mapping[str, Callable[[float], str]] = {
+    "held out": lambda found: f"{_little(found)} of the gap on held-out readings",
+    "ahead": lambda found: (
+        f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
+    ),
+    "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
+    "left": lambda found: f"leaves a residual of {share(found)} of the swing",
+    "elsewhere": lambda _: "the residuals point elsewhere",
+}
+"""Reasons not to decide on the answer that fits best, by kind; each takes the share found."""
 
 
 def _among_answers(effect: str) -> str:

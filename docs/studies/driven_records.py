@@ -272,7 +272,8 @@ The diagnosis: {document["verdict"]}
 Fitted to the first half of the record, the likeliest set predicts the second half from the force alone with a root
 mean square error of {errors[1]:.2f} mm, the nominal model with {errors[0]:.2f} mm; the carriage moves by
 {1e3 * float(np.ptp(run.reading)):.0f} mm. The carriage has no restoring force, so small errors of the force
-accumulate.
+accumulate. The diagnosis decides on no
+cause that predicts no better than the nominal model.
 The validation record used in the literature is not among these data.
 """
 

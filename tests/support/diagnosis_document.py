@@ -101,6 +101,7 @@ def document() -> dict[str, Any]:
         },
         "decided": True,
         "unpredictive": "",
+        "doubts": [],
         "found": found(),
         "ambiguous_with": [RIVAL],
         "next_run": {

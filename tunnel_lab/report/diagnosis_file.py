@@ -163,8 +163,9 @@ class DiagnosisDocument(Document):
         default_factory=dict, description="the facts behind the sentences, each with its kind"
     )
     unpredictive: str = Field(
-        default="", description="the answer, where it is probable and does not predict held-out readings"
+        default="", description="the answer, where it is probable and its predictions leave a doubt"
     )
+    doubts: list[Table] = Field(default_factory=list, description="these doubts: kind and share")
     blind_spots: list[str] = Field(description="what these runs cannot show")
     cautions: list[str] = Field(description="caveats")
     disturbed: list[Table] = Field(

@@ -6,16 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.held_out import one_more
 from diagnosis.answer.trade_off import least_separated, role_in_effect
+from diagnosis.likelihood.residuals import linear_coefficients
 from identification import identify
 from identification.estimate import Estimate
 from identification.printing import SYMBOLS, trade_off_line
-from identification.trade_off import ROLES, Role, Setting, separating, trade_off
+from identification.trade_off import ROLES, Combination, Role, Setting, separating, trade_off
 from tests.reference.free_decays import Setting as Condition
 from tests.reference.free_decays import campaign
 from tests.support.gap_campaigns import campaign as gap_campaign
 from tests.support.gap_campaigns import nominal
-from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.effects import effect_class, effect_from, known_effects
 
 RIG, JOINT, DRIVEN = Setting(springs=True, driven=False), Setting(False, False), Setting(False, True)
 ANY = dict.fromkeys("abcd", Role())
@@ -138,3 +140,38 @@ def test_a_fit_of_a_diagnosis_names_its_pair_and_leaves_out_what_lies_at_a_bound
 def test_a_correlation_is_told_from_one(value, shown):
     found = {"parameters": ["cn_r", "cn_beta"], "correlation": value, "remedy": "do it"}
     assert f"(correlation {shown})" in trade_off_line({"trade_off": found}, SYMBOLS)
+
+
+def test_the_combination_of_least_variance_is_stated_and_the_split_respects_the_bounds_of_both():
+    """ζ + η/2 = 0.0031 ± 0.0001 of a decay, whose loss factor alone is unknown to 0.2."""
+    values, std = np.array([0.0, 0.0062]), 0.2
+    matrix = np.array([[0.25, -0.5], [-0.5, 1.0]]) * std**2 + np.diag([1e-8, 0.0])
+    found = Combination.of("zeta", values, matrix, np.array([[0.0, 1.0], [0.0, 1.0]]), "1")
+    assert found.factor == pytest.approx(0.5)
+    assert found.value == pytest.approx(0.0031)
+    assert found.std == pytest.approx(1e-4)
+    assert found.of_second == pytest.approx((0.0, 0.0031))
+    document = {"parameters": ["mechanical_damping", "structural_damping.loss_factor"], "correlation": -1.0,
+                "remedy": "add runs", "together": vars(found)}  # fmt: skip
+    line = trade_off_line({"trade_off": document}, {"zeta": "ζ", "mechanical_damping": "damping"})
+    assert line.startswith(
+        "What the runs determine: the whole damping ratio, ζ + 0.500 × structural damping (loss factor) = "
+        "0.00310 ± 0.00010; of it structural damping (loss factor) contributes 0 to 0.0031. What trades off: "
+    )
+    assert Combination.of("a", values, np.abs(matrix), np.zeros((2, 2)), "1") is None  # they do not add up
+
+
+def test_a_fit_states_the_combination_of_two_losses_as_a_damping_ratio():
+    data = gap_campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
+    base = nominal(data)
+    whole = one_more(base, effect_class("quadratic_damping"))
+    found = least_separated(whole, data)
+    assert found.parameters == ("mechanical_damping", "quadratic_damping.coefficient")
+    together, places = found.together, [whole.problem.names.index(name) for name in found.parameters]
+    inertia, _, stiffness = linear_coefficients(whole, 0)
+    ratio = 0.5 * whole.point.common[places[0]] / np.sqrt(inertia * stiffness)
+    assert together.quantity == "zeta"
+    assert together.value == pytest.approx(ratio + together.factor * whole.point.common[places[1]])
+    matrix = whole.covariance[np.ix_(places, places)]
+    assert together.std < 0.5 * 0.5 * np.sqrt(matrix[0, 0] / (inertia * stiffness))
+    assert 0.0 <= together.of_second[0] < together.of_second[1] <= together.value

@@ -14,6 +14,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.patch.native_friction import native_friction
 from diagnosis.search.hypothesis import _choices
+from tests.marks import slow
 from tests.reference.robot_joints import LEVEL, MOTOR, NOISE, RATE, TIME, multisine, robot
 from tests.support.gap_campaigns import campaign, nominal
 from tests.support.robots import KINDS, TRUE, near, own_model
@@ -74,8 +75,11 @@ def test_the_patch_adds_what_gravity_adds_and_leaves_out_what_a_drive_does():
 SLIDING, SHARE = 0.1, 0.08
 
 
-def swing(xml: str, start: float, control: Array) -> Array:
-    """Positions of a joint with gravity, rad, whose friction MuJoCo sets before every step to its load."""
+def swing(xml: str, start: float, control: Array, back: float = SHARE, share: float = SHARE) -> Array:
+    """Positions of a joint with gravity, rad, whose friction MuJoCo sets before every step to its load.
+
+    The share of the load differs where the motor drives the joint, and where the joint drives the motor (``back``).
+    """
     model = mujoco.MjModel.from_xml_string(xml)
     data, found = mujoco.MjData(model), np.empty(control.size)
     data.qpos[0] = start
@@ -84,10 +88,25 @@ def swing(xml: str, start: float, control: Array) -> Array:
         for _ in range(round(1.0 / (RATE * model.opt.timestep))):
             data.ctrl[:] = value
             mujoco.mj_forward(model, data)
-            carried = max(abs(float(data.qfrc_bias[0])), abs(float(data.qfrc_actuator[0])))
-            model.dof_frictionloss[0] = SLIDING + SHARE * carried
+            motor = float(data.qfrc_actuator[0])
+            carried = max(abs(float(data.qfrc_bias[0])), abs(motor))
+            model.dof_frictionloss[0] = SLIDING + (share if motor * data.qvel[0] > 0.0 else back) * carried
             mujoco.mj_step(model, data)
     return found
+
+
+def campaign_of(
+    xml: str, *, driven: bool, seed: int = 0, back: float = SHARE, share: float = SHARE
+) -> Campaign:
+    """Two runs of a joint with the friction of `swing`."""
+    runs = []
+    for place, (start, peak) in enumerate([(0.4, 0.3), (0.8, 0.25)]):
+        control = multisine(seed + place, peak) if driven else np.zeros(TIME.size)
+        noise = np.random.default_rng([seed + place, 1]).normal(0.0, NOISE, TIME.size)
+        drive = Drive("drive", control, "zero", None) if driven else None
+        reading = swing(xml, start, control, back, share) + noise
+        runs.append(Run(f"r{place + 1}", Record(TIME, reading), 0.0, drive=drive))
+    return Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))
 
 
 @pytest.mark.parametrize("driven", [False, True])
@@ -97,13 +116,7 @@ def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, dr
     xml = robot(
         f'{TRUE} frictionloss="0.1" solreffriction="0.002 1"', axis=LEVEL, actuators=actuators, tip=0.2
     )
-    runs = []
-    for seed, (start, peak) in enumerate([(0.4, 0.3), (0.8, 0.25)]):
-        control = multisine(seed, peak) if driven else np.zeros(TIME.size)
-        noise = np.random.default_rng([seed, 1]).normal(0.0, NOISE, TIME.size)
-        drive = Drive("drive", control, "zero", None) if driven else None
-        runs.append(Run(f"r{seed + 1}", Record(TIME, swing(xml, start, control) + noise), 0.0, drive=drive))
-    data = Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))
+    data = campaign_of(xml, driven=driven)
     model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, actuators=actuators, tip=0.2))
     answer = diagnose(data, kinds=vocabulary(KINDS), model=model)
     assert answer.causes == ("coulomb_friction",)
@@ -114,3 +127,24 @@ def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, dr
     left_out = "friction against load" in {fact.kind for fact in answer.model.differences}
     assert left_out == driven
     assert left_out or answer.model.closure.native_closed > 0.99
+    assert answer.decision.decided  # though MuJoCo cannot confirm the driven joint
+
+
+@pytest.mark.parametrize(
+    ("seed", "share", "back", "kinds"),
+    [
+        (70, 0.02, 0.3, ("coulomb_friction", "gravity_stiffness")),
+        slow(10, 0.05, 0.25, (*KINDS, "dropped_samples", "cubic_stiffness")),
+        slow(10, 0.05, 0.25, None),
+        slow(30, 0.05, 0.5, None),
+    ],
+)
+def test_friction_that_differs_between_drive_and_back_drive_is_not_decided_as_another_cause(
+    tmp_path: Path, seed: int, share: float, back: float, kinds: tuple[str, ...] | None
+) -> None:
+    """No law of the vocabulary is this one: sets that fit 96 to 99 % move MuJoCo's joint unlike the records."""
+    joint = f'{TRUE} frictionloss="0.1" solreffriction="0.002 1"'
+    data = campaign_of(robot(joint, axis=LEVEL, tip=0.2), driven=True, seed=seed, share=share, back=back)
+    model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, tip=0.2))
+    answer = diagnose(data, kinds=None if kinds is None else vocabulary(kinds), model=model)
+    assert answer.causes == ("unknown",) or not answer.decision.decided

@@ -37,6 +37,8 @@ KNOWN_IN_SEVERAL = {
     "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
     "alike_within": "of random moments of two sources, and of two kinds of one source",
+    "remains_rate": "whether a residual is beyond chance, with the causes or, for a judgement on them, without",
+    "unknown_from": "the rest of the answers are weighed again without a refused one",
     "leak": "wherever channels are compared",
     "common_first": "the sentence states the share",
     "own_number_gain": "wherever an instant or a phase counts",

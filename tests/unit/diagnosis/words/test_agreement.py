@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.facts.decision import decision
+from diagnosis.facts.decision import Predictions, decision
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.words.sections import place_rows
@@ -38,7 +38,7 @@ def answered(
     one["found"] |= {"place": place, "both_winds": True}
     one["where"] |= {"channel": channel, "condition": condition}
     answers = [(" + ".join(names), probability), ("unknown", 1.0 - probability)]
-    decided = decision(answers, Settings().answer, elsewhere=against.elsewhere).to_json_dict()
+    decided = decision(answers, Settings().answer, Predictions(elsewhere=against.elsewhere)).to_json_dict()
     one["candidates"] = [{"effect": name, "probability": value, "parameters": {}} for name, value in answers]
     return one | {"causes": list(names), "ambiguous_with": []} | decided
 
@@ -71,14 +71,15 @@ def test_no_place_contradicts_decided_causes() -> None:
 
 def test_causes_that_do_not_agree_with_the_place_are_undecided_between_them_and_a_look_at_the_runs() -> None:
     one = answered(("cubic_stiffness",), "forcing", "blow", "always", 0.97)
-    assert (one["decided"], one["elsewhere"]) == (False, "cubic_stiffness")
+    assert (one["decided"], one["unpredictive"]) == (False, "cubic_stiffness")
+    assert [doubt["kind"] for doubt in one["doubts"]] == ["elsewhere"]
     assert headline(one) == ("Undecided: cubic stiffness, and more", "open")
     said = verdict(one, "")
     assert "explain the gap" not in said
-    assert "Cubic stiffness fits best, but the residuals point elsewhere: look at runs " in said
+    assert "Cubic stiffness fits best, but the residuals point elsewhere. Look at runs " in said
     assert "Do not repair the rig on this answer" in " ".join(next_steps(one))
     agreed = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always", 0.97)
-    assert (agreed["decided"], agreed["elsewhere"]) == (True, "")
+    assert (agreed["decided"], agreed["doubts"]) == (True, [])
 
 
 @pytest.mark.parametrize("reason", ["frequency along the decay", "damping along the decay"])

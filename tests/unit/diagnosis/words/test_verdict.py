@@ -10,7 +10,7 @@ import pytest
 from diagnosis.answer.judgements import immaterial, nearly
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Step, Waterfall
-from diagnosis.facts.decision import decision
+from diagnosis.facts.decision import Predictions, decision
 from diagnosis.facts.found import Nearly
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
@@ -219,16 +219,31 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
     assert decision((("none", 0.999), ("unknown", 0.001)), Settings().answer).credible == (("none", 0.999),)
 
 
-@pytest.mark.parametrize(("closed", "decided"), [(0.0, False), (0.09, False), (0.2, True), (None, True)])
-def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
+@pytest.mark.parametrize(
+    ("predictions", "doubt"),
+    [
+        (Predictions(held_out=0.0), "explains nothing of the gap on held-out readings"),
+        (Predictions(held_out=0.09), "explains only 9.0 % of the gap on held-out readings"),
+        (Predictions(held_out=0.98, ahead=0.0), "explains nothing of the gap in the later half of the runs"),
+        (
+            Predictions(held_out=0.98, patched=0.02),
+            "explains only 2.0 % of the gap when written into the model",
+        ),
+        (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing"),
+        (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09), ""),
+        (Predictions(), ""),
+    ],
+)
+def test_an_answer_that_predicts_nothing_is_undecided(predictions, doubt):
     answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
-    found = decision(answers, Settings().answer, closed)
-    assert found.decided is decided
-    said_so = "Free play fits best, but does not predict held-out readings." in undecided_words(
-        found.to_json_dict()
-    )
-    assert said_so is not decided
-    assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, 0.0).decided
+    found = decision(answers, Settings().answer, predictions)
+    assert found.decided is not bool(doubt)
+    assert bool(found.unpredictive) is bool(doubt)
+    assert [name for name, _ in found.credible] == ["free_play", "coulomb_friction"]
+    words = undecided_words(found.to_json_dict())
+    assert ("Free play fits best, but" in words) is bool(doubt)
+    assert doubt in words
+    assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, predictions).decided
 
 
 def test_an_undecided_answer_is_undecided_on_every_page():
