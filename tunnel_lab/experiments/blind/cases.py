@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from diagnosis.facts.decision import Decision, decision
+from diagnosis.facts.decision import Decision, Predictions, decision
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
 from diagnosis.words.scatter import SCATTERS
@@ -239,9 +239,11 @@ class Case:
     def decision(self) -> Decision | None:
         """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
         answers = [(c["effect"], float(c["probability"])) for c in self.answer.get("candidates", ())]
-        closed = (self.answer.get("gap") or {}).get("closed")
-        chosen = settings_of(self.answer).answer
-        return decision(answers, chosen, closed) if answers else None
+        if not answers:
+            return None
+        held_out = Predictions(held_out=(self.answer.get("gap") or {}).get("closed"))
+        found = decision(answers, settings_of(self.answer).answer, held_out)
+        return replace(found, decided=found.decided and not self.answer.get("doubts"))
 
     @property
     def stated_wrongly(self) -> bool:
