@@ -39,6 +39,7 @@ _FALLING = 0.75  # share of swings smaller than the one before: half of them at 
 _GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped the body
 _CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
 _OVER = 0.3  # of the expected swing: what follows is not the same motion
+_UNSETTLED = 0.2  # of the swings after a release, in which another motion may die out
 _DIED_OUT = 0.1  # of the largest swing
 _OTHER = 1.5  # ratio of half periods: the motion of something else
 _SMALL = 0.2  # of the swing of the longest run
@@ -156,6 +157,8 @@ def _decays(swings: Swings) -> list[_Decay]:
         breaks.insert(0, (0, 0) if swings.begins_late else (-1, 0))
     found = []
     for (hand, start), until in zip(breaks, [*(k for k, _ in breaks[1:]), count], strict=True):
+        if hand >= 0:
+            start += _settled(swings, start, until)
         sizes = size[start:until]
         if not sizes.size:
             continue
@@ -164,6 +167,15 @@ def _decays(swings: Swings) -> list[_Decay]:
         if moving >= _LEAST_HALVES and _is_decay(sizes[:moving], sizes, swings, start):
             found.append(_Decay(hand, start, moving, until))
     return found
+
+
+def _settled(swings: Swings, start: int, until: int) -> int:
+    """The number of swings until a motion of something else has died out, on which a longer one remains."""
+    sizes, slow = swings.size[start:until], swings.slow[start:until]
+    later = np.maximum.accumulate(sizes[::-1])[::-1]
+    even = np.flatnonzero((later[1:] <= _STILL_GROWING * swings.sampled * sizes[:-1]) & ~slow[:-1])
+    first = int(even[0]) if even.size else 0
+    return first if first <= _UNSETTLED * sizes.size else 0
 
 
 def _release_at(swings: Swings, k: int, since: int) -> int | None:
@@ -229,7 +241,8 @@ def _piece(
         # From the first sample of the largest reading, or from the last one of a hold.
         turn, size = int(turns[0]), 0.5 * float(swings.size[decay.start])
         part = slice(int(swings.reached[decay.start]), int(swings.left[decay.start]) + 1)
-        near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= _AT_TURN * size)
+        most = max(_AT_TURN * size, swings.least)
+        near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= most)
         still = near.size and time_s[near[-1]] - time_s[near[0]] > _HELD * usual
         first = max(turn, int(near[-1])) if still else turn
         free = free_from(time_s, reading, first, turns[1:], noise)
