@@ -201,7 +201,7 @@ _BESIDE = 2  # points of the spectrum on either side, which belong to the same p
 
 
 def _strongest_decay(record: Record, found: float) -> float:
-    """The frequency of the decaying sinusoid that explains most of a record, Hz; ``found`` itself unless clearly more.
+    """The frequency of the decaying sinusoid that explains clearly more of a record than another one, Hz.
 
     A decay that is over long before the record ends is weak in the spectrum of the whole record, in which the drift
     of the centre and slow leakage are strong. Each decay rate therefore has its own spectrum: the record times that
@@ -209,7 +209,7 @@ def _strongest_decay(record: Record, found: float) -> float:
     at each frequency, for several rates.
 
     Args:
-        found: the highest peak of the spectrum of block means, Hz; 0: none.
+        found: the other one, which is returned otherwise: the highest peak of the spectrum of block means; 0: none.
     """
     values, rate = record.yaw_rad - record.yaw_rad.mean(), record.sample_rate
     best, strongest, known = found, 0.0, 0.0

@@ -101,7 +101,9 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         moved, order = _out_of_order(time), np.argsort(time, kind="stable")
         if moved > _FEW * time.size and not _of_one_run(time[order], reading[order]):
             what = f"the times of {moved} of {counted(time.size, 'row')} are out of order"
-            remedy = "sort the rows if they are one run; write each run into a file of its own if they are several"
+            remedy = (
+                "sort the rows if they are one run; write each run into a file of its own if they are several"
+            )
             raise TunnelError(what, remedy=remedy)
         rows, time, reading = rows[order], time[order], reading[order]
         remarks.append("rows out of order sorted by time")

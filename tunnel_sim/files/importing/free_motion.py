@@ -19,9 +19,7 @@ _CLEARLY = 2.0  # times that: below it nothing is left out
 _OF_SWING = 0.01  # of the amplitude: slight nonlinearities change a half cycle by less
 
 
-def free_from(
-    time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float
-) -> int:
+def free_from(time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float) -> int:
     """The first sample from which on the motion is free; ``first`` itself, or later.
 
     A free decay is fitted to the half cycles after the first extreme that is certainly free, and extended back.
@@ -36,9 +34,7 @@ def free_from(
     return _from(time_s, reading, first, turns, noise)
 
 
-def free_until(
-    time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float
-) -> int:
+def free_until(time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float) -> int:
     """The index after the last sample of a free motion that something ends; ``last`` itself, or earlier.
 
     Args:
@@ -107,4 +103,6 @@ class _Fit:
 
 def _rows(time: Array, rates: Array) -> Array:
     fading = np.exp(-rates[0] * time)
-    return np.column_stack([np.ones_like(time), fading * np.cos(rates[1] * time), fading * np.sin(rates[1] * time)])
+    return np.column_stack(
+        [np.ones_like(time), fading * np.cos(rates[1] * time), fading * np.sin(rates[1] * time)]
+    )

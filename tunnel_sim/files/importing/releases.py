@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -40,6 +41,7 @@ _GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped 
 _CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
 _OVER = 0.3  # of the expected swing: what follows is not the same motion
 _UNSETTLED = 0.2  # of the swings after a release, in which another motion may die out
+_LITTLE = 0.3  # of the first swing: a random moment may make smaller ones grow again
 _DIED_OUT = 0.1  # of the largest swing
 _OTHER = 1.5  # ratio of half periods: the motion of something else
 _SMALL = 0.2  # of the swing of the longest run
@@ -130,7 +132,9 @@ class _Decay:
                 break
             if self.start + k == until < size.size and not rests and size[until] < _GROWN * expected:
                 sizes[k] = size[until]  # something was seen there, and the motion goes on
-            ends_here = sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            ends_here = (
+                sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            )
             if ends_here and expected > _GOING_ON * sizes[k - 1]:
                 return self.start + k
         return None
@@ -175,7 +179,8 @@ def _settled(swings: Swings, start: int, until: int) -> int:
     later = np.maximum.accumulate(sizes[::-1])[::-1]
     even = np.flatnonzero((later[1:] <= _STILL_GROWING * swings.sampled * sizes[:-1]) & ~slow[:-1])
     first = int(even[0]) if even.size else 0
-    return first if first <= _UNSETTLED * sizes.size else 0
+    grown = first == 0 or sizes[first] > sizes[:first].max()
+    return 0 if grown or first > _UNSETTLED * sizes.size else first
 
 
 def _release_at(swings: Swings, k: int, since: int) -> int | None:
@@ -221,11 +226,13 @@ def _bend(sizes: PerSample) -> float:
 
 
 def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -> bool:
-    """Whether swings decay evenly, and none after them is larger than the first one."""
+    """Whether swings decay evenly, and none after them is larger than the first one, or grows much again."""
     first = max(moving[:2]) if start == 0 else moving[0]
+    regrown = sizes > _GROWN * swings.sampled * np.minimum.accumulate(sizes)
     return bool(
         sizes.max() <= _STILL_GROWING * swings.sampled * first
         and first > _VISIBLE * swings.least
+        and (start == 0 or not (regrown & (sizes > _LITTLE * first)).any())
         and _bend(moving) <= _ROUGH + swings.least / np.median(moving)
     )
 
@@ -316,7 +323,9 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
     drift = noise * sqrt(float(time_s[-1] - time_s[0]) * float(np.median(np.diff(time_s))))  # of summed noise
     found = []
     for piece in find_runs(time_s, angle, drift):
-        let_go = piece.first if piece.first == 0 else _let_go(angle, piece, max(_NOISES * noise_of(angle), drift))
+        let_go = (
+            piece.first if piece.first == 0 else _let_go(angle, piece, max(_NOISES * noise_of(angle), drift))
+        )
         inside = np.flatnonzero((ends > let_go) & (starts < piece.last))
         peaks = np.array([np.abs(rate[starts[i] : ends[i]]).max() for i in inside])
         if piece.first == 0 or peaks.size < _LEAST_HALVES:
@@ -337,9 +346,7 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
     away, starts, ends = centred
     tops = [int(a) + int(np.argmax(np.abs(away[a:b]))) for a, b in zip(starts, ends, strict=True)]
     tops = [top for top, end in zip(tops, ends, strict=True) if end > piece.first]
-    growing = (
-        abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in zip(tops, tops[1:], strict=False)
-    )
+    growing = (abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in pairwise(tops))
     free = next((k for k, grows in enumerate(growing) if not grows), 0)
     return max(piece.first, tops[free]) if tops else piece.first
 
