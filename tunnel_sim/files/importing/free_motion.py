@@ -93,7 +93,7 @@ class _Fit:
             rates = rates + step
             if np.abs(step).max() <= _SETTLED * rates[1]:
                 break
-        return cls(rates, np.linalg.lstsq(_rows(time, rates), values, rcond=None)[0])
+        return cls(rates, np.asarray(np.linalg.lstsq(_rows(time, rates), values, rcond=None)[0]))
 
     def at(self, time: Array) -> Array:
         """The reading of the decay."""
