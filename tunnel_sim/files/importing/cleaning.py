@@ -70,7 +70,7 @@ def restarts(time: Times) -> list[int]:
     early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
     if not early and not _interleaved(clock, starts):
         return []
-    return known[back].tolist()
+    return [int(place) for place in known[back]]
 
 
 def _interleaved(clock: Times, starts: Sequence[int]) -> bool:

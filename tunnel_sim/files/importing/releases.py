@@ -222,7 +222,7 @@ def _random_before(swings: Swings, k: int) -> float:
 
 def _bend(sizes: PerSample) -> float:
     """The median second difference of the logarithms of successive swings: 0 for an exponential decay."""
-    return float(np.median(np.abs(np.diff(np.log(sizes), 2))))
+    return float(np.median(np.abs(np.diff(np.log(np.maximum(sizes, 1e-300)), 2))))
 
 
 def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -> bool:
@@ -233,7 +233,7 @@ def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -
         sizes.max() <= _STILL_GROWING * swings.sampled * first
         and first > _VISIBLE * swings.least
         and (start == 0 or not (regrown & (sizes > _LITTLE * first)).any())
-        and _bend(moving) <= _ROUGH + swings.least / np.median(moving)
+        and _bend(moving) <= _ROUGH + swings.least / max(float(np.median(moving)), swings.least)
     )
 
 
