@@ -210,10 +210,58 @@ def _find_frequency(record: Record) -> float | None:
         return None
     # A block mean hides an oscillation of at most two samples per cycle: a record of some two thousand cycles.
     factor = max(1, record.time_s.size // _LONG)
+    thin = record
     if factor > 1:
-        record = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
-    frequency, _ = _spectral_peak(record, padding=8 if factor == 1 else 1, falling=True)
-    return None if frequency == 0.0 else frequency
+        thin = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
+    frequency, _ = _spectral_peak(thin, padding=8 if factor == 1 else 1, falling=True)
+    return _strongest_decay(evenly_spaced(record, bridged=False), frequency) or None
+
+
+_SHORTEST = 64  # samples of the shortest decay that is compared
+_FALLS = 4.0  # decay rate times duration: to 2 % of the first swing
+_SHORTER = 4  # ratio of successive durations: the best one is at most twice as long or short as the decay
+_CLEARLY = 2.0  # times the energy of the frequency found first: noise and leakage do not make up as much
+_LOWEST = 2.0  # cycles of a decay: below them is the drift of its centre
+_BESIDE = 2  # points of the spectrum on either side, which belong to the same peak
+
+
+def _strongest_decay(record: Record, found: float) -> float:
+    """The frequency of the decaying sinusoid that explains clearly more of a record than another one, Hz.
+
+    A decay that is over long before the record ends is weak in the spectrum of the whole record, in which the drift
+    of the centre and slow leakage are strong. Each decay rate therefore has its own spectrum: the record times that
+    decay, which is the matched filter, without the parabola of the centre. It is the least-squares fit of one decay
+    at each frequency, for several rates.
+
+    Args:
+        found: the other one, which is returned otherwise: the highest peak of the spectrum of block means; 0: none.
+    """
+    values, rate = record.yaw_rad - record.yaw_rad.mean(), record.sample_rate
+    best, strongest, known = found, 0.0, 0.0
+    size, falls = values.size, 0.0
+    while size >= _SHORTEST or falls == 0.0:
+        window = np.exp(-falls * np.arange(size) / size)
+        series = _without_parabola(values[:size], window) * window
+        padded = next_fast_len(size, real=True)
+        lowest = max(1, int(np.ceil(_LOWEST * max(1.0, falls / 2.0) * padded / size)))
+        if lowest + 2 < padded // 2:
+            place, power = highest_peak(series, padded, lowest)
+            power = power * 2.0 / float(window @ window)
+            bins = round(found * padded / rate)
+            near = power[max(lowest, bins - _BESIDE) : bins + _BESIDE + 1]
+            known = max(known, float(near.max(initial=0.0)))
+            if (energy := float(power[round(place)])) > strongest:
+                best, strongest = place * rate / padded, energy
+        size, falls = (size, _FALLS) if falls == 0.0 else (size // _SHORTER, _FALLS)
+    return best if strongest > _CLEARLY * known else found
+
+
+def _without_parabola(values: Array, weights: Array) -> Array:
+    """Values less their weighted least-squares parabola."""
+    place = np.linspace(-1.0, 1.0, values.size)
+    columns = np.stack([np.ones_like(place), place, place**2])
+    weighted = columns * weights**2
+    return np.asarray(values - np.linalg.solve(weighted @ columns.T, weighted @ values) @ columns)
 
 
 def thinned_reading(record: Record, frequency: float) -> Reading:

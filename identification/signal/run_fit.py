@@ -283,7 +283,9 @@ def _departing_windows(
         The windows, of single cycles where the run has few others; none where one oscillation describes the motion,
         or where frequencies differ along the run, and from its own, by no more than such a scatter.
     """
-    missed = max(float(np.mean(fitted.residual**2)) - noise.std**2, 0.0)
+    # Slower than a cycle, the residual is a drift of the centre, by which the fit does not lose step.
+    residual = fitted.residual - _mean_over_a_cycle(fitted.residual, reading, fitted.decay)
+    missed = max(float(np.mean(residual**2)) - noise.std**2, 0.0)
     if missed <= GROSS_MISFIT * float(np.var(reading.yaw)):
         return ()
     if len(windows) < _LEAST_TO_SEE_CHANGE:
@@ -296,6 +298,18 @@ def _departing_windows(
     along = abs(found[-1] - found[0]) / np.sqrt(2.0 * variance)
     away = abs(found.mean() - omega_n.value) / np.sqrt(variance / found.size + omega_n.std**2)
     return windows if max(along, away) > MISFIT_DEVIATIONS else ()
+
+
+def _mean_over_a_cycle(residual: Array, reading: Reading, decay: Decay) -> Array:
+    """The running mean of a residual over about one cycle, shape (n,), rad; zero where a cycle has few samples."""
+    step = float(reading.time[-1]) / (reading.time.size - 1)
+    size = round(2.0 * np.pi / max(decay.omega_d * step, 2.0 * np.pi / residual.size))
+    if not 2 <= size < residual.size // 2:
+        return np.zeros_like(residual)
+    total = np.concatenate([[0.0], np.cumsum(residual)])
+    place = np.arange(residual.size)
+    first, last = np.maximum(place - size // 2, 0), np.minimum(place - size // 2 + size, residual.size)
+    return np.asarray((total[last] - total[first]) / (last - first))
 
 
 def _spanning(value: Quantity, windows: Sequence[Quantity]) -> Quantity:

@@ -57,7 +57,13 @@ class Log:
         return self
 
     def swing(
-        self, amplitude: float, seconds: float, *, phase: float = 0.0, frequency: float = 0.0, zeta: float = 0.0
+        self,
+        amplitude: float,
+        seconds: float,
+        *,
+        phase: float = 0.0,
+        frequency: float = 0.0,
+        zeta: float = 0.0,
     ) -> Log:
         """A free decay; by another frequency and damping it is that of something else and not counted."""
         clock = self._clock(seconds)
@@ -80,7 +86,13 @@ class Log:
         return self._add(np.exp(-self.zeta * omega * clock) * swing)
 
     def reading(
-        self, noise: float = 1e-4, seed: int = 1, *, step: float = 0.0, limit: float = np.inf, zero: float = 0.0,
+        self,
+        noise: float = 1e-4,
+        seed: int = 1,
+        *,
+        step: float = 0.0,
+        limit: float = np.inf,
+        zero: float = 0.0,
         drift: float = 0.0,
     ) -> tuple[Array, Array]:
         """Times and readings: white noise, a sensor's step and limits, its zero and the drift of the centre."""

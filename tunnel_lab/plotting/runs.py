@@ -307,7 +307,7 @@ def import_picture(imported: Imported) -> bytes:
         axes.remove()
     more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
     picture.suptitle(
-        figure_text(f"{imported.campaign.name}\nruns in colour, samples that are left out in grey, doubtful ones shaded{more}"),
+        figure_text(f"{imported.campaign.name}\nruns in colour, others in grey, doubtful ones shaded{more}"),
         fontsize=9,
     )
     stream = io.BytesIO()

@@ -70,7 +70,7 @@ def restarts(time: Times) -> list[int]:
     early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
     if not early and not _interleaved(clock, starts):
         return []
-    return known[back].tolist()
+    return [int(place) for place in known[back]]
 
 
 def _interleaved(clock: Times, starts: Sequence[int]) -> bool:
@@ -101,7 +101,9 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         moved, order = _out_of_order(time), np.argsort(time, kind="stable")
         if moved > _FEW * time.size and not _of_one_run(time[order], reading[order]):
             what = f"the times of {moved} of {counted(time.size, 'row')} are out of order"
-            remedy = "sort the rows if they are one run; write each run into a file of its own if they are several"
+            remedy = (
+                "sort the rows if they are one run; write each run into a file of its own if they are several"
+            )
             raise TunnelError(what, remedy=remedy)
         rows, time, reading = rows[order], time[order], reading[order]
         remarks.append("rows out of order sorted by time")

@@ -12,6 +12,7 @@ _HALVES = 7  # half cycles to which the model is fitted
 _LEAST = 5  # extremes
 _SAMPLES = 300
 _STEPS = 12
+_MOST = 300.0  # exponent: a model that grows further is not extended
 _SETTLED = 1e-9
 _NOISES = 6.0  # standard deviations that a sample of a free motion does not exceed
 _ERRORS = 3.0  # times the error half a cycle later: a nonlinearity grows with the swing
@@ -19,9 +20,7 @@ _CLEARLY = 2.0  # times that: below it nothing is left out
 _OF_SWING = 0.01  # of the amplitude: slight nonlinearities change a half cycle by less
 
 
-def free_from(
-    time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float
-) -> int:
+def free_from(time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float) -> int:
     """The first sample from which on the motion is free; ``first`` itself, or later.
 
     A free decay is fitted to the half cycles after the first extreme that is certainly free, and extended back.
@@ -36,9 +35,7 @@ def free_from(
     return _from(time_s, reading, first, turns, noise)
 
 
-def free_until(
-    time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float
-) -> int:
+def free_until(time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float) -> int:
     """The index after the last sample of a free motion that something ends; ``last`` itself, or earlier.
 
     Args:
@@ -86,25 +83,31 @@ class _Fit:
         rates = np.array([0.0, np.pi * halves_per_s])  # decay rate and angular frequency
         for _ in range(_STEPS):
             rows = _rows(time, rates)
+            if not np.isfinite(rows).all():
+                return None
             state = np.linalg.lstsq(rows, values, rcond=None)[0]
-            residual = values - rows @ state
             motion = rows[:, 1:] @ state[1:]
             turned = rows[:, 1] * state[2] - rows[:, 2] * state[1]
             tangent = np.column_stack([rows, -time * motion, time * turned])
-            step = np.linalg.lstsq(tangent, residual, rcond=None)[0][3:]
-            if not np.isfinite(step).all() or abs(step[1]) > 0.5 * rates[1]:
+            step = np.linalg.lstsq(tangent, values - rows @ state, rcond=None)[0][3:]
+            if not np.isfinite(step).all() or np.abs(step).max() > 0.5 * rates[1]:
                 return None
             rates = rates + step
             if np.abs(step).max() <= _SETTLED * rates[1]:
                 break
-        return cls(rates, np.linalg.lstsq(_rows(time, rates), values, rcond=None)[0])
+        rows = _rows(time, rates)
+        if not np.isfinite(rows).all():
+            return None
+        return cls(rates, np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0]))
 
     def at(self, time: Array) -> Array:
         """The reading of the decay."""
-        with np.errstate(over="ignore"):
-            return np.asarray(_rows(time, self.rates) @ self.state)
+        return np.asarray(_rows(time, self.rates) @ self.state)
 
 
 def _rows(time: Array, rates: Array) -> Array:
-    fading = np.exp(-rates[0] * time)
-    return np.column_stack([np.ones_like(time), fading * np.cos(rates[1] * time), fading * np.sin(rates[1] * time)])
+    with np.errstate(over="ignore"):
+        fading = np.exp(np.minimum(-rates[0] * time, _MOST))
+    return np.column_stack(
+        [np.ones_like(time), fading * np.cos(rates[1] * time), fading * np.sin(rates[1] * time)]
+    )

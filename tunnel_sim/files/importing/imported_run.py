@@ -120,9 +120,7 @@ def imported_run(
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
 
 
-def _on_the_cut(
-    raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readings, unit: str
-) -> list[str]:
+def _on_the_cut(raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readings, unit: str) -> list[str]:
     """Remarks on the first and the last sample of a run, and on peaks that its sensor cuts off."""
     remarks = []
     if piece.first:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -39,6 +40,8 @@ _FALLING = 0.75  # share of swings smaller than the one before: half of them at 
 _GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped the body
 _CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
 _OVER = 0.3  # of the expected swing: what follows is not the same motion
+_UNSETTLED = 0.2  # of the swings after a release, in which another motion may die out
+_LITTLE = 0.3  # of the first swing: a random moment may make smaller ones grow again
 _DIED_OUT = 0.1  # of the largest swing
 _OTHER = 1.5  # ratio of half periods: the motion of something else
 _SMALL = 0.2  # of the swing of the longest run
@@ -129,7 +132,9 @@ class _Decay:
                 break
             if self.start + k == until < size.size and not rests and size[until] < _GROWN * expected:
                 sizes[k] = size[until]  # something was seen there, and the motion goes on
-            ends_here = sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            ends_here = (
+                sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
+            )
             if ends_here and expected > _GOING_ON * sizes[k - 1]:
                 return self.start + k
         return None
@@ -156,6 +161,8 @@ def _decays(swings: Swings) -> list[_Decay]:
         breaks.insert(0, (0, 0) if swings.begins_late else (-1, 0))
     found = []
     for (hand, start), until in zip(breaks, [*(k for k, _ in breaks[1:]), count], strict=True):
+        if hand >= 0:
+            start += _settled(swings, start, until)
         sizes = size[start:until]
         if not sizes.size:
             continue
@@ -164,6 +171,16 @@ def _decays(swings: Swings) -> list[_Decay]:
         if moving >= _LEAST_HALVES and _is_decay(sizes[:moving], sizes, swings, start):
             found.append(_Decay(hand, start, moving, until))
     return found
+
+
+def _settled(swings: Swings, start: int, until: int) -> int:
+    """The number of swings until a motion of something else has died out, on which a longer one remains."""
+    sizes, slow = swings.size[start:until], swings.slow[start:until]
+    later = np.maximum.accumulate(sizes[::-1])[::-1]
+    even = np.flatnonzero((later[1:] <= _STILL_GROWING * swings.sampled * sizes[:-1]) & ~slow[:-1])
+    first = int(even[0]) if even.size else 0
+    grown = first == 0 or sizes[first] > sizes[:first].max()
+    return 0 if grown or first > _UNSETTLED * sizes.size else first
 
 
 def _release_at(swings: Swings, k: int, since: int) -> int | None:
@@ -205,16 +222,18 @@ def _random_before(swings: Swings, k: int) -> float:
 
 def _bend(sizes: PerSample) -> float:
     """The median second difference of the logarithms of successive swings: 0 for an exponential decay."""
-    return float(np.median(np.abs(np.diff(np.log(sizes), 2))))
+    return float(np.median(np.abs(np.diff(np.log(np.maximum(sizes, 1e-300)), 2))))
 
 
 def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -> bool:
-    """Whether swings decay evenly, and none after them is larger than the first one."""
+    """Whether swings decay evenly, and none after them is larger than the first one, or grows much again."""
     first = max(moving[:2]) if start == 0 else moving[0]
+    regrown = sizes > _GROWN * swings.sampled * np.minimum.accumulate(sizes)
     return bool(
         sizes.max() <= _STILL_GROWING * swings.sampled * first
         and first > _VISIBLE * swings.least
-        and _bend(moving) <= _ROUGH + swings.least / np.median(moving)
+        and (start == 0 or not (regrown & (sizes > _LITTLE * first)).any())
+        and _bend(moving) <= _ROUGH + swings.least / max(float(np.median(moving)), swings.least)
     )
 
 
@@ -229,7 +248,8 @@ def _piece(
         # From the first sample of the largest reading, or from the last one of a hold.
         turn, size = int(turns[0]), 0.5 * float(swings.size[decay.start])
         part = slice(int(swings.reached[decay.start]), int(swings.left[decay.start]) + 1)
-        near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= _AT_TURN * size)
+        most = max(_AT_TURN * size, swings.least)
+        near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= most)
         still = near.size and time_s[near[-1]] - time_s[near[0]] > _HELD * usual
         first = max(turn, int(near[-1])) if still else turn
         free = free_from(time_s, reading, first, turns[1:], noise)
@@ -303,7 +323,9 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
     drift = noise * sqrt(float(time_s[-1] - time_s[0]) * float(np.median(np.diff(time_s))))  # of summed noise
     found = []
     for piece in find_runs(time_s, angle, drift):
-        let_go = piece.first if piece.first == 0 else _let_go(angle, piece, max(_NOISES * noise_of(angle), drift))
+        let_go = (
+            piece.first if piece.first == 0 else _let_go(angle, piece, max(_NOISES * noise_of(angle), drift))
+        )
         inside = np.flatnonzero((ends > let_go) & (starts < piece.last))
         peaks = np.array([np.abs(rate[starts[i] : ends[i]]).max() for i in inside])
         if piece.first == 0 or peaks.size < _LEAST_HALVES:
@@ -324,9 +346,7 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
     away, starts, ends = centred
     tops = [int(a) + int(np.argmax(np.abs(away[a:b]))) for a, b in zip(starts, ends, strict=True)]
     tops = [top for top, end in zip(tops, ends, strict=True) if end > piece.first]
-    growing = (
-        abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in zip(tops, tops[1:], strict=False)
-    )
+    growing = (abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in pairwise(tops))
     free = next((k for k, grows in enumerate(growing) if not grows), 0)
     return max(piece.first, tops[free]) if tops else piece.first
 

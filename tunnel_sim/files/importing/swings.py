@@ -18,6 +18,8 @@ from tunnel_sim.vocabulary.record import Array
 _NOISE_OF = 200_000  # samples for the estimate of the noise
 _STRETCH = 64  # samples whose mean fourth difference is one estimate of it
 _NOISES = 6.0  # standard deviations: white noise returns by as much in one of 1e4 half cycles
+_ROUNDING = 1e-12  # of the range: rounding alone
+_TINY = 1e-200  # s, or the unit of the reading: below it quotients overflow
 _LEVELS = 1.5  # steps of a sensor that rounds: its last digit toggles
 _STEPPED = 0.2  # share of unchanged readings, from which a sensor rounds
 _SHARE = 0.1  # of the range near an extreme: a smaller return is a ripple on the swing
@@ -93,13 +95,15 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
         drift: greatest drift of its centre, in the unit of the reading.
     """
     noise, step = noise_of(reading), float(np.median(np.diff(time_s)))
-    usual = half / step if step > 0.0 else 0.0
     span = float(np.ptp(reading))
-    wanted = ceil((_NOISES * noise / (_FINE_ENOUGH * span)) ** 2) if span > 0.0 else 1
+    if not (step > _TINY and span > _TINY):
+        return None
+    usual = min(half / step, float(reading.size))
+    wanted = ceil((_NOISES * noise / (_FINE_ENOUGH * span)) ** 2)
     block = int(max(1, usual / _FINE, min(wanted, usual / _COARSE)))
     count = reading.size // block
     means = reading[: count * block].reshape(count, block).mean(axis=1)
-    least = max(_NOISES * noise / sqrt(block), _LEVELS * _level(reading), drift)
+    least = max(_NOISES * noise / sqrt(block), _LEVELS * _level(reading), drift, _ROUNDING * span)
     turns = _turns(means, np.maximum(least, _SHARE * _ranges(means, max(3, int(usual / block)))))
     if turns.size < 3:
         return None
@@ -109,13 +113,14 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
     size, lasts = np.abs(np.diff(reading[at])), np.diff(clock[at])
     padded = np.concatenate([lasts, np.full(_AHEAD - 1, np.nan)])
     ahead = np.nanmedian(np.lib.stride_tricks.sliding_window_view(padded, _AHEAD), axis=1)
+    ahead = np.maximum(ahead, step)
     across = clock[reached[1:]] - clock[left[:-1]]
     slack = 2.0 * block * step  # the ends of a swing are known to a block
     stays = clock[left] - clock[reached]
     held = stays > _HELD * np.append(ahead, ahead[-1]) + slack
     slow = across > _SLOW * _USUAL_ACROSS * ahead + slack
     if not held[0] and size.size > 1:  # the record may begin within a swing, of which a sinusoid needs a part
-        part = np.arccos(1.0 - 2.0 * min(1.0, size[0] / size[1])) / np.pi
+        part = np.arccos(1.0 - 2.0 * min(1.0, size[0] / max(size[1], least))) / np.pi
         slow[0] |= lasts[0] > _SLOWER * part * ahead[0] + block * step
     return Swings(
         at=at,

@@ -13,11 +13,12 @@ import pytest
 
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.cleaning import cleaned, from_zero, resolution, restarts
+from tunnel_sim.files.importing.cleaning import cleaned, clipped, from_zero, resolution, restarts
 from tunnel_sim.files.importing.column_numbers import without_overflow
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -201,6 +202,85 @@ def test_a_clock_that_starts_anew_begins_another_run(tmp_path: Path) -> None:
     np.testing.assert_allclose(runs[0].record.yaw_rad, angle, atol=1e-8)
     shuffled = np.random.default_rng(1).permutation(time)
     assert restarts(shuffled) == []
+
+
+BETWEEN = {
+    "blank line": "\n",
+    "repeated heading": "time_s,yaw_rad\n",
+    "boot lines": "Boot v1.2\nIMU ok\ntime_s,yaw_rad\n",
+    "comment": "# second run\n",
+    "row of nan": "nan,nan\n",
+    "heading with numbers": "Samples,3000\nX0,0.0E+0\ntime_s,yaw_rad\n",
+    "missing reading": "0.0,\n",
+    "half a row": ",0.35\n",
+}
+
+
+@pytest.mark.parametrize("row", BETWEEN)
+def test_a_row_that_is_not_a_number_does_not_hide_another_run(tmp_path: Path, row: str) -> None:
+    """Three runs of different lengths and damping, each from zero on by the clock."""
+    lengths = (8.0, 5.0, 11.0)
+    texts = [
+        "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(*decay(seed, duration=length), strict=True))
+        for seed, length in enumerate(lengths)
+    ]
+    path = written(tmp_path, "log.csv", "time_s,yaw_rad\n" + BETWEEN[row].join(texts))
+    runs = read_records([path]).campaign.runs
+    assert [run.record.duration for run in runs] == pytest.approx(lengths, abs=0.02)
+    for seed, (run, length) in enumerate(zip(runs, lengths, strict=True)):
+        angle = decay(seed, duration=length)[1]
+        np.testing.assert_allclose(run.record.yaw_rad[-900:], angle[-900:], atol=1e-8)
+
+
+@pytest.mark.parametrize("row", ["nan,nan\n", "\n", "# note\n", "3.5,\n"])
+def test_a_missing_row_within_a_run_leaves_one_run(tmp_path: Path, row: str) -> None:
+    time, angle = decay()
+    lines = [f"{t:.3f},{y:.8f}\n" for t, y in zip(time, angle, strict=True)]
+    lines[700] = row
+    (run,) = read_records([written(tmp_path, "log.csv", "time_s,yaw_rad\n" + "".join(lines))]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, np.delete(time, 700), atol=1e-9)
+
+
+def test_rows_of_several_runs_are_never_sorted_into_one() -> None:
+    time, angle = decay()
+    late = np.concatenate([time, time + 3.0])  # the second clock starts within the first run's times
+    assert restarts(late) == [time.size]
+    shuffled = np.random.default_rng(1).permutation(late.size)
+    both = np.concatenate([angle, decay(2, amplitude=0.2)[1]])
+    with pytest.raises(TunnelError, match="rows are out of order"):
+        cleaned(late[shuffled], both[shuffled])
+    offset = np.concatenate([time, time + 0.5 / RATE])[shuffled]  # an even clock at twice the rate
+    with pytest.raises(TunnelError, match="rows are out of order"):
+        cleaned(offset, both[shuffled])
+
+
+def test_rows_of_one_run_are_sorted_however_mixed_up() -> None:
+    time, angle = decay()
+    shuffled = np.random.default_rng(1).permutation(time.size)
+    found = cleaned(time[shuffled], angle[shuffled])
+    np.testing.assert_array_equal(found.reading, angle)
+    assert "sorted" in "; ".join(found.said)
+
+
+def test_coarse_stamps_are_not_spread_across_a_gap() -> None:
+    time, angle = decay()
+    kept = (time < 3.0) | (time >= 5.0)
+    found = cleaned((np.floor(time * 50.0) / 50.0)[kept], angle[kept])
+    assert np.abs(found.time_s - time[kept]).max() <= 0.02
+    angle[300] = np.nan  # a missing row keeps its place
+    found = cleaned(np.floor(time * 50.0) / 50.0, angle)
+    assert np.abs(found.time_s - np.delete(time, 300)).max() <= 0.02
+
+
+@pytest.mark.parametrize("step", [0.0, 2.0 * np.pi / 4096.0])
+def test_peaks_that_a_sensor_cuts_off_are_recognised(step: float) -> None:
+    _, angle = decay(duration=20.0)
+    rounded = angle if step == 0.0 else step * np.round(angle / step)
+    assert clipped(rounded) == []
+    (low, below), (high, above) = sorted(clipped(np.clip(rounded, -0.2, 0.25)), key=lambda limit: limit[0])
+    assert (low, high) == (-0.2, 0.25)
+    assert above.size == np.count_nonzero(rounded >= 0.25)
+    assert below.size == np.count_nonzero(rounded <= -0.2)
 
 
 def test_the_step_of_a_sensor_is_found() -> None:
