@@ -193,8 +193,8 @@ def undecided_words(document: Document) -> str:
         said += f"{best} fits best, but does not predict held-out readings. "
     if document.get("elsewhere"):
         best, runs = _among_answers(document["elsewhere"]).capitalize(), document["where"]["runs"]
-        named = 0 < len(runs) <= settings_of(document).words.runs_listed
-        look = _runs(runs) if named else "the runs"
+        some = 0 < len(runs) < document["found"]["place"]["runs"]
+        look = _runs(runs) if some else "the runs"
         said += f"{best} fits best, but the residuals point elsewhere: look at {look} there first. "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
 
