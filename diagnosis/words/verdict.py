@@ -192,11 +192,18 @@ def undecided_words(document: Document) -> str:
         best = _among_answers(document["unpredictive"]).capitalize()
         said += f"{best} fits best, but does not predict held-out readings. "
     if document.get("elsewhere"):
-        best, runs = _among_answers(document["elsewhere"]).capitalize(), document["where"]["runs"]
-        some = 0 < len(runs) < document["found"]["place"]["runs"]
-        look = _runs(runs) if some else "the runs"
-        said += f"{best} fits best, but the residuals point elsewhere: look at {look} there first. "
+        best = _among_answers(document["elsewhere"]).capitalize()
+        fit = "fits" if len(without_scatter(document["elsewhere"].split(" + "))) == 1 else "fit"
+        said += (
+            f"{best} {fit} best, but the residuals point elsewhere: look at {_places(document)} there first. "
+        )
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
+
+
+def _places(document: Document) -> str:
+    """The runs that show the gap, by name where not all do."""
+    runs = document["where"]["runs"]
+    return _runs(runs) if 0 < len(runs) < document["found"]["place"]["runs"] else "the runs"
 
 
 def _among_answers(effect: str) -> str:
@@ -460,6 +467,8 @@ def next_steps(document: Document) -> list[str]:
         springs = not robot and not unplannable(document) and document.get("model") is None
         kinds = ["springs"] * springs + ["wind speeds"] * windy(document)
         kinds += ["inputs" if driven else "release angles"]
+        if document.get("elsewhere"):
+            steps.append(f"Look at {_places(document)} where the residuals point (Where), before any cause.")
         steps += [
             f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
