@@ -86,8 +86,8 @@ class ScatterLimits:
     """Upper limits of scatter that was not detected, under a model that explains the runs down to their noise.
 
     Args:
-        frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction; None
-            where the runs would hide usual scatter.
+        frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction;
+            None where the runs would hide usual scatter.
         damping: of the damping ratio, as ``frequency``.
     """
 

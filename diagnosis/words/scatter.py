@@ -298,8 +298,8 @@ def repeatability_line(document: Document) -> str:
     if not scatters(document):
         own = [f"{name} by {_root_mean_square(found['runs'], name, '')}" for name in ("frequency", "damping")]
         return (
-            f"Repeatability: not determined, {_undetermined(document)}. The runs, one by one, deviate from the model "
-            f"in {' and in '.join(own)} (root mean square)."
+            f"Repeatability: not determined, {_undetermined(document)}. The runs, one by one, deviate from the "
+            f"model in {' and in '.join(own)} (root mean square)."
         )
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
     beyond = f"; outlier: {found['outlier']}" if found["outlier"] else ""

@@ -185,12 +185,8 @@ def _causes(document: Document) -> Section:
 
 def _repeats(document: Document) -> Section:
     line = repeatability_line(document)
-    drawn = captioned("repeatability")
-    return Section(
-        "repeats",
-        "How the runs repeat",
-        (Paragraph(line), *([] if repeats(document) else [drawn]), repeatability_table(document)),
-    )
+    drawn = [] if not line or repeats(document) else [captioned("repeatability")]
+    return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, repeatability_table(document)))
 
 
 def _how_far(document: Document, campaign: Campaign | None) -> Section:

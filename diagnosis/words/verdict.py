@@ -195,12 +195,21 @@ def undecided_words(document: Document) -> str:
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
         doubts = [DOUBTS[one["kind"]](one["share"]) for one in document["doubts"]]
-        said += f"{best} fits best, but {' and '.join(doubts)}. "
-        if any(one["kind"] == "elsewhere" for one in document["doubts"]):
-            runs = document["where"]["runs"]
-            named = 0 < len(runs) <= settings_of(document).words.runs_listed
-            said += f"Look at {_runs(runs) if named else 'the runs'} there first. "
+        fit = "fits" if len(without_scatter(document["unpredictive"].split(" + "))) == 1 else "fit"
+        said += f"{best} {fit} best, but {' and '.join(doubts)}"
+        said += f": look at {_places(document)} there first. " if in_doubt_of_place(document) else ". "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
+
+
+def in_doubt_of_place(document: Document) -> bool:
+    """Whether the answer is undecided because the residuals show another place than its causes."""
+    return any(one["kind"] == "elsewhere" for one in document.get("doubts", ()))
+
+
+def _places(document: Document) -> str:
+    """The runs that show the gap, by name where not all do."""
+    runs = document["where"]["runs"]
+    return _runs(runs) if 0 < len(runs) < document["found"]["place"]["runs"] else "the runs"
 
 
 def _little(explained: float) -> str:
@@ -490,6 +499,8 @@ def next_steps(document: Document) -> list[str]:
         springs = not robot and not unplannable(document) and document.get("model") is None
         kinds = ["springs"] * springs + ["wind speeds"] * windy(document)
         kinds += ["inputs" if driven else "release angles"]
+        if in_doubt_of_place(document):
+            steps.append(f"Look at {_places(document)} where the residuals point (Where), before any cause.")
         steps += [
             f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",

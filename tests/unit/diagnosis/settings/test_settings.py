@@ -25,7 +25,6 @@ FIELDS = {
 #: Decisions that more than one function has to know: the reason why they are one.
 KNOWN_IN_SEVERAL = {
     "rivals_from": "a rival is stated by its name, and in the sentence with its probability",
-    "separated_by": "a run is planned with other springs, and proposed, by one measure",
     "detection_rate": "the rate of the test is also what a campaign without a gap is said to have",
     "grown_from": "on whole runs and on stretches",
     "most_causes": "on whole runs and beside a random moment",

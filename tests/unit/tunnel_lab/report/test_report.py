@@ -284,8 +284,10 @@ def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
     assert 'data-figure="repeatability"' in page
     assert "deviates far beyond the others" in page
     found = document["repeatability"]
-    page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
-    assert "<p>Repeatability: the runs repeat, without scatter of frequency or damping.</p>" in page
+    limits = {"frequency": 1e-4, "damping": 0.01}
+    repeats = found | {"spreads": [], "outlier": "", "limits": limits}
+    page = written(document | {"repeatability": repeats, "rest": None})
+    assert "<p>Repeatability: no run-to-run scatter detected: frequency less than" in page
     assert 'data-figure="repeatability"' not in page
     assert "How the runs repeat" not in written(document | {"repeatability": None})
 
