@@ -138,9 +138,7 @@ def _of_another_method(found: Sequence[RunDecay]) -> tuple[Remark, ...]:
     for item in found:
         if item.instead is not None and item.estimate.identified:
             runs.setdefault(item.instead, []).append(item.estimate.id)
-    return tuple(
-        Remark(Outcome.NOTED, tuple(names), what, remedy) for (what, remedy), names in runs.items()
-    )
+    return tuple(Remark(Outcome.NOTED, tuple(names), what, remedy) for (what, remedy), names in runs.items())
 
 
 def seen_by(run: Run, gained: Gained) -> Array:
