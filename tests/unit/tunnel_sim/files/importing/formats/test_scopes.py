@@ -22,7 +22,7 @@ from tunnel_sim.files.importing.records import read_records
 TIME, ANGLE = decay()
 VOLTS = ANGLE / 0.5
 _HEADER = [
-    ("Record Length", f"{TIME.size:e}"), ("Sample Interval", f"{1 / RATE:e}"), ("Trigger Point", "1.25e3"), 
+    ("Record Length", f"{TIME.size:e}"), ("Sample Interval", f"{1 / RATE:e}"), ("Trigger Point", "1.25e3"),
     ("", ""),
     ("Source", "CH1"), ("Vertical Units", "V"), ("Vertical Scale", "2e-1"), ("Horizontal Units", "s"),
     ("Probe Atten", "1.0"), ("Serial Number", "C012"),
