@@ -15,6 +15,7 @@ from identification.estimators import (
     make_estimator,
     takes_driven,
 )
+from identification.examination.ambient import is_ambient
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
@@ -85,6 +86,11 @@ def identify(
     refuse_several_gains([run.drive for run in campaign.runs], campaign.name)
     examined = examine(campaign).accepted()
     remaining = examined.campaign
+    # The rate of a decay is not to be had from these, and the filter does not need one.
+    random = (
+        () if chosen.name == "filter_error" else tuple(run.id for run in remaining.runs if is_ambient(run))
+    )
+    remaining = replace(remaining, runs=tuple(run for run in remaining.runs if run.id not in random))
     with shown_by(progress):
         found = (
             checked_return(chosen.estimate(remaining), chosen.name, remaining)
@@ -94,14 +100,12 @@ def identify(
     found = widened_by_rounding(found, remaining.runs)
     found = withheld(widened_by_contradictions(found, remaining, examined.remarks), examined.remarks)
     estimate = as_angles(found, campaign.sensor)
-    if examined.remarks:  # the estimate includes them, and every run of the campaign, in its order
+    if examined.remarks or random:  # the estimate includes them, and every run of the campaign, in its order
         of_runs = {run.id: run for run in estimate.runs}
         cycling = {name for one in examined.remarks if in_limit_cycle(one.figures) for name in one.runs}
-        why = {
-            run.id: Status.LIMIT_CYCLE if run.id in cycling else Status.REPEATED_RUN
-            for run in campaign.runs
-            if run.id not in of_runs
-        }
+        why = {run.id: Status.REPEATED_RUN for run in campaign.runs if run.id not in of_runs}
+        why |= dict.fromkeys(cycling & why.keys(), Status.LIMIT_CYCLE)
+        why |= dict.fromkeys(random, Status.AMBIENT_VIBRATION)
         of_runs |= {name: RunEstimate(name, (status,)) for name, status in why.items()}
         estimate = replace(
             estimate,

@@ -42,6 +42,10 @@ class Status(Enum):
     LIMIT_CYCLE = (
         "a limit cycle, which has no damping ratio: record its growth, or a decay at a lower wind speed"
     )
+    AMBIENT_VIBRATION = (
+        "ambient vibration: the motion comes and goes as under a random moment, and a decay fitted to it "
+        "does not have its damping: use -e filter_error"
+    )
     FREQUENCY_CHANGES = (
         "the frequency changes so much along the decay, as in a pendulum, that no single omega_n and zeta describe "
         "it; the intervals span the values of the windows: use the windows, record smaller swings, or run the "

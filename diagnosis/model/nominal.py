@@ -405,7 +405,9 @@ class NominalModel:
         if len(data.runs) == 1:
             found.append("how well runs repeat: a single run shows no scatter between runs")
         elif _OF_A_DECAY * len(data.runs) <= len(common) and not data.driven:
-            found.append("how well runs repeat: no run tests another one, and ± is for runs that repeat exactly")
+            found.append(
+                "how well runs repeat: no run tests another one, and ± is for runs that repeat exactly"
+            )
         last = (_OF_WIND,) if data.wind_on else ()
         if data.driven:
             found.append("a lag of the sensor as opposed to a delay of the input: only their sum is visible")

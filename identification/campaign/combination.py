@@ -55,10 +55,12 @@ class RunDecay:
 
     Args:
         gained: decay rate, stiffness and gain of its input; None where they were not found.
+        instead: why the result is that of another method, and a remedy; None where it is the method's own.
     """
 
     estimate: RunEstimate
     gained: Gained | None = None
+    instead: tuple[str, str] | None = None
 
 
 def combined_estimate(
@@ -91,6 +93,7 @@ def combined_estimate(
         for run, item in zip(campaign.runs, found, strict=True)
         if item.gained is not None and is_remarked(run, joined)
     )
+    remarks += _of_another_method(found)
     estimate = replace(estimate, remarks=remarks)
     if not pairs:
         return replace(estimate, statuses=by_severity(statuses))
@@ -127,6 +130,15 @@ def combined_estimate(
         estimate = replace(estimate, remarks=(gain, *remarks))
     statuses |= design_statuses(design, parameters[:size])
     return filled_estimate(campaign, estimate, runs, design, values, own, statuses, repeatability)
+
+
+def _of_another_method(found: Sequence[RunDecay]) -> tuple[Remark, ...]:
+    """A remark for each reason for which runs have the result of another method."""
+    runs: dict[tuple[str, str], list[str]] = {}
+    for item in found:
+        if item.instead is not None and item.estimate.identified:
+            runs.setdefault(item.instead, []).append(item.estimate.id)
+    return tuple(Remark(Outcome.NOTED, tuple(names), what, remedy) for (what, remedy), names in runs.items())
 
 
 def seen_by(run: Run, gained: Gained) -> Array:

@@ -3,8 +3,8 @@
 For runs in a turbulent stream, where the residual of output error is not white and its intervals are too
 narrow or, after widening, too wide. A Kalman filter predicts every sample from the previous ones, and decay rate,
 stiffness and intensity of the moment maximise the likelihood of the prediction errors
-(`identification.signal.filter`). A run without a random moment has the result of output error; for a body
-without a spring no random moment is sought.
+(`identification.signal.filter`). A run without a random moment has the result of output error, which a remark
+says; for a body without a spring no random moment is sought.
 """
 
 from __future__ import annotations
@@ -57,8 +57,10 @@ class FilterError(RunByRun):
         if bare.fit is None or bare.noise is None:
             return RunDecay(bare.estimate)
         driven = self._driven(bare, sensor)
-        if driven is None:
-            return RunDecay(bare.estimate, bare.gained)
+        if isinstance(driven, str):
+            remedy = "run the diagnosis" if bare.noise.departs else "use output_error, which is faster"
+            what = f"{driven}, so the result is that of output error"
+            return RunDecay(bare.estimate, bare.gained, (what, remedy))
         filtered, noise_std = driven
         decay, forcing = filtered.model.decay, bare.reading.forcing
         gain = filtered.innovations.gain if forcing.known is None else forcing.known.at(decay.stiffness)
@@ -87,17 +89,17 @@ class FilterError(RunByRun):
         of_sought = filtered.gained[np.ix_(sought, sought)] * noise.slow_ratio
         return RunDecay(estimate, Gained.of(coefficients, of_sought, sought))
 
-    def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
-        # The fit, and its assumed sensor noise of one sample.
+    def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | str:
+        # The fit, and its assumed sensor noise of one sample; or why there is none.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
-            return None
+            return "no random moment is sought in a motion without oscillation"
         white = noise.slow_ratio == 1.0
         noise_std = noise.std if white else white_noise(fit.residual, sensor)
         frequency = fit.decay.omega_d / (2.0 * np.pi)
         thin, factor = block_means(even_reading(bare.reading), frequency, self.blocks_per_cycle)
         if thin.time.size < 4 * _DECIDED:
-            return None
+            return "the record is too short for a random moment"
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
         known, forcing, time = None, bare.reading.forcing, bare.reading.time
@@ -110,13 +112,15 @@ class FilterError(RunByRun):
 
             known = KnownInput(response, forcing.known)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
-        if found is None or found.model.decay.stiffness <= 0.0:
-            return None
+        if found is None:
+            return "no random moment is found beside the noise of the sensor"
+        if found.model.decay.stiffness <= 0.0:
+            return "the fit with a random moment has no positive stiffness"
         if not white and not noise.departs:  # coloured noise of the sensor explains the residual too
             residual, _ = block_means(
                 even_reading(Reading(time, fit.residual)), frequency, self.blocks_per_cycle
             )
             rival = Autoregression.of(residual.yaw, 1.0 / (frequency * interval))
             if rival is not None and rival.cost(residual.yaw) < found.innovations.cost:
-                return None
+                return "coloured noise of the sensor explains the residual as well as a random moment"
         return found, noise_std

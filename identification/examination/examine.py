@@ -18,6 +18,7 @@ from identification.examination.self_excited import self_excited_runs, swing_of
 from identification.examination.slips.base import Seen
 from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
+from tunnel_sim.files.plausible import few_samples
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.quantities import Seconds
@@ -29,6 +30,7 @@ _TIMER_DECIMALS = 10  # decimal steps that a timer's step must exceed, or any st
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: with more, the stamps are not from one clock
+_SLOW = 0.3  # mean square of a step over the variance, 4 sin²(π/n): that of n = 11.5 samples per cycle
 
 
 def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
@@ -46,7 +48,20 @@ def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
         noted = (Remark(Outcome.NOTED, tuple(run.id for run in campaign.runs), what, remedy),)
         unit = sensor.unit.replace("rad", "deg").replace("²", "2")  # in the form of the option
         return (*noted, *_wide_swings(campaign, f"if these are {unit}, import them with --unit {unit}"))
-    return _wide_swings(campaign, "if these are degrees, name the column yaw_deg")
+    return (*_wide_swings(campaign, "if these are degrees, name the column yaw_deg"), *_few_samples(campaign))
+
+
+def _few_samples(campaign: Campaign) -> tuple[Remark, ...]:
+    """Note free decays of few samples per cycle; none where the campaign states that."""
+    if campaign.sensor.plausible is False:
+        return ()
+    found = []
+    for run in (run for run in campaign.runs if run.drive is None):
+        reading = run.record.yaw_rad
+        # The steps of a slower motion are smaller, which is soon seen.
+        if np.mean(np.diff(reading) ** 2) > _SLOW * np.var(reading) and (few := few_samples(run.record)):
+            found.append(Remark(Outcome.NOTED, (run.id,), few, "check that it is not, or sample faster"))
+    return tuple(found)
 
 
 def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:

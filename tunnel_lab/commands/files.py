@@ -31,7 +31,11 @@ def import_files(
     ] = None,
     angle: Annotated[
         list[str] | None,
-        _column("--angle", metavar="NAME", help="Column of the angle, by name or number. May be repeated."),
+        _column(
+            "--angle",
+            metavar="NAME",
+            help="Column of the angle, by name or its number in the file. May be repeated.",
+        ),
     ] = None,
     unit: Annotated[
         str | None, _unit("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
@@ -64,7 +68,9 @@ def import_files(
     calibration: Annotated[
         str | None,
         _unit(
-            "--calibration", metavar="'a + b*V'", help="Volts to angle: a formula, or a file of two columns."
+            "--calibration",
+            metavar="'a + b*V'",
+            help="Volts to angle: a formula, also 'b*(V - c)', or a file of two columns.",
         ),
     ] = None,
     conditions: Annotated[
@@ -84,8 +90,8 @@ def import_files(
         _condition(
             "--set",
             metavar="KEY=NUMBER",
-            help="A condition of all runs, or a size. KEY=NAME names the column or variable that states it. May be "
-            "repeated.",
+            help="A condition of all runs, or a size, also with a unit. KEY=NAME names the column or variable that "
+            "states it. May be repeated.",
         ),
     ] = None,
     start: Annotated[
@@ -122,11 +128,12 @@ def import_files(
 ) -> None:
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
-    Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
-    sample rate, runs and releases are detected; the choices and their reasons are
-    printed before anything is written, and options correct them. The campaign has a
-    picture (import.png), the choices (import.toml, for --recipe), and comments in
-    campaign.toml on conditions that the files do not state, such as the stiffness.
+    Text of any dialect, LVM, Excel, MAT, TDMS, HDF5, Parquet and JSON are read, also
+    compressed (.csv.gz). Columns, units, sample rate, runs and releases are detected;
+    the choices and their reasons are printed before anything is written, and options
+    correct them. The campaign has a picture (import.png), the choices (import.toml, for
+    --recipe), and comments in campaign.toml on conditions that the files do not state,
+    such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig

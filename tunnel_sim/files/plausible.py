@@ -22,9 +22,10 @@ from tunnel_sim.vocabulary.quantities import Hertz, Rad, Readings, Times
 from tunnel_sim.vocabulary.record import Record, count_cycles
 
 KEEP = "state plausible = false under [sensor] to keep it"
-#: With fewer samples per cycle the peaks are only resolved to 5 %, and the record may be an undetectable alias of
-#: a motion above half the sample rate.
-LEAST_SAMPLES_PER_CYCLE = 10.0
+#: With fewer samples per cycle a fit hardly tells the motion from its alias above half the sample rate.
+LEAST_SAMPLES_PER_CYCLE = 4.0
+#: With fewer the peaks are only resolved to 5 %. A fit needs no more, so they are accepted with a remark.
+FEW_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 _TWO_TURNS = 4.0 * np.pi
 # If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Other
@@ -252,6 +253,15 @@ def standing_for_missing(reading: Readings) -> NDArray[np.bool_] | None:
         if nearest > _BEYOND * float(np.ptp(rest)) > 0.0:
             return standing
     return None
+
+
+def few_samples(record: Record) -> str:
+    """A remark on a free decay of few samples per cycle; empty where it has enough."""
+    cycles = count_cycles(record)
+    per_cycle = record.yaw_rad.size / cycles if cycles > 0.0 else np.inf
+    if per_cycle >= FEW_SAMPLES_PER_CYCLE:
+        return ""
+    return f"{per_cycle:.1f} samples per cycle: a motion above half the sample rate would look the same"
 
 
 def _check(said: str, value: float, allowed: Range, where: str) -> None:

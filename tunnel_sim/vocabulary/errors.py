@@ -5,15 +5,16 @@ from __future__ import annotations
 import difflib
 import os
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
+_T = TypeVar("_T")
 _LONGEST = 4096  # characters in one part of a message: the longest path
 
 
@@ -35,6 +36,25 @@ class TunnelError(Exception):
         self.remedy = one_line(remedy, _LONGEST)
         text = f"{self.where}: {self.what}" if self.where else self.what
         super().__init__(f"{text}; {self.remedy}" if self.remedy else text)
+
+
+def attempt(faults: list[TunnelError], make: Callable[[], _T]) -> _T | None:
+    """The result of a function; None where it refuses, and the refusal is then added to the others."""
+    try:
+        return make()
+    except TunnelError as error:
+        faults.append(error)
+        return None
+
+
+def joined(faults: Sequence[TunnelError]) -> TunnelError:
+    """Refusals of one place, at least one, as one refusal."""
+    if len(faults) == 1:
+        return faults[0]
+    what, remedy = (
+        "; ".join(texts) for texts in zip(*((one.what, one.remedy) for one in faults), strict=True)
+    )
+    return TunnelError(what, where=faults[0].where, remedy=remedy)
 
 
 def one_line(value: object, limit: int = 120) -> str:

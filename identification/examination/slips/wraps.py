@@ -12,8 +12,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
 _TURN = 2.0 * np.pi
-#: Of a turn: step between samples, less whole turns. With ten samples per cycle, the fewest accepted, a swing of a
-#: tenth of a turn has no larger steps.
+#: Of a turn: step between samples, less whole turns. With ten samples per cycle a swing of a tenth of a turn has no
+#: larger steps.
 _SMOOTH = 0.1
 
 

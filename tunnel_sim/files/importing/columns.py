@@ -40,7 +40,7 @@ from tunnel_sim.files.importing.inputs import (
 from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.inputs import without_command
 from tunnel_sim.vocabulary.quantities import Readings, Rows
 
@@ -52,6 +52,14 @@ _LEAST_JUDGED = 16  # samples
 _UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is that of an angle
 _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
+
+
+class Unread(TunnelError):
+    """Columns of times and readings whose units or rate are to be stated."""
+
+    def __init__(self, fault: TunnelError, columns: tuple[Channel | None, Channel]) -> None:
+        super().__init__(fault.what, where=fault.where, remedy=fault.remedy)
+        self.columns = columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +99,33 @@ class RunColumns:
 
 
 def find_columns(
-    table: Table, choices: ImportChoices, calibration: Calibration | None, where: str
+    table: Table,
+    choices: ImportChoices,
+    calibration: Calibration | None,
+    where: str,
 ) -> list[RunColumns]:
-    """The columns of each run of a table, at least one run; guesses are reported."""
+    """The columns of each run of a table, at least one run; guesses are reported.
+
+    Raises:
+        Unread: for all that is to be stated of the columns of a run.
+    """
     found = []
     for pair in find_pairs(table, choices, where):
         said = [*pair.said]
-        time = in_seconds(pair.time, pair.reading.values.size, table.facts, choices, said, where)
+        faults: list[TunnelError] = []  # all that is to be stated of a file is asked for at once
+        rows, facts = pair.reading.values.size, table.facts
+        time = attempt(faults, lambda: in_seconds(pair.time, rows, facts, choices, said, where))  # noqa: B023
         # A row without a time is not a sample: a heading between two runs may hold other numbers.
-        timed = np.where(np.isfinite(time), pair.reading.values, np.nan)
+        values = pair.reading.values
+        timed = values if time is None else np.where(np.isfinite(time), values, np.nan)
         counted = replace(pair.reading, values=without_overflow(timed, said))
-        reading, quantity, unit = in_radians(counted, choices, calibration, said, where)
+        found_reading = attempt(
+            faults,
+            lambda: in_radians(counted, choices, calibration, said, where),  # noqa: B023
+        )
+        if time is None or found_reading is None:
+            raise Unread(joined(faults), (pair.time, pair.reading))
+        reading, quantity, unit = found_reading
         driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where, unit)
         if table.native:
             said += _apart(table, pair.reading, driven, choices, where)
@@ -306,7 +330,7 @@ def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
-        elif c.unit == "" and not OTHER.search(c.name) and not named_kind(c.name):
+        elif c.unit == "" and not (OTHER.search(c.name) or named_kind(c.name) or resembles(c.name, "")):
             levels[_UNNAMED].append(c)
         elif kind == "voltage":
             levels[5].append(c)

@@ -277,6 +277,17 @@ def conditions_of(
     return found, sizes
 
 
+def refuse_open_wind(
+    table: Table, beside: Sequence[Channel | None], choices: ImportChoices, where: str
+) -> None:
+    """Refuse a table beside whose records wind-off is not assumed, before they are known; arguments as above."""
+    stated = find_conditions(table, beside, choices, [], where)
+    rows = np.ones(table.channels[0].values.size, dtype=bool)
+    given = choices.conditions.model_dump(exclude_none=True)
+    known = {**stated.numbers, **stated.measured(rows, []), **given}
+    check_wind(known, stated.unused(rows), Path(), "", [], where, driven=True)
+
+
 def check_wind(
     conditions: Mapping[str, float],
     hints: Sequence[Hint],

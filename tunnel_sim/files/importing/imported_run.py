@@ -13,7 +13,7 @@ from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import Unstated, check_wind, conditions_of
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
-from tunnel_sim.files.plausible import checked_record
+from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
@@ -114,7 +114,9 @@ def imported_run(
         if record is None:
             record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
-        return ImportedRun(name, raw, piece, None, (*remarks, f"left out: {error.what}"), rest, sizes)
+        return ImportedRun(name, raw, piece, None, (*remarks, _left_out(error)), rest, sizes)
+    if drive is None and stride <= 1 and (few := few_samples(record)):
+        remarks.append(few)
     begun = float(clock[0] - record.time_s[0])
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive, clock_s=begun)
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
@@ -140,6 +142,12 @@ def _on_the_cut(raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readi
             "leaves them out"
         )
     return remarks
+
+
+def _left_out(error: TunnelError) -> str:
+    """Why a run is left out, and how to keep it where the campaign's file can state that."""
+    kept = f"; {KEEP} in a campaign.toml" if KEEP in error.remedy else ""
+    return f"left out: {error.what}{kept}"
 
 
 def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:

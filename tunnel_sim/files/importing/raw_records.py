@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
 from tunnel_sim.files.importing.column_numbers import Calibration
-from tunnel_sim.files.importing.columns import RunColumns, find_columns, with_readings
-from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table
+from tunnel_sim.files.importing.columns import RunColumns, Unread, find_columns, with_readings
+from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table, refuse_open_wind
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, attempt, counted, joined, one_line, shown
 from tunnel_sim.vocabulary.inputs import InputColumn
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
@@ -70,15 +70,30 @@ def raw_records(
     named: dict[str, float],
     *,
     several: bool,
+    with_table: bool = False,
 ) -> list[RawRecord]:
-    """The records of a file, with the conditions in its name; ``several``: ids must name the file among others."""
+    """The records of a file, with the conditions in its name.
+
+    Args:
+        several: whether ids must name the file among others.
+        with_table: whether a table may state the conditions.
+    """
     # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
     for table in with_readings(long or source.tables, choices, shown(source.path)):
         where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
-        for columns in find_columns(table, choices, calibration, where):
+        try:
+            every = find_columns(table, choices, calibration, where)
+        except Unread as fault:
+            if with_table or "wind_speed" in named:
+                raise
+            faults: list[TunnelError] = [fault]  # what is to be stated of a file is asked for at once
+            beside = fault.columns
+            attempt(faults, lambda: refuse_open_wind(table, beside, choices, where))  # noqa: B023 - at once
+            raise joined(faults) from None
+        for columns in every:
             said = [*columns.said]
             kept = _from_start_to_end(columns.time, choices, said)
             stated = find_conditions(table, columns.used, choices, said, where).of_rows(kept)

@@ -107,7 +107,10 @@ def read_records(
     for path in (path for path in files if path.name not in choices.leave_out):
         source = read_source(path, choices)
         named = from_name(pattern, path)
-        raws += raw_records(source, choices, calibration, named, several=len(files) > 1)
+        several = len(files) > 1
+        raws += raw_records(
+            source, choices, calibration, named, several=several, with_table=table is not None
+        )
         sources.append(source)
     if not raws:
         what = "every file is left out" if files else "no files"

@@ -61,9 +61,7 @@ def _read(request: dict[str, Any], contents: list[bytes]) -> Message:
     return {"tables": described, "known": known}, [column.data for column in columns]
 
 
-def _text_tables(
-    content: bytes, where: str, choices: ImportChoices
-) -> tuple[list[Table], dict[str, str]]:
+def _text_tables(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
     """The tables of a file of text, and what they are known to be; LabVIEW's have headers of their own."""
     if content.startswith(MAGIC):
         return read_labview_tables(content, where)

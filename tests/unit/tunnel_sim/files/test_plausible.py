@@ -19,7 +19,7 @@ SLIPS = {
     "width in mm": ("width = 0.225", "width = 225", "mm"),
     "speed in km/h": ("wind_speed = 10", "wind_speed = 144", "km/h"),
     "time in ms": ("scale = 1", "scale = 1000", "milliseconds"),
-    "slow sampling": ("rate = 200", "rate = 15", "too low a sample rate"),
+    "slow sampling": ("rate = 200", "rate = 7", "too low a sample rate"),
 }
 TEXT = """schema_version = 1
 [campaign]

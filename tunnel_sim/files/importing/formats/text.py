@@ -194,8 +194,8 @@ def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]
     if not {"horizontal", "vertical"} <= set(stated) or any(units[i] for i in numeric):
         return result
     after = 0
-    for place, column in enumerate(numeric):
-        first = place == 0 or column - 1 not in numeric
+    for column in numeric:
+        first = column - 1 not in numeric and column + 1 in numeric  # of a block: the times
         cells = stated["horizontal"] if first else stated["vertical"]
         text = cells[0] if first else cells[min(after, len(cells) - 1)] if cells else ""
         after += not first

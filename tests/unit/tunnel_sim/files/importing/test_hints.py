@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from identification import identify
 from tests.support.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
@@ -312,3 +313,39 @@ def test_a_unit_that_does_not_fit_a_setting_is_named() -> None:
         parse_setting("frontal_area=360 furlong", "--set")
     with pytest.raises(TunnelError, match="'%' is not a unit of repeatability_wind_speed"):
         parse_setting("repeatability_wind_speed=2 %", "--set")
+
+
+def test_refusals_of_one_file_come_together(tmp_path: Path) -> None:
+    rows = "\n".join(f"{y:.8f};12.{i % 3}" for i, y in enumerate(ANGLE))
+    path = written(tmp_path, "log.csv", f"pot (V);tunnel\n{rows}\n")
+    with pytest.raises(TunnelError) as caught:
+        read_records([path])
+    for what in ("no column of times", "'pot' is in V", "'tunnel' is left out"):
+        assert what in caught.value.what
+    for remedy in ("--rate in Hz", "--calibration", "--set wind_speed=tunnel"):
+        assert remedy in caught.value.remedy
+    conditions = written(tmp_path, "runs.csv", "file,wind_speed\nlog.csv,12\n")
+    with pytest.raises(TunnelError) as caught:
+        read_records([path], conditions=conditions)
+    assert "tunnel" not in caught.value.what  # the table states it
+    choices = setting("wind_speed=12").model_copy(update={"rate": RATE, "calibration": "V", "unit": "rad"})
+    (run,) = read_records([path], choices).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, ANGLE, atol=1e-7)
+
+
+@pytest.mark.parametrize(("per_cycle", "kept"), [(9.1, True), (6.3, True), (4.6, True), (3.3, False)])
+def test_few_samples_per_cycle_are_accepted_with_a_note(per_cycle: float, kept: bool, tmp_path: Path) -> None:
+    time = np.arange(400) / (2.0 * per_cycle)
+    angle = 0.3 * np.exp(-0.05 * time) * np.cos(4.0 * np.pi * time)
+    rows = "".join(f"{t:.6f},{y:.8f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", "time_s,yaw_rad\n" + rows)
+    if not kept:
+        with pytest.raises(TunnelError, match=r"samples per cycle.*plausible = false"):
+            read_records([path])
+        return
+    found = read_records([path])
+    assert "samples per cycle: a motion above half the sample rate" in "\n".join(found.remarks())
+    estimate = identify(found.campaign)
+    assert estimate.runs[0].omega_n is not None
+    assert estimate.runs[0].omega_n.value == pytest.approx(4.0 * np.pi, rel=1e-3)
+    assert any("samples per cycle" in str(remark) for remark in estimate.remarks)
