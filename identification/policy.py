@@ -17,8 +17,8 @@ REFUSAL_DEVIATIONS = 4.75
 """`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
 
 QUESTION_RATE = 1e-5
-"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred possible
-slips less than one correct campaign in a hundred is asked about."""
+"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred
+possible slips less than one correct campaign in a hundred is asked about."""
 
 MISFIT_RATE = 1e-3
 """Rate of false departures of a record, a line or a set of runs from its model; they only widen intervals."""

@@ -71,7 +71,7 @@ def _powers(swings: tuple[Swing, ...]) -> tuple[Array, Array]:
     count = int(np.log2(top / (_ABOVE * highest))) if highest > 0.0 else 0
     if count < 1:
         return np.zeros(0), np.zeros((len(swings), 0))
-    edges = top * 2.0 ** np.arange(-count, 1)
+    edges = np.array([top * 2.0**octave for octave in range(-count, 1)])
     rows = []
     for record in records:
         window = np.hanning(record.yaw_rad.size)
