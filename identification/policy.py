@@ -151,9 +151,12 @@ OTHER_WIND = (1.02, 1.3)
 NOISE_RATIO = 0.15
 """Tolerance of the ratio of two runs' noise from one sensor."""
 
-ODD_NOISE = 4.0
-"""Ratio of a run's noise to that of the other runs, by which it is odd: an amplifier's next range has 3 to 10 times
-the gain, and the vibration of a rig changes the noise by less. Judgement."""
+ODD_NOISE = 3.5
+"""Ratio of a run's noise to that of the other runs, by which it is odd: simulated runs of one sensor differ by a
+fifth, and one run of a measured campaign in the data differs by three times from all others. Judgement."""
+
+FILTERED_NOISE = 5.0
+"""Such a ratio, in a run with less noise, that only a filter or a smoothed file explains. Judgement."""
 
 LEAST_DRIFT = 5e-4
 """Relative change of a clock's rate along a run that is a drift: quartz keeps 1e-4, and a rig's temperature changes
