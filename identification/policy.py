@@ -111,8 +111,8 @@ LEAST_DAMPING_STD = 2e-4
 """Least relative standard deviation of a decay rate: no fit is more accurate beside small effects. Judgement."""
 
 LEAST_FACTOR: Mapping[str, float] = {
-    "wind_speed": 0.05,
-    "air_density": 0.1,
+    "wind_speed": 0.075,
+    "air_density": 0.15,
     "air_density of a group": 0.05,
     "spring_stiffness": 0.05,
     "time_s": 0.01,
@@ -120,7 +120,8 @@ LEAST_FACTOR: Mapping[str, float] = {
     "along": 0.05,
 }
 """Least relative error of a statement that is called a slip; smaller ones are calibration or scatter. Of a wind in
-runs that state none, over the least stated wind; along a campaign, from its first to its last run. Judgement."""
+runs that state none, over the least stated wind; along a campaign, from its first to its last run. Speeds: 2.5 times
+`SPEED_DEPARTURE`, so that runs whose speeds scatter as widely are not slips. Judgement."""
 
 LEAST_OF_WIND = 0.005
 """Least relative change of ωn² by the wind that a campaign is designed to measure. Judgement."""
