@@ -121,8 +121,7 @@ def _withheld(answer: Diagnosis) -> Diagnosis:
     """The answer without coefficients where the examination says that a unit makes them wrong by decades."""
     if not any(remark.withholds for remark in answer.remarks):
         return answer
-    sizes = tuple(replace(size, moves={}) for size in answer.sizes)
-    return replace(answer, coefficients=Coefficients({}, {}), hidden=(), trade_off=None, sizes=sizes)
+    return replace(answer, coefficients=Coefficients({}, {}), hidden=(), trade_off=None)
 
 
 def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:

@@ -17,8 +17,8 @@ REFUSAL_DEVIATIONS = 4.75
 """`REFUSAL_RATE` in one-sided standard deviations of a normal distribution."""
 
 QUESTION_RATE = 1e-5
-"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred possible
-slips less than one correct campaign in a hundred is asked about."""
+"""Rate of questioning correct statements, of each possible slip. A question withholds nothing; with a hundred
+possible slips less than one correct campaign in a hundred is asked about."""
 
 MISFIT_RATE = 1e-3
 """Rate of false departures of a record, a line or a set of runs from its model; they only widen intervals."""
@@ -111,8 +111,8 @@ LEAST_DAMPING_STD = 2e-4
 """Least relative standard deviation of a decay rate: no fit is more accurate beside small effects. Judgement."""
 
 LEAST_FACTOR: Mapping[str, float] = {
-    "wind_speed": 0.05,
-    "air_density": 0.1,
+    "wind_speed": 0.075,
+    "air_density": 0.15,
     "air_density of a group": 0.05,
     "spring_stiffness": 0.05,
     "time_s": 0.01,
@@ -120,7 +120,8 @@ LEAST_FACTOR: Mapping[str, float] = {
     "along": 0.05,
 }
 """Least relative error of a statement that is called a slip; smaller ones are calibration or scatter. Of a wind in
-runs that state none, over the least stated wind; along a campaign, from its first to its last run. Judgement."""
+runs that state none, over the least stated wind; along a campaign, from its first to its last run. Speeds: 2.5 times
+`SPEED_DEPARTURE`, so that runs whose speeds scatter as widely are not slips. Judgement."""
 
 LEAST_OF_WIND = 0.005
 """Least relative change of ωn² by the wind that a campaign is designed to measure. Judgement."""
@@ -151,9 +152,12 @@ OTHER_WIND = (1.02, 1.3)
 NOISE_RATIO = 0.15
 """Tolerance of the ratio of two runs' noise from one sensor."""
 
-ODD_NOISE = 4.0
-"""Ratio of a run's noise to that of the other runs, by which it is odd: an amplifier's next range has 3 to 10 times
-the gain, and the vibration of a rig changes the noise by less. Judgement."""
+ODD_NOISE = 3.5
+"""Ratio of a run's noise to that of the other runs, by which it is odd: simulated runs of one sensor differ by a
+fifth, and one run of a measured campaign in the data differs by three times from all others. Judgement."""
+
+FILTERED_NOISE = 5.0
+"""Such a ratio, in a run with less noise, that only a filter or a smoothed file explains. Judgement."""
 
 LEAST_DRIFT = 5e-4
 """Relative change of a clock's rate along a run that is a drift: quartz keeps 1e-4, and a rig's temperature changes

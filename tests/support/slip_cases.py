@@ -402,8 +402,18 @@ FURTHER: dict[str, Case] = {
     "one wind-off run low-passed at 30 Hz": Case(
         NINE, _low_passed(30.0, "r4"), "the logger filtered the run", ("r4",)
     ),
+    "one run low-passed at 6 Hz and digitised again": Case(
+        SIX,
+        both(_low_passed(6.0, "r5"), reading(lambda y: np.round(y / 5e-4) * 5e-4, "r5")),
+        "the logger filtered the run",
+        ("r5",),
+        refused=False,
+    ),
+    "one run of five times the noise": Case(
+        SIX, _noisier(4.9 * NOISE, "r1"), "its noise is 5.", ("r1",), refused=False
+    ),
     "one run of ten times the noise": Case(
-        SIX, _noisier(10.0 * NOISE, "r4"), "the noise is 10 times as large", ("r4",), refused=False
+        SIX, _noisier(10.0 * NOISE, "r4"), "its noise is 1", ("r4",), refused=False
     ),
     "a second day's density 15 % too high": Case(
         NINE, scaling("r8", "r9", air_density=1.15), "1.38 of r8, r9 as 1.2 kg/m3", ("r8", "r9")

@@ -32,6 +32,7 @@ NOT_ASKED = (
     "stiffness_not_separable",
     "damping_not_separable",
     "no_reference_size",
+    "coefficients_withheld",
 )
 """Statuses beside which a value is absent because the runs cannot give it, or the estimator does not.
 

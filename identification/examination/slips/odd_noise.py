@@ -17,50 +17,60 @@ _FEWEST = 4  # runs
 _ABOVE = 8.0  # times the frequency of the motion: its harmonics have ended
 _BELOW = 0.45  # of the lowest sample rate
 _LEAST_BINS = 16  # of a record in a band: their median scatters by a quarter
-_SPREAD = 3.0  # greatest ratio of the powers of the other runs: they have one noise
+_SPREAD = 1.7  # greatest ratio of the noise of the other runs: they have one sensor
+_SPREADS = 4.0  # logarithms of that ratio
 
 
 @dataclass(frozen=True)
 class OddNoise(StatementSlip):
     """One run has far less or far more noise than all others, in some band of frequencies. Named.
 
-    A run with less noise is refused: a filter smooths its start, which looks like other oscillations and moments.
-    A run with more noise is noted, unless the wind may cause it.
+    A run with far less noise is refused: a filter smooths its start, which looks like other oscillations.
     """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
-        """Compare the median power of all runs in octaves above the motion; a line of hum does not change it."""
+        """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
+
+        The wind may add noise: a run is compared with others of as much wind, or as little.
+        """
         if len(seen.swings) < _FEWEST:
             return ()
         bands, power = _powers(seen.swings)
         if not bands.size:
             return ()
-        windy = np.array([0.5 * (s.run.air_density or 0.0) * s.run.wind_speed**2 for s in seen.swings])
+        logs = 0.5 * np.log(power)
+        pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in seen.swings])
         for place, swing in enumerate(seen.swings):
-            others = np.delete(power, place, axis=0)
-            if np.any(others.max(axis=0) > _SPREAD * others.min(axis=0)):
+            others, winds = np.delete(logs, place, axis=0), np.delete(pressure, place)
+            spread = np.ptp(others, axis=0)
+            if np.any(spread > np.log(_SPREAD)):
                 continue
-            level = np.exp(np.mean(np.log(others), axis=0))
-            ratio = np.sqrt(power[place] / level)
-            calmer = int(np.sum(np.delete(windy, place) >= windy[place]))
-            if float(ratio.min()) < 1.0 / policy.ODD_NOISE:
-                return (_less(swing, bands, ratio),)
-            if float(ratio.max()) > policy.ODD_NOISE and calmer >= 1:
-                what = f"the noise is {float(ratio.max()):.2g} times as large as that of every other run"
+            ratio = logs[place] - others.mean(axis=0)
+            odd = np.abs(ratio) > np.maximum(np.log(policy.ODD_NOISE), _SPREADS * spread)
+            less, more = odd & (ratio < 0.0), odd & (ratio > 0.0)
+            if less.any() and np.any(winds <= pressure[place]):
+                return (_less(swing, float(bands[less][0]), float(ratio.min())),)
+            if more.any() and np.any(winds >= pressure[place]):
+                what = f"its noise is {np.exp(ratio.max()):.2g} times as large as that of every other run"
                 remedy = "check the sensor's range, its cable and the unit, or leave the run out"
                 return (Remark(Outcome.NOTED, (swing.run.id,), what, remedy),)
         return ()
 
 
-def _less(swing: Swing, bands: Array, ratio: Array) -> Remark:
-    """The refusal of a run with less noise, from the lowest such band on."""
-    first = float(bands[int(np.flatnonzero(ratio < 1.0 / policy.ODD_NOISE)[0])])
+def _less(swing: Swing, first: float, ratio: float) -> Remark:
+    """The remark on a run with less noise, a refusal where the difference is large.
+
+    Args:
+        first: lower end of the lowest such band, Hz.
+        ratio: logarithm of the least ratio of the noise to that of the others.
+    """
     what = (
-        f"above {first:.2g} Hz its noise is 1/{1.0 / float(ratio.min()):.2g} of that of every other run: the "
-        "logger filtered the run, or its file was smoothed"
+        f"above {first:.2g} Hz its noise is 1/{np.exp(-ratio):.2g} of that of every other run: the logger filtered "
+        "the run, or its file was smoothed"
     )
     remedy = "record or export it with the bandwidth of the others, or leave the run out"
-    return Remark(Outcome.REFUSED, (swing.run.id,), what, remedy)
+    outcome = Outcome.REFUSED if ratio < -np.log(policy.FILTERED_NOISE) else Outcome.NOTED
+    return Remark(outcome, (swing.run.id,), what, remedy)
 
 
 def _powers(swings: tuple[Swing, ...]) -> tuple[Array, Array]:
@@ -71,7 +81,7 @@ def _powers(swings: tuple[Swing, ...]) -> tuple[Array, Array]:
     count = int(np.log2(top / (_ABOVE * highest))) if highest > 0.0 else 0
     if count < 1:
         return np.zeros(0), np.zeros((len(swings), 0))
-    edges = top * 2.0 ** np.arange(-count, 1)
+    edges = np.array([top * 2.0**octave for octave in range(-count, 1)])
     rows = []
     for record in records:
         window = np.hanning(record.yaw_rad.size)

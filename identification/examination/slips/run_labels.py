@@ -74,15 +74,22 @@ class InAnotherUnit(Label):
                 yield value / factor, words
 
 
+def _both_ways(factors: Mapping[str, float], unit: str) -> Mapping[str, float]:
+    """Factors of units, and of the right unit where the other runs have one of these."""
+    others = {f"{unit}, the others {words}": 1.0 / factor for words, factor in factors.items()}
+    return {**factors, **others}
+
+
 @dataclass(frozen=True)
 class SpeedInAnotherUnit(InAnotherUnit):
-    """A speed in km/h, knots, mph or ft/s, or converted from km/h twice."""
+    """A speed in km/h, knots, mph or ft/s, or in m/s where the others are in one of these."""
 
     key: ClassVar[Key] = "speed"
     factors: Mapping[str, float] = field(
-        default_factory=lambda: {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808,
-                                 "in m/s, the others in km/h": 1.0 / 3.6}
-    )  # fmt: skip
+        default_factory=lambda: _both_ways(
+            {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808}, "in m/s"
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -95,13 +102,21 @@ class SpeedDecimal(InAnotherUnit):
 
 @dataclass(frozen=True)
 class SpringInAnotherUnit(InAnotherUnit):
-    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad."""
+    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad, or in N m/rad where the others are."""
 
     key: ClassVar[Key] = "spring"
     factors: Mapping[str, float] = field(
-        default_factory=lambda: {"in N mm/rad": 1e3, "in N cm/rad": 1e2, "in N m/deg": 1.0 / 57.2958,
-                                 "in kgf m/rad": 1.0 / 9.80665, "in lbf in/rad": 8.8507}
-    )  # fmt: skip
+        default_factory=lambda: _both_ways(
+            {
+                "in N mm/rad": 1e3,
+                "in N cm/rad": 1e2,
+                "in N m/deg": 1.0 / 57.2958,
+                "in kgf m/rad": 1.0 / 9.80665,
+                "in lbf in/rad": 8.8507,
+            },
+            "in N m/rad",
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -129,7 +144,9 @@ class TimeInAnotherUnit(Label):
     def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
         """The stamped times over true ones."""
         yield value / 60.0, "in minutes"
+        yield value * 60.0, "in seconds, the others in minutes"
         yield value * 1e3, "in milliseconds"
+        yield value / 1e3, "in seconds, the others in milliseconds"
         for rate in (2.0, 4.0, 5.0, 10.0):
             yield value * rate, f"of a run sampled {rate:g} times as fast as stated"
             yield value / rate, f"of a run sampled {rate:g} times as slowly as stated"

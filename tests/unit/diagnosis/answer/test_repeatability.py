@@ -54,6 +54,15 @@ def test_a_wind_that_drifts_over_the_campaign_is_no_chance() -> None:
     assert trend.p_value < 1e-3
 
 
+def test_a_wind_that_follows_the_spring_is_no_chance() -> None:
+    rng = np.random.default_rng(2)
+    stiff = np.array([spring > 20.0 for spring, _ in CONDITIONS], float)
+    (trend,) = found(0.03 * (stiff - 0.5) + rng.normal(0.0, 0.0005, stiff.size)).trends
+    assert (trend.effect, trend.along, trend.only) == (SPEED, "spring_stiffness", False)
+    assert trend.change == pytest.approx(0.03, abs=4.0 * trend.std)
+    assert trend.left < 0.003
+
+
 def test_a_wind_that_differs_by_chance_does_not_drift() -> None:
     errors = np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))
     given = found(errors)

@@ -123,6 +123,39 @@ def test_a_drift_is_not_by_chance(given: Document) -> None:
     assert "the wind speed falls by" in scatter_words(given)
 
 
+def test_a_pattern_of_the_plan_is_not_by_chance(given: Document) -> None:
+    trend = {
+        "effect": "wind_speed_scatter",
+        "change": -0.0081,
+        "std": 0.0006,
+        "p_value": 1e-5,
+        "left": 0.0012,
+    }
+    given["repeatability"]["trends"] = [trend | {"along": "spring_stiffness"}]
+    text = verdict(alone(given), "")
+    assert (
+        "Part of this is not by chance: the wind speed is 0.810 ± 0.060 % lower at the greatest stiffness of the "
+        "spring than at the least. The remaining scatter is 0.12 %."
+    ) in text
+    assert "The runs differ from each other, and not by chance alone (probability 91 %): " in text
+    assert "by chance only" not in text
+    assert headline(given) == ("Scatter between runs, not by chance alone", "found")
+
+
+def test_what_the_examination_found_is_not_by_chance(given: Document) -> None:
+    given["remarks"] = [
+        {
+            "outcome": "noted",
+            "runs": ["beta"],
+            "what": "w",
+            "remedy": "r",
+            "figures": {"systematic": "a wind"},
+        }
+    ]
+    assert "by chance only" not in verdict(alone(given), "")
+    assert headline(given) == ("Scatter between runs, not by chance alone", "found")
+
+
 def test_undecided_answers_share_the_scatter(given: Document) -> None:
     both = " + ".join(sorted(set(given["causes"]) - {CAUSE}))
     given["decided"] = False

@@ -11,10 +11,12 @@ import pytest
 
 from diagnosis import diagnose
 from identification import identify
+from identification.estimate import PARAMETERS
 from identification.examination.examine import examine
-from identification.status import Outcome
+from identification.examination.slips.spoilt import ClockJumps
+from identification.status import Outcome, Status
 from tests.marks import slow
-from tests.support.slip_cases import FURTHER, PLAIN, TABLE, Case
+from tests.support.slip_cases import FURTHER, PLAIN, SIX, TABLE, Case
 from tests.support.slip_rig import SPEEDS, SPRINGS, Condition, high_passed, honest, repeated
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -172,6 +174,59 @@ def test_zeros_of_their_own_do_not_mirror_a_run():
         for run, zero in zip(data.runs, zeros, strict=True)
     )
     assert examine(replace(data, runs=runs)).remarks == ()
+
+
+@pytest.mark.parametrize("name", ["springs in N mm/rad", "time in minutes", "springs in kgf m/rad"])
+def test_coefficients_wrong_by_decades_are_withheld(name: str):
+    data = (TABLE | FURTHER)[name].campaign
+    found = identify(data)
+    assert all(getattr(found, key) is None for key in (*PARAMETERS, "wind_off_inertia", "wind_off_intercept"))
+    assert found.parameters == ()
+    assert Status.COEFFICIENTS_WITHHELD in found.statuses
+    assert all(run.omega_n is not None for run in found.runs)
+    vouched = identify(replace(data, sensor=replace(data.sensor, plausible=False)))
+    assert vouched.cn_beta is not None
+
+
+@pytest.mark.slow
+def test_a_diagnosis_withholds_them_too():
+    answer = diagnose(TABLE["springs in N mm/rad"].campaign)
+    assert answer.coefficients.after == {}
+    assert "Use the coefficients" not in str(answer)
+    assert "give them in SI units" in str(answer)
+
+
+def test_two_readings_of_one_contradiction_are_both_said():
+    (remark,) = examine(TABLE["a second day's density 18 % too low"].campaign).remarks
+    assert "0.984 of r5, r6 as 1.2 kg/m3" in remark.what
+    assert "1.2 of r2, r3 as 0.984 kg/m3" in remark.what
+    assert set(remark.runs) == {"r2", "r3", "r5", "r6"}
+
+
+def test_samples_that_are_missing_are_no_jump_of_the_clock():
+    rng = np.random.default_rng(4)
+    for run in honest().runs:
+        time, yaw = run.record.time_s, run.record.yaw_rad
+        for begin in rng.integers(200, 3000, 6).tolist():
+            kept = np.r_[0:begin, begin + int(rng.integers(60, 1500)) : time.size]
+            data = replace(PLAIN, runs=(replace(run, record=Record(time[kept], yaw[kept])),))
+            assert ClockJumps().mend(data)[1] == ()
+
+
+def test_noise_that_grows_with_the_wind_is_not_odd():
+    rng = np.random.default_rng(6)
+    runs = tuple(
+        replace(
+            run,
+            record=Record(
+                run.record.time_s,
+                run.record.yaw_rad
+                + rng.normal(0.0, 1e-3 * (run.wind_speed / 15.0) ** 2, run.record.yaw_rad.size),
+            ),
+        )
+        for run in SIX.runs
+    )
+    assert examine(replace(SIX, runs=runs)).remarks == ()
 
 
 def test_the_examination_is_cheap():

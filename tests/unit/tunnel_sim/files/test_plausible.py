@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.files.plausible import RANGES, plausible_values
+from tunnel_sim.files.plausible import RANGES, checked_record, plausible_values
+from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 SLIPS = {
     "density in g/m3": ("air_density = 1.2", "air_density = 1204", "g/m3"),
@@ -85,3 +87,32 @@ def test_the_ends_of_a_range_are_in_it_and_beyond_is_not(key):
     with pytest.raises(TunnelError, match="here"):
         plausible_values({key: 1.01 * allowed.high}, "here")
     assert allowed.reason
+
+
+_TIME = np.arange(2000) / 200.0
+_DECAY = 0.3 * np.exp(-0.1 * _TIME) * np.cos(12.0 * _TIME)
+
+
+@pytest.mark.parametrize(
+    ("time", "reading", "says"),
+    [
+        (_TIME + 1.7e9 * (_TIME >= 4.0), _DECAY, "time_s jumps by 1.7e+09 s after 3.995 s"),
+        (_TIME + 1e3 * (_TIME >= 2.5), _DECAY, "time_s jumps by 1000 s after 2.495 s"),
+        (_TIME, np.where(np.arange(2000) % 7 == 3, -9.99, _DECAY), "286 of 2000 readings are -9.99"),
+        (
+            _TIME,
+            np.where((_TIME > 3.0) & (_TIME < 5.0), 999.0, _DECAY),
+            "readings are 999, far from all others",
+        ),
+    ],
+)
+def test_what_hides_an_oscillation_is_named(time: Array, reading: Array, says: str):
+    with pytest.raises(TunnelError) as caught:
+        checked_record(time, reading, "yaw_rad", SensorProperties(), None, "run 'r1'")
+    assert says in str(caught.value)
+    assert "no oscillation is visible" not in str(caught.value)
+
+
+def test_a_record_without_an_oscillation_is_still_refused_for_that():
+    with pytest.raises(TunnelError, match="no oscillation is visible"):
+        checked_record(_TIME, 1e-3 * _TIME, "yaw_rad", SensorProperties(), None, "r1")
