@@ -187,7 +187,9 @@ def untrained() -> list[Point]:
         return np.array([policy(own) for policy, own in zip(policies, observations, strict=True)])
 
     driven = [(f"resonant at {speed:g} m/s", partial(resonant, speed=speed)) for speed in SPEEDS]
-    for name, begin in (("free decay", alone), *driven, ("resonant by spring", by_spring)):
+    rules: list[tuple[str, Callable[[dict[str, Any]], None]]]
+    rules = [("free decay", alone), *driven, ("resonant by spring", by_spring)]
+    for name, begin in rules:
         found.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
     for name, rule in (("scripted", scripted), ("greedy", greedy), (PACKAGED, trained)):
         returns = play_campaigns(lambda env: rule(env.known))  # noqa: B023  called within the loop
