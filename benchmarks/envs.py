@@ -14,6 +14,7 @@ from statistics import median
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 from rich.console import Console
@@ -81,6 +82,33 @@ def vector(count: int, mode: str, preset: str) -> Any:
     return gymnasium.make_vec(NAME, num_envs=count, vectorization_mode=mode, **arguments)
 
 
+def alone(table: Table, repetitions: int) -> None:
+    """Steps per second of processor time of one environment, Pendulum-v1 and bare MuJoCo, in turn."""
+    options = {"wind_limit": 20.0, "moment_limit": 0.05, "duration": DURATION}
+    env = gymnasium.make(NAME, **options)
+    env.reset(seed=1)
+    plan = plan_run({}, FreeDecayConfig(), load_rig(), np.random.default_rng(0))
+    model = build_model(load_rig(), plan.stated())
+
+    def bare_steps() -> float:
+        data, begin = model.release_state(), time.process_time()
+        for _ in range(500):
+            mujoco.mj_step(model.mj, data, 10)
+        return time.process_time() - begin
+
+    sides = {
+        "mj_step of the rig's model, ten substeps": bare_steps,
+        "Pendulum-v1": stepping(gymnasium.make("Pendulum-v1"), 500, time.process_time),
+        "FreeDecay-v0": stepping(env, 500, time.process_time),
+    }
+    times: dict[str, list[float]] = {name: [] for name in sides}
+    for _ in range(repetitions):
+        for name, side in sides.items():
+            times[name].append(side())
+    for name, spent in times.items():
+        table.add_row(name, f"{500 / median(spent):,.0f}", "≥ 3,000" if name == "FreeDecay-v0" else "")
+
+
 def campaigns(table: Table) -> None:
     """Runs per second of processor time of Campaign-v0, with sampled actions."""
     for kind, count, aim in (("full", 20, ""), ("linear", 400, "≥ 100")):
@@ -131,6 +159,9 @@ def main() -> None:
             line("the same by processor time", options.workers, timed[0], timed[1], "")
         workers.close()
         native.close()
+    Console(width=118).print(table)
+    table = Table("one environment", "steps per second of processor time", "target", title="FreeDecay-v0")
+    alone(table, options.repetitions)
     Console(width=118).print(table)
     table = Table("simulation", "runs", "runs per second of processor time", "target", title="Campaign-v0")
     campaigns(table)

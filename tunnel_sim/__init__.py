@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import tunnel_sim.forks  # noqa: F401  # notes what is loaded at every fork
 from tunnel_sim.lazy import lazy_names
+from tunnel_sim.registering import register_with_gymnasium
 
 if TYPE_CHECKING:
     from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
@@ -56,6 +57,8 @@ else:
             ".vocabulary.rig": "Rig",
         },
     )
+
+register_with_gymnasium()
 
 __all__ = [
     "ALL_EFFECTS",

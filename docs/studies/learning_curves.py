@@ -14,6 +14,7 @@ import io
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,7 +58,11 @@ SETTINGS: dict[str, Any] = {
 RUNS = 16  # in parallel
 SEEDS = (0, 1)
 SWING = radians(20.0)  # rad, amplitude of the hand-written policy
-SPEED = 25.0  # m/s, wind speed of the hand-written policy
+SPEEDS = (
+    25.0,
+    40.0,
+)  # m/s, wind speeds of the hand-written policy; the second is the limit, which the agent has too
+SHARE = 0.5  # of the spring's stiffness that the air may take at the speed that the policy sets by the spring
 CURVES = ("FreeDecay-v0", "Campaign-v0")
 LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
 """Steps of each training: control periods, and runs."""
@@ -149,10 +154,11 @@ class _Held:
 
 def untrained() -> list[Point]:
     """The policies for comparison with the agents."""
-    from tunnel_sim.envs.conditions import FreeDecayConfig
+    from tunnel_sim.envs.conditions import CN_BETA, FreeDecayConfig
     from tunnel_sim.envs.engines import operator_action
 
     config, found = FreeDecayConfig(**FREE_DECAY), []
+    rig = config.rig()
     policies: list[Callable[[Array], Array]] = []
 
     def alone(info: dict[str, Any]) -> None:
@@ -160,16 +166,30 @@ def untrained() -> list[Point]:
             _Held(operator_action(config, wind_speed=float(speed))) for speed in info["wind_speed"]
         ]
 
-    def resonant(info: dict[str, Any]) -> None:
+    def resonant(info: dict[str, Any], speed: float) -> None:
         policies[:] = [
-            Resonant(config, stiffness=float(spring), inertia=0.1014, wind_speed=SPEED, amplitude=SWING)
+            Resonant(config, stiffness=float(spring), inertia=0.1014, wind_speed=speed, amplitude=SWING)
             for spring in info["spring_stiffness"]
         ]
+
+    def by_spring(info: dict[str, Any]) -> None:
+        air = (
+            0.5 * rig.air.density * rig.body.frontal_area * rig.body.length * max(CN_BETA)
+        )  # N m s²/(rad m²)
+        policies[:] = []
+        for spring in info["spring_stiffness"].tolist():
+            speed = min((SHARE * spring / air) ** 0.5, config.wind_limit)
+            policies.append(
+                Resonant(config, stiffness=spring, inertia=0.1014, wind_speed=speed, amplitude=SWING)
+            )
 
     def each(observations: Array) -> Array:
         return np.array([policy(own) for policy, own in zip(policies, observations, strict=True)])
 
-    for name, begin in (("free decay", alone), ("resonant", resonant)):
+    driven = [(f"resonant at {speed:g} m/s", partial(resonant, speed=speed)) for speed in SPEEDS]
+    rules: list[tuple[str, Callable[[dict[str, Any]], None]]]
+    rules = [("free decay", alone), *driven, ("resonant by spring", by_spring)]
+    for name, begin in rules:
         found.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
     for name, rule in (("scripted", scripted), ("greedy", greedy), (PACKAGED, trained)):
         returns = play_campaigns(lambda env: rule(env.known))  # noqa: B023  called within the loop
@@ -283,7 +303,7 @@ def _panel(axes: Axes, points: Sequence[Point]) -> None:
             label=f"agent, seed {seed}",
         )  # fmt: skip
     for place, rule in enumerate(one for one in points if one.policy != TRAINED):
-        style = ("--", ":", "-.")[place]
+        style = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))[place]
         axes.axhline(rule.nats, color="0.4", linewidth=1.0, linestyle=style, label=rule.policy)
     last = max(one.steps for one in mine)
     marks = [mark for mark in (3e3, 1e4, 3e4, 1e5) if first <= mark <= last]

@@ -28,20 +28,23 @@ def test_the_page_shows_the_stored_curves() -> None:
     points = from_csv((DOCS / "how-to" / "train-an-agent-curves.csv").read_text(encoding="utf-8"))
     assert filled_with_curves(page, points) == page
     assert "| 25,600 |" in page
-    assert len(points) == 33
+    assert len(points) in (27, 35)  # with one or two trainings of FreeDecay-v0
 
 
 def test_what_the_page_says_of_the_curves_is_in_the_data() -> None:
     points = from_csv((DOCS / "how-to" / "train-an-agent-curves.csv").read_text(encoding="utf-8"))
     of = {(one.environment, one.policy, one.seed, one.steps): one for one in points}
-    resonant, greedy = of["FreeDecay-v0", "resonant", 0, 0], of["Campaign-v0", "greedy", 0, 0]
-    for seed in (0, 1):
+    limit, best = (of["FreeDecay-v0", f"resonant {how}", 0, 0] for how in ("at 40 m/s", "by spring"))
+    greedy = of["Campaign-v0", "greedy", 0, 0]
+    played = {one.seed for one in points if (one.environment, one.policy) == ("FreeDecay-v0", "trained")}
+    assert 0 in played
+    for seed in played:
         line = [one for one in points if one.seed == seed and one.policy == "trained"]
         runs = {one.steps: one for one in line if one.environment == "FreeDecay-v0"}
         gained = {count: one.nats - runs[0].nats for count, one in runs.items()}
         assert all(abs(gain) < 0.4 for count, gain in gained.items() if count <= 12_800)
-        assert all(gain > 1.4 for count, gain in gained.items() if count > 50_000)
-        assert abs(runs[102_400].nats - resonant.nats) < 1.96 * runs[102_400].std_error
+        assert all(gain > 1.0 for count, gain in gained.items() if count > 50_000)
+        assert limit.nats < runs[max(runs)].nats < best.nats - 0.5
     assert of["Campaign-v0", "trained", 1, 32_768].nats > greedy.nats
     assert of["Campaign-v0", "trained", 0, 32_768].nats < greedy.nats
 

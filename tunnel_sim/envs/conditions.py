@@ -42,6 +42,7 @@ _NUMBERS: Mapping[str, Number] = {
     "resolution": Number(unit="rad"),
     "wind_limit": Number(above=True, unit="m/s"),
     "moment_limit": Number(above=True, unit="N m"),
+    "stop_penalty": Number(unit="nats"),
     "effect_probability": Number(most=1.0),
 }
 
@@ -62,6 +63,8 @@ class FreeDecayConfig:
         wind_time_constant: of the tunnel's first-order response to its set-point, s.
         moment_limit: greatest moment that the operator can apply, N m.
         effect_probability: probability that an episode draws an effect, if its options do not name effects.
+        stop_penalty: what a run loses at the stop, besides its information, nats. By default as much as two
+            standard deviations smaller by a factor of e⁵ together, more than a run usually adds by control.
         prior: changes to `Prior` by name, in its units.
     """
 
@@ -75,6 +78,7 @@ class FreeDecayConfig:
     wind_time_constant: float = 2.0
     moment_limit: float = 0.5
     effect_probability: float = 0.0
+    stop_penalty: float = 5.0
     prior: Mapping[str, float] = field(default_factory=dict)
     expose_truth: bool = False
     rig_file: str | None = None

@@ -129,7 +129,10 @@ class Episodes:
         if wild.any():
             angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
         readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)
+        before = self.information.known
         rewards = self.information.advance(angle, rate, speeds.mean(axis=1), moment)
+        if wild.any():  # the run is lost: its sum of rewards is the penalty
+            rewards = np.where(wild, -before - self._config.stop_penalty, rewards)
         self.step_count += 1
         observations = np.empty((self._count, self._config.samples_per_step + 2))
         np.clip(readings, -READING_BOUND, READING_BOUND, out=observations[:, :-2])

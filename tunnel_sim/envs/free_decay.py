@@ -68,7 +68,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Advance the run by one control period; the reward is the information gained, in nats."""
+        """Advance the run by one control period; the reward is the information gained, nats, less any penalty."""
         if self._episodes.ended[0]:
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
         many = self._episodes.advance(np.asarray(action)[None])

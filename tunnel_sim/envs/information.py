@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.rig import Body
 DYNAMIC = 6  # Izz, Cr, angle, rate, Cnβ, Cnr; the zero's sensitivity is one
 
 
-def propagator(a: Array, k: Array, duration: float) -> tuple[Array, Array, Array, Array]:
+def propagator(a: Array, k: Array, duration: float | Array) -> tuple[Array, Array, Array, Array]:
     """Exact solution of ẍ + 2a ẋ + k x = 0 after a time: x from (1, 0) and (0, 1), then ẋ; each of shape (n,).
 
     Args:

@@ -40,7 +40,7 @@ def read_only_column(values: object, name: str, where: str, *, times: bool = Fal
     Raises:
         TunnelError: for texts, truth values, complex numbers, missing values, and numbers that are not finite.
     """
-    masked = int(np.ma.count_masked(values)) if isinstance(values, np.ma.MaskedArray) else 0
+    masked = np.count_nonzero(values.mask) if isinstance(values, np.ma.MaskedArray) else 0
     if masked:
         raise TunnelError(f"{name} has {masked} masked values", where=where, remedy=_CUT)
     given = _as_array(values, name, where)

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-PAGES = Path(__file__).parents[4] / "docs" / "reference" / "envs"
+ROOT = Path(__file__).parents[4]
+PAGES = ROOT / "docs" / "reference" / "envs"
 
 
-def printed(code: str, *paths: Path) -> str:
-    start = f"import sys; sys.path[:0] = {[str(path) for path in paths]!r}\nimport gymnasium\n{code}"
+def printed(code: str, *paths: Path, first: str = "import gymnasium") -> str:
+    start = f"import sys; sys.path[:0] = {[str(path) for path in paths]!r}\n{first}\n{code}"
     done = subprocess.run([sys.executable, "-c", start], capture_output=True, text=True, check=False)
     return done.stdout + done.stderr.strip().rpartition("\n")[2]
 
@@ -39,6 +40,13 @@ def test_gymnasium_reads_no_entry_points(tmp_path: Path) -> None:
     said = printed(found + 'gymnasium.make("tunnel_sim/FreeDecay-v0")', tmp_path)
     assert said.startswith("1\n")
     assert "Namespace tunnel_sim not found" in said
+
+
+@pytest.mark.parametrize("order", ["import tunnel_sim, gymnasium", "import gymnasium, tunnel_sim"])
+def test_the_name_alone_works_beside_the_package_in_any_order(order: str) -> None:
+    code = f'{order}\nprint(gymnasium.spec("tunnel_sim/Campaign-v0").id)'
+    assert printed(code, ROOT, first="") == "tunnel_sim/Campaign-v0\n"
+    assert printed("import tunnel_sim\nprint('gymnasium' in sys.modules)", ROOT, first="") == "False\n"
 
 
 @pytest.mark.parametrize("page", ["free-decay", "campaign"])

@@ -149,6 +149,34 @@ def test_a_step_after_the_end_or_before_the_start_is_refused() -> None:
         env.step(0)
 
 
+@pytest.mark.parametrize("penalty", [5.0, 0.0])
+def test_a_run_that_reaches_the_stop_is_lost(penalty: float) -> None:
+    """Constant wind beyond divergence without a moment: the sum of its rewards is the penalty."""
+    options = {"spring": 3, "wind_speed": 20.0, "release_angle": 0.3, "truth": {"cn_beta": 0.6}}
+    arguments = {} if penalty == 5.0 else {"stop_penalty": penalty}
+    env = make(preset="operator", sample_rate=100.0, control_period=0.05, **arguments)
+    action = env.unwrapped.operator_action(wind_speed=40.0)
+    env.reset(seed=1, options=options)
+    rewards, terminated, truncated = [], False, False
+    while not (terminated or truncated):
+        _, reward, terminated, truncated, _ = env.step(action)
+        rewards.append(reward)
+    assert terminated
+    assert min(rewards[:-1]) >= 0.0
+    assert sum(rewards[:-1]) > 10.0
+    assert sum(rewards) == pytest.approx(-penalty)
+
+
+def test_a_run_informs_while_the_wind_decays_and_not_once_it_is_at_rest() -> None:
+    env = make(preset="operator", sample_rate=100.0, control_period=0.05, wind_time_constant=0.1)
+    action = env.unwrapped.operator_action(wind_speed=0.0)
+    env.reset(seed=1, options={"spring": 5, "wind_speed": 15.0, "release_angle": 0.3})
+    rewards = [env.step(action)[1] for _ in range(200)]
+    assert sum(rewards[:40]) > 1.0
+    env.reset(seed=1, options={"spring": 5, "wind_speed": 0.0, "release_angle": 0.3})
+    assert max(env.step(action)[1] for _ in range(50)) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_run_that_leaves_the_sensors_range_is_terminated() -> None:
     env = make(duration=20.0)
     options = {"spring_stiffness": 0.5, "wind_speed": 20.0, "truth": {"cn_beta": 0.5}}  # Kr below Ka
