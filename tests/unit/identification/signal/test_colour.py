@@ -61,6 +61,14 @@ def test_coloured_noise_is_no_departure_and_agrees_with_its_stated_size(pole: fl
     assert np.mean([one.variance for one in found]) == pytest.approx(float(density(pole, 1.0)), rel=0.15)
 
 
+def test_noise_beyond_its_stated_level_is_a_misfit() -> None:
+    """As the beat of vortices in the wind beside the white noise of the sensor, which agrees with the statement."""
+    rng = np.random.default_rng(12)
+    values = rng.standard_normal(COUNT) + red(0.97, rng)
+    assert judged(values, SensorProperties(500.0, None, 1.0)).level.departs
+    assert not judged(values, SensorProperties(500.0, None, np.sqrt(2.0))).level.departs
+
+
 def test_white_noise_has_no_colour() -> None:
     rng = np.random.default_rng(3)
     for _ in range(30):
