@@ -96,9 +96,11 @@ class NoiseLevel:
         std: standard deviation used, rad, quantisation included.
         source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (of the fit).
         residual_std: standard deviation of the residual, rad.
-        slow_ratio: power of the residual's slow part over that of white noise; 1 where the model explains the
-            data; where it does not, the variances are multiplied by it.
-        departs: whether the slow ratio is beyond chance (false-alarm rate 1e-3).
+        slow_ratio: factor on the variances: 1 in white noise; in coloured noise its power at the frequency of the
+            motion over that of white noise of ``std``; where the model departs, the power of the residual's slow
+            part over that of white noise.
+        departs: whether the residual has more power than white or coloured noise beyond chance (false-alarm rate
+            1e-3).
         disagrees: whether the residual's white part contradicts the stated noise.
     """
 

@@ -36,7 +36,7 @@ from identification.signal.frequency import holds_motion
 from identification.signal.noise import reading_noise
 from identification.signal.run_fit import modal_quantities, residual_check
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 
 @dataclass(frozen=True)
@@ -60,24 +60,26 @@ class NeuralNetwork(Paired):
         return shipped_networks() if self.weights is None else read_networks(self.weights)
 
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
-        networks, readings, cycles = self.networks, [], 0.0
-        if holds_motion(run.record):
-            windows, cycles = find_windows(run.record, reading_noise(run.record, sensor))
-            for window in windows:
-                if (reading := read_window(window, networks)) is None:
-                    break
-                readings.append(reading)
+        networks, white = (
+            self.networks,
+            reading_noise(run.record, sensor) if holds_motion(run.record) else None,
+        )
+        readings, cycles = read_windows(run.record, white, networks)
         if not readings:
             short = 0.0 < cycles < CYCLES
             return RunEstimate(run.id, (Status.TOO_FEW_CYCLES if short else Status.NO_OSCILLATION,)), None
-        zeta, zeta_std, departs = _average(readings, 0)
-        omega, omega_std, drifts = _average(readings, 1)
+        zeta, omega = (_average(readings, row)[0] for row in (0, 1))
         if not networks.trained_for(zeta, omega):
             return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
+        check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
+        if check is not None and check.colour is not None:
+            coloured, _ = read_windows(run.record, check.noise_std, networks)
+            readings = coloured or readings
+        zeta, zeta_std, departs = _average(readings, 0)
+        omega, omega_std, drifts = _average(readings, 1)
         own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
         zeta_std = float(np.hypot(zeta_std, own_zeta))
         omega_std = float(np.hypot(omega_std, own_omega * omega))
-        check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
         statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
         if check is not None:
             statuses |= noise_statuses([check.noise])
@@ -147,6 +149,25 @@ class WindowReading:
     def variances(self) -> Array:
         """Variances of ζ and ωn from the reading's noise: shape (2,)."""
         return np.asarray(np.sum(self.noise**2, axis=1))
+
+
+def read_windows(
+    record: Record, noise_std: float | None, networks: Networks
+) -> tuple[list[WindowReading], float]:
+    """The windows of a record up to the first that is not similar to a damped oscillation, and the clear cycles.
+
+    Args:
+        noise_std: of one sample, rad; None where nothing moves.
+    """
+    if noise_std is None:
+        return [], 0.0
+    windows, cycles = find_windows(record, noise_std)
+    readings: list[WindowReading] = []
+    for window in windows:
+        if (reading := read_window(window, networks)) is None:
+            break
+        readings.append(reading)
+    return readings, cycles
 
 
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:

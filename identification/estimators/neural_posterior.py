@@ -40,7 +40,9 @@ from identification.neural.posterior import (
 )
 from identification.neural.rivals import CAMPAIGN_NAMES, Features, Rivals, campaign_features, record_features
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
+from identification.signal.free_decay import Decay
 from identification.signal.noise import stated_noise
+from identification.signal.run_fit import residual_check
 from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
@@ -54,6 +56,12 @@ class _DemodulatedRun:
     windows: Demodulated
     alone: Rivals
     posterior: Posterior
+
+    @property
+    def rate_and_omega(self) -> tuple[float, float]:
+        """Decay rate, 1/s, and damped angular frequency, rad/s, of the nominal fit."""
+        rate, omega = np.array([self.windows.rate, self.windows.omega]) + self.alone.parameters
+        return float(rate), float(omega)
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,7 @@ class NeuralPosterior:
         decays: list[Array] = []  # (a, k) of the runs from their nominal fits
         informations = []
         for one in linked:
-            rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
+            rate, omega = one.rate_and_omega
             decays.append(np.array([rate, omega**2 + rate**2]))
             slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
             informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
@@ -183,6 +191,7 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
     # The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model.
     total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
     std = seen.windows.noise * float(np.sqrt(seen.windows.block))
+    rate, omega = seen.rate_and_omega
     harmonics = np.concatenate((seen.windows.second, seen.windows.third))
     distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
     limit = 0.5 * MISFIT_RATE
@@ -195,6 +204,9 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
         disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
     slow = max(total / freedom, 1.0) if departs else 1.0
     noise = NoiseLevel(std, "residual", std, slow, departs, disagrees)
+    if departs:  # coloured noise is no departure
+        check = residual_check(seen.run, Decay(rate, omega**2 + rate**2), sensor)
+        noise = noise if check is None or check.colour is None else check.noise
     zeta, omega_n = (seen.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))
     weight = seen.windows.samples
     zero = float(weight @ seen.windows.zero / weight.sum())

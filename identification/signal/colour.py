@@ -175,13 +175,11 @@ class Autoregression:
         """
         block = max(1, int(cycle / _IN_CYCLE))
         values, own = slow_part(residual, block), block / cycle
-        if values.size * own < CYCLES or own > _FASTEST:
+        if values.size * own < CYCLES or own > _FASTEST or not values.any():
             return None
         seen = Periodogram.of(values, 1.0, own)
         covariance = np.fft.irfft(seen.bridged(own), values.size)[: _HIGHEST_ORDER + 1]
         count = float(np.count_nonzero(seen.between)) * values.size / seen.frequency.size
-        if not covariance[0] > 0.0:
-            return None
         best, least = None, np.inf
         for whitening, variance in levinson(covariance[: max(2, int(count / _VALUES_PER_TAP))]):
             order = whitening.size - 1

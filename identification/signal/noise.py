@@ -156,7 +156,7 @@ def _coloured(residuals: Sequence[Residual], total: float, stated: float | None)
 
     It does where the whitened residuals pass the test of white noise, also close to the motion alone, and have one
     power in all parts of a run: the misfit of a model lies there, or changes along the run, and a random moment
-    excites the resonance.
+    excites the resonance. Noise does not exceed its stated level.
 
     Args:
         total: standard deviation of the residuals, rad.
@@ -180,6 +180,8 @@ def _coloured(residuals: Sequence[Residual], total: float, stated: float | None)
         return None
     freedom = sum(_independent_squares(residual) for residual in residuals)
     bears_out = stated is not None and _agree(total, stated, freedom)
+    if stated is not None and not bears_out and total > stated:
+        return None
     std = stated if bears_out and stated is not None else total
     powers = [float(colour.power(1.0)) * (std / total) ** 2 for colour in colours]
     level = NoiseLevel(

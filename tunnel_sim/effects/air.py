@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from tunnel_sim.effects.parameters import (
     Trial,
     WindOnRun,
     exponent,
+    mean_of_ramp,
     parameter,
     ramp,
     settling,
@@ -255,11 +257,23 @@ class WindSpeedDrift(Effect):
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.1,)
     autonomous = False
+    caveat = (
+        "The stated wind speed counts as that at the release. The uncertainty of Cnβ includes that it may be the "
+        "mean over the run."
+    )
 
     drift: float = parameter(
         "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0
     )
     settling: float = settling()
+
+    def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """Runs cannot show whether the stated speed is that at the release or the mean over the run.
+
+        The truth may be between the two cases; their difference is a rectangular half-width.
+        """
+        mean = 1.0 + self.drift * mean_of_ramp(self.settling)
+        return (abs(cn_beta * (mean**2 - 1.0)) / sqrt(3.0) if runs else 0.0), 0.0
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:

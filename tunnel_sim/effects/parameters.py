@@ -156,6 +156,9 @@ def settling() -> Any:
     return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True)
 
 
+_LINEAR = 1e-3  # rate below which the first two terms of the mean's series are exact to 1e-12
+
+
 def ramp(part: Array, rate: float) -> Array:
     """The share of a drift that has developed, from 0 to 1 over the run, shape (n,).
 
@@ -167,6 +170,13 @@ def ramp(part: Array, rate: float) -> Array:
     if rate == 0.0:
         return part
     return np.asarray(np.expm1(-rate * part) / np.expm1(-rate), dtype=np.float64)
+
+
+def mean_of_ramp(rate: float) -> float:
+    """The mean of `ramp` over the run."""
+    if abs(rate) < _LINEAR:
+        return 0.5 + rate / 12.0
+    return -1.0 / float(np.expm1(-rate)) - 1.0 / rate
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ class Run:
     """One run: its record and its conditions.
 
     Args:
-        wind_speed: V, m/s; 0 is wind-off.
+        wind_speed: V, m/s; 0 is wind-off. The speed at the release, or the mean of a steady speed over the run.
         spring_stiffness: Kr, N m/rad; for a run with a ``command_rad`` the servo's kp; None: the run is identified
             in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.

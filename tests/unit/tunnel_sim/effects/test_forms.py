@@ -10,7 +10,7 @@ import pytest
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
-from tunnel_sim.effects.parameters import SWING, WindOnRun
+from tunnel_sim.effects.parameters import SWING, WindOnRun, ramp
 from tunnel_sim.engine.effect_laws import DRIVE
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
@@ -119,6 +119,18 @@ def test_the_loss_may_follow_the_motion_or_the_rig_in_still_air():
     assert moment == pytest.approx(abs(stiffer.mean()) / np.sqrt(3.0))
     assert rate == pytest.approx(abs(lost.mean()) / np.sqrt(3.0))
     assert damping.unseen_form(0.5, []) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("settling", [-3.0, -1e-4, 0.0, 2e-3, 6.0])
+def test_the_stated_speed_may_be_that_at_the_release_or_the_mean_over_the_run(settling):
+    """Truth: the mean of the drift over the run, by the trapezium rule."""
+    drift = effect_from("wind_speed_drift", {"drift": 0.015, "settling": settling})
+    time = np.linspace(0.0, 1.0, 20001)
+    speed = 1.0 + 0.015 * np.trapezoid(ramp(time, settling), time)
+    moment, rate = drift.unseen_form(-0.5, [WindOnRun(20.0, 9.0, 10.0, per_cn_beta=2.0, per_cn_r=0.5)])
+    assert moment == pytest.approx(0.5 * (speed**2 - 1.0) / np.sqrt(3.0), rel=1e-6)
+    assert rate == 0.0
+    assert drift.unseen_form(-0.5, []) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
