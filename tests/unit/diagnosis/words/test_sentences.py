@@ -112,7 +112,7 @@ FIGURES = {
     "rms_rad": 2e-5, "tolerance_rad": 1e-5, "tolerance": 0.1, "driven": False, "windy": True, "effects": [RIVAL],
     "std_rad": 1e-3, "fewer": 1, "uncertainty_rad": 1e-5, "stated_rad": 2e-3, "least_rad": 1e-3, "most_rad": 3e-3,
     "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93, "left": 0.4,
-    "below_per_s": 4.2e-3, "unit": "rad",
+    "below_per_s": 4.2e-3, "unit": "rad", "parameters": ["coulomb_friction.exponent"],
 }  # fmt: skip
 
 
