@@ -67,10 +67,24 @@ def outside_the_fits(study: Study) -> tuple[Fact, ...]:
     """The parts of the records that no fit uses, and the effects that other readings do not confirm."""
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
+        *one_amplitude(study),
         *((Fact("needless", {"effects": study.needless}),) if study.needless else ()),
         *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
         *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )
+
+
+def one_amplitude(study: Study) -> tuple[Fact, ...]:
+    """The fact that all runs have one release amplitude, for free forms; empty without these or with several."""
+    problem = study.chosen.problem
+    runs, names = problem.data.runs, problem.free_forms
+    if problem.data.driven or not names or not study.named:
+        return ()
+    conditions = {(run.spring_stiffness, run.wind_speed) for run in runs}
+    releases = [float(np.max(np.abs(run.reading - np.median(run.reading)))) for run in runs]
+    if len(conditions) > 1 or max(releases) > study.settings.words.same_release * min(releases):
+        return ()
+    return (Fact("one amplitude", {"parameters": names}),)
 
 
 def zeros_apart(study: Study) -> tuple[Fact, ...]:

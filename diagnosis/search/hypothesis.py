@@ -369,15 +369,17 @@ def _first_forms(fitted: Fit) -> tuple[Form, ...]:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first form of every effect, or another that explains much of the significant residual of the first."""
+    """The first form of every effect, or another that explains more than chance and much of what the first leaves.
+
+    Where the noise is overestimated, a wrong form may leave less than the noise as a whole.
+    """
     by_effect, weighing, best = _forms_by_effect(fitted), fitted.settings.weighing, _first_forms(fitted)
 
     def total(forms: tuple[Form, ...]) -> float:
         freed = _free_forms(fitted, forms)
         return fitted.total if freed is None else freed.total
 
-    by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * fitted.count)
-    if all(len(forms) == 1 for forms in by_effect) or fitted.total - fitted.count < by_chance:
+    if all(len(forms) == 1 for forms in by_effect):
         return best
     least = total(best)
     for place, forms in enumerate(by_effect):

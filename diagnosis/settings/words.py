@@ -118,6 +118,12 @@ class WordsSettings:
         "judgement",
         "Rounding to one digit can cause half of it.",
     )
+    same_release: float = setting(
+        1.1,
+        "Maximum ratio of the largest to the smallest swing of runs of one release amplitude.",
+        "judgement",
+        "Releases by hand to one mark scatter by a few per cent.",
+    )
     nearly_explains: float = setting(
         0.8, "Minimum share of an unexplained gap that effects must explain to be mentioned.", "judgement"
     )

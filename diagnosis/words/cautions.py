@@ -5,7 +5,7 @@ A sentence is a template of the fact's figures, or a function of them where a te
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +52,12 @@ def _none_held_out(given: Figures) -> str:
     )
 
 
+def _forms(names: Sequence[str]) -> str:
+    """Parameters of forms, such as ``the exponent of coulomb friction``."""
+    parts = (name.split(".") for name in names)
+    return " and ".join(f"the {own.replace('_', ' ')} of {plain(effect)}" for effect, own in parts)
+
+
 def _unresolved(given: Figures) -> str:
     return (
         f"{plain(*given['effects']).capitalize()} was fitted to the whole records and left out of the answer: "
@@ -95,6 +101,11 @@ CAUTIONS: Mapping[str, Sentence] = {
     "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
     "causes may therefore differ from those of identify, which uses the whole record.",
     "unresolved": _unresolved,
+    "one amplitude": lambda given: (
+        "Not determined: one release amplitude does not show whether the form of a law is right, so "
+        f"{_forms(given['parameters'])} may be wrong by more than the deviation stated. Add releases from other "
+        "angles."
+    ),
     "needless": lambda given: (
         f"{plain(*given['effects']).capitalize()} was fitted and left out of the answer: with it the residual on "
         "held-out readings is no smaller than without it."

@@ -38,6 +38,7 @@ KNOWN_IN_SEVERAL = {
     "alike_within": "of random moments of two sources, and of two kinds of one source",
     "remains_rate": "whether a residual is beyond chance, with the causes or, for a judgement on them, without",
     "unknown_from": "the rest of the answers are weighed again without a refused one",
+    "coefficient_interval": "an interval has one probability, within bounds or without",
     "leak": "wherever channels are compared",
     "common_first": "the sentence states the share",
     "own_number_gain": "wherever an instant or a phase counts",

@@ -113,6 +113,7 @@ FIGURES = {
     "std_rad": 1e-3, "fewer": 1, "uncertainty_rad": 1e-5, "stated_rad": 2e-3, "least_rad": 1e-3, "most_rad": 3e-3,
     "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93, "left": 0.4,
     "below_per_s": 4.2e-3, "unit": "rad", "percent": 99.0, "native_percent": 90.0, "index": 0, "samples": 5,
+    "parameters": ["coulomb_friction.exponent"],
 }  # fmt: skip
 
 
