@@ -64,10 +64,11 @@ def cautions(
 
 
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
-    """The parts of the records that no fit uses, and the effects that no half of the records confirms."""
+    """The parts of the records that no fit uses, and the effects that the runs do not confirm."""
+    refused = list(study.refused.values())
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
-        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
+        *(fact for place, fact in enumerate(refused) if fact not in refused[:place]),
         *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )
 

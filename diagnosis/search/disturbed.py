@@ -7,6 +7,7 @@ the greatest jumps of the other runs, so dropped samples, turbulence or a ringin
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.clock import Clock
+from diagnosis.search.odd_run import odd_alone
 from diagnosis.search.prepared import Prepared, prepared_and_tested
 from diagnosis.settings import SelectionSettings, Settings
 from diagnosis.where.jumps import Jumps, jumps
@@ -33,11 +35,15 @@ def prepared_undisturbed(
     clock: Clock,
     settings: Settings,
 ) -> tuple[Prepared, GapTest, tuple[Disturbance, ...]]:
-    """As `prepared_and_tested`, without disturbances where there is a gap.
+    """As `prepared_and_tested`, without disturbances where there is a gap, and without a run that alone shows it.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
+
+    def prepared_of(campaign: Campaign) -> tuple[Prepared, GapTest]:
+        return prepared_and_tested(campaign, model.of(campaign), kinds, clock, settings)
+
     prepared, test = prepared_and_tested(measured, model, kinds, clock, settings)
     if not test.detected:
         return prepared, test, ()
@@ -45,11 +51,32 @@ def prepared_undisturbed(
         disturbed = disturbances(measured, prepared.nominal)
     if disturbed:
         try:
-            kept = undisturbed(measured, disturbed)
-            return *prepared_and_tested(kept, model.of(kept), kinds, clock, settings), disturbed
+            measured = undisturbed(measured, disturbed)
+            prepared, test = prepared_of(measured)
         except TunnelError:  # the others do not determine the model
             disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
+    if not test.detected or any(one.used for one in disturbed):
+        return prepared, test, disturbed
+    with clock.step("where"):
+        odd = odd_alone(measured, prepared.in_wider_blocks().nominal, kinds)
+    for one in () if odd is None else without_its_start(odd):
+        with suppress(TunnelError):
+            others, without = prepared_of(undisturbed(measured, [one]))
+            if not without.detected:
+                return others, without, together(disturbed, [one])
     return prepared, test, disturbed
+
+
+def without_its_start(odd: Disturbance) -> tuple[Disturbance, ...]:
+    """An odd run without its start, where that is all, and then without the whole run."""
+    whole = replace(odd, kept_from_s=None)
+    return (whole,) if odd.kept_from_s is None else (odd, whole)
+
+
+def together(*found: Sequence[Disturbance]) -> tuple[Disturbance, ...]:
+    """Disturbances of several campaigns, one of each run: the last."""
+    by_run = {one.run: one for several in found for one in several}
+    return tuple(by_run[run] for run in sorted(by_run))
 
 
 def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
@@ -85,8 +112,7 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
 
     The logarithms of the greatest jumps are tested for up to a given share of outliers from the outside inwards
     (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
-    Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a run among the runs that
-    jump less. Their scatter is estimated with a prior, since few runs do not determine it.
+    run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not determine it.
     """
     if len(runs) < chosen.disturbed_fewest:
         return []
@@ -116,18 +142,20 @@ def _clear(p_value: float, chosen: SelectionSettings) -> bool:
 
 
 def undisturbed(campaign: Campaign, disturbed: Sequence[Disturbance]) -> Campaign:
-    """The campaign with disturbed runs up to their disturbance, or without them.
+    """The campaign with the undisturbed part of disturbed runs, or without them.
 
     Raises:
         TunnelError: where no run would remain.
     """
-    until = {one.run: one.kept_until_s for one in disturbed}
-    kept = campaign.without([name for name, end in until.items() if end is None])
+    found = {one.run: one for one in disturbed}
+    kept = campaign.without([name for name, one in found.items() if one.left_out])
     runs = []
     for run in kept.runs:
-        end = until.get(run.id)
-        if end is not None:
-            inside = run.record.time_s < end
+        one = found.get(run.id)
+        if one is not None and not one.used:
+            inside = (run.record.time_s >= (one.kept_from_s or -np.inf)) & (
+                run.record.time_s < (np.inf if one.kept_until_s is None else one.kept_until_s)
+            )
             run = replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
         runs.append(run)
     return replace(kept, runs=tuple(runs))

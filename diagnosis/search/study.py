@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from diagnosis.facts.disturbance import Disturbance
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
@@ -82,7 +83,7 @@ class Study:
         prepared: the campaign before any effect is fitted.
         gap: whether there is a gap, and where.
         answers: the answer first, then the most probable ones; empty without a gap.
-        refused: by names of refused answers, the effects that no half of the records confirms.
+        refused: by names of refused answers, the reason: effects that the runs do not confirm.
         rivals: causes weighed from outside the vocabulary.
         disturbed: disturbed runs, which are left out from the disturbance on.
         between_runs: for an unknown cause, the nominal fit to runs that differ; None where they do not.
@@ -95,7 +96,7 @@ class Study:
     prepared: Prepared
     gap: Gap
     answers: tuple[Answer, ...] = ()
-    refused: Mapping[Names, Names] = field(default_factory=dict)
+    refused: Mapping[Names, Fact] = field(default_factory=dict)
     rivals: tuple[FoundRival, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
     between_runs: Fit | None = None

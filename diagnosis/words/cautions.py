@@ -59,6 +59,20 @@ def _unresolved(given: Figures) -> str:
     )
 
 
+def _contradicted(given: Figures) -> str:
+    return (
+        f"{plain(*given['effects']).capitalize()} was left out of the answer: without run {given['run']} the "
+        "other runs do not show it, although they could."
+    )
+
+
+def _explains_too_much(given: Figures) -> str:
+    return (
+        f"{plain(*given['effects']).capitalize()} was left out of the answer: it would explain more than the "
+        "nominal model leaves in its runs."
+    )
+
+
 CAUTIONS: Mapping[str, Sentence] = {
     "stated": "{words}",
     "stiffness not stated": f"{_LEFT_OUT.format('no', 'do')}diagnose these separately.",
@@ -95,6 +109,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
     "causes may therefore differ from those of identify, which uses the whole record.",
     "unresolved": _unresolved,
+    "contradicted": _contradicted,
+    "explains too much": _explains_too_much,
     "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
