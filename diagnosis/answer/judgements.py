@@ -66,8 +66,11 @@ def cautions(
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
     """The parts of the records that no fit uses, and the effects that the runs do not confirm."""
     refused = list(study.refused.values())
+    runs = dict.fromkeys(study.single.values())
+    single = {run: tuple(name for name, only in study.single.items() if only == run) for run in runs}
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
+        *(Fact("only one run", {"effects": names, "run": run}) for run, names in single.items()),
         *(fact for place, fact in enumerate(refused) if fact not in refused[:place]),
         *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )

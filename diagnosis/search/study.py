@@ -20,6 +20,7 @@ from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named
 from diagnosis.search.sets import Names, Sets
+from diagnosis.search.surviving import shown_by_one
 from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place
@@ -90,6 +91,7 @@ class Study:
         caution: key of the caution about answers found in the view of the runs; empty: none.
         left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
             None.
+        single: by effect of the answer that one run alone can show, that run.
         seconds: wall time by step, s.
     """
 
@@ -102,6 +104,7 @@ class Study:
     between_runs: Fit | None = None
     caution: str = ""
     left_by_all: float | None = None
+    single: Mapping[str, str] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -203,18 +206,31 @@ class Study:
         answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
         with clock.step("choices"):
             answers = [replace(one, choices=_choices(one, sets)) for one in answers]
+        single = {} if answers[0].hypothesis is None else shown_by_one(answers[0].hypothesis.fit)
         base = sets.view.base
         return cls(
             prepared,
             gap,
-            tuple(answers),
+            tuple(_less_certain(answers) if single else answers),
             sets.refused,
             sets.rivals,
             between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
             caution=sets.view.caution,
             left_by_all=sets.left_by_all,
+            single=single,
             seconds=clock.seconds,
         )
+
+
+def _less_certain(answers: Sequence[Answer]) -> list[Answer]:
+    """The answers where one run alone shows an effect of the first: that run may be odd, and its cause unknown."""
+    first, *others = answers
+    share = 0.0 if first.hypothesis is None else first.hypothesis.fit.settings.selection.odd_share
+    doubt = share * first.probability
+    if all(one.effects != UNKNOWN for one in others):
+        others.append(Answer(UNKNOWN, 1.0, 0.0))
+    moved = [replace(one, probability=one.probability + doubt * (one.effects == UNKNOWN)) for one in others]
+    return [replace(first, probability=first.probability - doubt), *sorted(moved, key=lambda one: -one.probability)]
 
 
 def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:

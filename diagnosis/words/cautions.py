@@ -40,7 +40,8 @@ def _few_runs(given: Figures) -> str:
     if given["windy"]:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
-    return f"There {number} only: the form of the {motion} alone distinguishes the causes. Add runs {others}."
+    alone = ", and a fault of this run cannot be told from a cause" if given["runs"] == 1 else ""
+    return f"There {number} only: the form of the {motion} alone distinguishes the causes{alone}. Add runs {others}."
 
 
 def _none_held_out(given: Figures) -> str:
@@ -63,6 +64,13 @@ def _contradicted(given: Figures) -> str:
     return (
         f"{plain(*given['effects']).capitalize()} was left out of the answer: without run {given['run']} the "
         "other runs do not show it, although they could."
+    )
+
+
+def _only_one_run(given: Figures) -> str:
+    return (
+        f"Only run {given['run']} shows {plain(*given['effects'])}: the other runs could not, so a fault of this run is "
+        "not excluded. Repeat it."
     )
 
 
@@ -111,6 +119,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "unresolved": _unresolved,
     "contradicted": _contradicted,
     "explains too much": _explains_too_much,
+    "only one run": _only_one_run,
     "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (
