@@ -13,19 +13,24 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.facts.disturbance import Disturbance
+from diagnosis.likelihood.compression import compressed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.clock import Clock
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.odd_run import odd_alone
 from diagnosis.search.prepared import Prepared, prepared_and_tested
+from diagnosis.search.scatter import scattered
 from diagnosis.settings import SelectionSettings, Settings
 from diagnosis.where.jumps import Jumps, jumps
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
+
+_EARLY = 0.25  # share of a run, within which a disturbance may belong to its release
 
 
 def prepared_undisturbed(
@@ -45,7 +50,7 @@ def prepared_undisturbed(
         return prepared_and_tested(campaign, model.of(campaign), kinds, clock, settings)
 
     prepared, test = prepared_and_tested(measured, model, kinds, clock, settings)
-    if not test.detected:
+    if not test.detected and not prepared.cut:
         return prepared, test, ()
     with clock.step("where"):
         disturbed = disturbances(measured, prepared.nominal)
@@ -55,16 +60,23 @@ def prepared_undisturbed(
             prepared, test = prepared_of(measured)
         except TunnelError:  # the others do not determine the model
             disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
-    if not test.detected or any(one.used for one in disturbed):
+    if not (test.detected or prepared.cut) or any(one.used for one in disturbed):
         return prepared, test, disturbed
     with clock.step("where"):
-        odd = odd_alone(measured, prepared.in_wider_blocks().nominal, kinds)
+        nominal = compressed(prepared.uncut) if prepared.uncut else prepared.in_wider_blocks().nominal
+        odd = odd_alone(measured, nominal, kinds)
     for one in () if odd is None else without_its_start(odd):
         with suppress(TunnelError):
             others, without = prepared_of(undisturbed(measured, [one]))
-            if not without.detected:
+            if not others.cut and (not without.detected or differs(others.nominal, kinds)):
                 return others, without, together(disturbed, [one])
     return prepared, test, disturbed
+
+
+def differs(nominal: Fit, kinds: Sequence[type[Effect]]) -> bool:
+    """Whether chance differences between the runs explain the whole gap of the nominal model."""
+    fitted = scattered(nominal, kinds)
+    return fitted is not None and Hypothesis((), fitted).explains_runs
 
 
 def without_its_start(odd: Disturbance) -> tuple[Disturbance, ...]:
@@ -103,7 +115,14 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         begun = float(stamps[name][0]) + similarity.own(runs[name].start, "s")
         at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
         kept = until if last * frequency >= chosen.disturbed_kept else None
-        found.append(Disturbance(name, at, kept, p_value))
+        after = float(one.time[most]) + 1.0 / frequency
+        span = runs[name].reading.size * runs[name].interval
+        # of a start that is not free, as of a hand that holds the body, the rest is used
+        begins = (
+            kept is None and (span - after) * frequency >= chosen.disturbed_kept and after < _EARLY * span
+        )
+        starts = begun + similarity.own(after, "s") if begins else None
+        found.append(Disturbance(name, at, kept, p_value, kept_from_s=starts))
     return tuple(sorted(found, key=lambda one: one.run))
 
 

@@ -66,7 +66,7 @@ def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -
         kinds: the effects that may be named.
     """
     none = Hypothesis((), nominal)
-    found = _explaining([none], nominal)
+    found = _explaining([none], nominal, kinds)
     if not found or _acts_at_random(nominal):
         return None
     differing = scattered(nominal, kinds)
@@ -89,7 +89,7 @@ def odd_run(measured: Campaign, study: Study) -> Disturbance | None:
     nominal, answer = study.nominal, study.answer
     if not study.gap.test.detected:
         return None
-    found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal)
+    found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal, study.prepared.kinds)
     rivals, at_random = list[Hypothesis](), None
     if answer is not None and answer.effects != UNKNOWN:
         at_random = None if answer.random is None else answer.random.left
@@ -147,24 +147,44 @@ def _sets(study: Study) -> list[Hypothesis]:
     return found
 
 
-def _explaining(sets: Sequence[Hypothesis], nominal: Fit) -> list[OddRun]:
+def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRun]:
     """The runs without which a set explains the others up to chance and an error of its form.
 
     Args:
         sets: the nominal model first, in runs that repeat.
+        kinds: the effects that may be named, those between runs among them.
     """
     data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
     if data.driven or len(data.runs) < chosen.disturbed_fewest:
         return []
     tried = list(_without_a_run(sets, replaceable(data)))
     gaps = {one.index: gap_left(one.beside.fit) for one in tried if not one.beside.effects}
-    return [
+    tried = [one for one in tried if one.p_value < chosen.disturbed_rate and one.index in gaps]
+    found = [
         one
         for one in tried
-        if one.p_value < chosen.disturbed_rate
-        and one.index in gaps
-        and one.beside.leaves_within(error_of_form(gaps[one.index], weighing) * bool(one.beside.effects))
+        if one.beside.leaves_within(error_of_form(gaps[one.index], weighing) * bool(one.beside.effects))
     ]
+    return found or list(_beside_scatter([one for one in tried if not one.beside.effects], nominal, kinds))
+
+
+def _beside_scatter(tried: Sequence[OddRun], nominal: Fit, kinds: Sequence[type[Effect]]) -> Iterator[OddRun]:
+    """The runs without which chance differences explain the others, but which these do not explain themselves."""
+    differing = None if nominal.problem.scatter or not tried else scattered(nominal, kinds)
+    if differing is None:
+        return
+    for one in sorted(tried, key=lambda one: one.beside.fit.total)[:_RUNS]:
+        fitted = scattered(one.beside.fit, kinds)
+        others = None if fitted is None else Hypothesis((), fitted)
+        if others is not None and others.explains_runs and not _is_explained(differing, one.index):
+            yield replace(one, beside=others)
+
+
+def _is_explained(fitted: Fit, index: int) -> bool:
+    """Whether a fit explains one of its runs up to chance."""
+    residual, chosen = fitted.residuals[index], fitted.settings.weighing
+    margin = chosen.needless_chi2 + chosen.chance_stds * np.sqrt(2.0 * residual.size)
+    return float(residual @ residual) - residual.size < margin
 
 
 def _simplest(
@@ -177,26 +197,20 @@ def _simplest(
     """
     if not found:
         return None
-    weighing, share = nominal.settings.weighing, nominal.settings.selection.odd_share
-    runs = nominal.problem.data.runs
-    scale = Scale.of([*rivals, *(one.beside for one in found)], gap_left(nominal), weighing)
-    best = max(found, key=lambda one: scale.weight(one.beside))
+    share, count = nominal.settings.selection.odd_share, len(nominal.problem.data.runs)
+    sets = [*rivals, *(one.beside for one in found)]
+    scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
+    best = max(found, key=lambda one: _weight(one.beside, scale))
     # one of the runs is odd in a share of the campaigns
-    weight = scale.weight(best.beside) - np.log(len(runs) * (1.0 - share) / share)
-    weights = [_weight(one, scale) for one in rivals] + (
-        [] if at_random is None else [scale.weight_of(at_random)]
-    )
+    weight = _weight(best.beside, scale) - np.log(count * (1.0 - share) / share)
+    # the forms of an answer are free where that pays, and are not compared with an odd run
+    weights = [_weight(one, scale) + scale.chosen.form_price * one.further_numbers for one in rivals]
+    weights += [] if at_random is None else [scale.weight_of(at_random)]
     if weight <= max(weights, default=-np.inf):
         return None
-    for one in rivals:  # a deviation of its stiffness, damping or wind speed may be chance
-        residual = one.fit.residuals[best.index]
-        margin = weighing.chance_stds * np.sqrt(2.0 * residual.size)
-        if (
-            one.fit.problem.scatter
-            and float(residual @ residual) - residual.size < weighing.needless_chi2 + margin
-        ):
-            return None
-    return best
+    # a deviation of its stiffness, damping or wind speed may be chance
+    by_chance = any(one.fit.problem.scatter and _is_explained(one.fit, best.index) for one in rivals)
+    return None if by_chance else best
 
 
 def _weight(one: Hypothesis, scale: Scale) -> float:

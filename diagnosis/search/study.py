@@ -230,7 +230,10 @@ def _less_certain(answers: Sequence[Answer]) -> list[Answer]:
     if all(one.effects != UNKNOWN for one in others):
         others.append(Answer(UNKNOWN, 1.0, 0.0))
     moved = [replace(one, probability=one.probability + doubt * (one.effects == UNKNOWN)) for one in others]
-    return [replace(first, probability=first.probability - doubt), *sorted(moved, key=lambda one: -one.probability)]
+    return [
+        replace(first, probability=first.probability - doubt),
+        *sorted(moved, key=lambda one: -one.probability),
+    ]
 
 
 def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:

@@ -41,7 +41,8 @@ def _few_runs(given: Figures) -> str:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
     alone = ", and a fault of this run cannot be told from a cause" if given["runs"] == 1 else ""
-    return f"There {number} only: the form of the {motion} alone distinguishes the causes{alone}. Add runs {others}."
+    told = f"the form of the {motion} alone distinguishes the causes{alone}"
+    return f"There {number} only: {told}. Add runs {others}."
 
 
 def _none_held_out(given: Figures) -> str:
@@ -69,8 +70,8 @@ def _contradicted(given: Figures) -> str:
 
 def _only_one_run(given: Figures) -> str:
     return (
-        f"Only run {given['run']} shows {plain(*given['effects'])}: the other runs could not, so a fault of this run is "
-        "not excluded. Repeat it."
+        f"Only run {given['run']} shows {plain(*given['effects'])}: the other runs could not, so a fault of this "
+        "run is not excluded. Repeat it."
     )
 
 

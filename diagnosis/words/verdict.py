@@ -251,6 +251,8 @@ def _disturbed(found: Mapping[str, Any], *, no_gap: bool) -> str:
         why = "the other runs do not determine the model"
         return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
     unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
+    if begins is not None:
+        unused = f"its readings before {begins:.4g} s are not used"
     return f"Run {run} was disturbed at {at:.4g} s; {unused}."
 
 

@@ -50,7 +50,9 @@ def test_a_fit_without_a_run_is_the_linear_one(shared: Fit) -> None:
     for index in (0, 4):
         again = refitted_without(shared, index)
         assert again is not None
-        assert without.common[index, place] == pytest.approx(again.value(SEVERITY), abs=0.1 * again.std(SEVERITY))
+        assert without.common[index, place] == pytest.approx(
+            again.value(SEVERITY), abs=0.1 * again.std(SEVERITY)
+        )
         assert without.stds[index, place] == pytest.approx(again.std(SEVERITY), rel=0.05)
         assert without.total[index] == pytest.approx(again.total, abs=0.1)
         assert without.count[index] == again.count
@@ -88,7 +90,7 @@ def moment(drop: float) -> ProcessNoise:
     return ProcessNoise((), names, np.full(6, drop / 6.0), np.ones(6), 0.0, 0.0, [], 0.01)
 
 
-def test_a_random_moment_explains_no_more_than_is_missing(shared: Fit) -> None:
+def test_a_random_moment_explains_no_more_than_is_missing() -> None:
     base = nominal(campaign(CUBIC, duration=6.0))
     left = base.total - base.count
     assert not explains_too_much(moment(1.2 * left), base)
