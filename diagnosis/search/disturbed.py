@@ -65,11 +65,11 @@ def prepared_undisturbed(
     with clock.step("where"):
         nominal = compressed(prepared.uncut) if prepared.uncut else prepared.in_wider_blocks().nominal
         odd = odd_alone(measured, nominal, kinds)
-    for one in () if odd is None else without_its_start(odd):
+    for some in dict.fromkeys([odd, tuple(replace(one, kept_from_s=None) for one in odd)]) if odd else ():
         with suppress(TunnelError):
-            others, without = prepared_of(undisturbed(measured, [one]))
+            others, without = prepared_of(undisturbed(measured, some))
             if not others.cut and (not without.detected or differs(others.nominal, kinds)):
-                return others, without, together(disturbed, [one])
+                return others, without, together(disturbed, some)
     return prepared, test, disturbed
 
 
@@ -77,12 +77,6 @@ def differs(nominal: Fit, kinds: Sequence[type[Effect]]) -> bool:
     """Whether chance differences between the runs explain the whole gap of the nominal model."""
     fitted = scattered(nominal, kinds)
     return fitted is not None and Hypothesis((), fitted).explains_runs
-
-
-def without_its_start(odd: Disturbance) -> tuple[Disturbance, ...]:
-    """An odd run without its start, where that is all, and then without the whole run."""
-    whole = replace(odd, kept_from_s=None)
-    return (whole,) if odd.kept_from_s is None else (odd, whole)
 
 
 def together(*found: Sequence[Disturbance]) -> tuple[Disturbance, ...]:

@@ -13,7 +13,7 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
 from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.disturbed import prepared_undisturbed, together, undisturbed
-from diagnosis.search.odd_run import odd_run
+from diagnosis.search.odd_run import odd_runs
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets, compared
@@ -96,17 +96,17 @@ def without_odd_runs(
     """
     chosen = found.settings.selection
     for _ in range(max(1, int(chosen.disturbed_share * len(campaign.runs)))):
-        odd = odd_run(campaign, found)
-        if odd is None:
+        odd = odd_runs(campaign, found)
+        if not odd:
             break
         try:
-            campaign = undisturbed(campaign, [odd])
+            campaign = undisturbed(campaign, odd)
             again = study(campaign, model.of(campaign))
         except TunnelError:  # the others do not determine the model
             break
         if again.causes == UNKNOWN:
             break
-        disturbed = together(found.disturbed, [odd], again.disturbed)
+        disturbed = together(found.disturbed, odd, again.disturbed)
         found = replace(again, disturbed=disturbed, seconds=_sum(found, again))
     return found
 

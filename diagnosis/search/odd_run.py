@@ -7,7 +7,7 @@ logger filtered, its gain was another.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from scipy.special import fdtrc
 from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.partial import refit_releases
-from diagnosis.likelihood.residuals import gap_left, resonance
+from diagnosis.likelihood.residuals import CHANNELS, gap_left, resonance
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
@@ -41,22 +41,20 @@ _SETS, _RUNS = 6, 2  # sets, and runs of each, that are refitted
 
 
 @dataclass(frozen=True, eq=False)
-class OddRun:
-    """A run, and a set that may explain the others.
+class OddRuns:
+    """One run or a few, and a set that may explain the others.
 
     Args:
-        index: of the run.
+        p_values: by id of the runs, the probability by chance of so large a misfit, times the number of runs.
         beside: the set, fitted to the other runs.
-        p_value: probability by chance of so large a misfit of the run, times the number of runs.
     """
 
-    index: int
+    p_values: Mapping[str, float]
     beside: Hypothesis
-    p_value: float
 
 
-def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -> Disturbance | None:
-    """The run without which the nominal model explains the others; None where a cause explains all runs as simply.
+def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -> tuple[Disturbance, ...]:
+    """The runs without which the nominal model explains the others; none where a cause explains all as simply.
 
     Two effects never do: they cost more than an odd run.
 
@@ -68,27 +66,27 @@ def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -
     none = Hypothesis((), nominal)
     found = _explaining([none], nominal, kinds)
     if not found or _acts_at_random(nominal):
-        return None
+        return ()
     differing = scattered(nominal, kinds)
     single = sets_with_one_more([none], [kind for kind in kinds if kind.fitted])
     rivals = [*single, *([] if differing is None else [Hypothesis((), differing)])]
     return _stated(_simplest(found, rivals, nominal), measured, nominal)
 
 
-def odd_run(measured: Campaign, study: Study) -> Disturbance | None:
-    """The run that differs from the others as a whole; None where the answer explains the runs more simply.
+def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
+    """The runs that differ from the others as a whole; none where the answer explains the runs more simply.
 
     Args:
         measured: the campaign in its own units.
         study: of all its runs.
 
     Returns:
-        The likeliest, at one rate of false alarms. None for driven runs, and for a run that alone has its wind
-        state or its spring: its difference may be that of its conditions.
+        The likeliest, at one rate of false alarms. Driven runs are not among them, nor is a run that alone has its
+        wind state or its spring: its difference may be that of its conditions.
     """
     nominal, answer = study.nominal, study.answer
     if not study.gap.test.detected:
-        return None
+        return ()
     found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal, study.prepared.kinds)
     rivals, at_random = list[Hypothesis](), None
     if answer is not None and answer.effects != UNKNOWN:
@@ -97,26 +95,27 @@ def odd_run(measured: Campaign, study: Study) -> Disturbance | None:
     return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)
 
 
-def _stated(odd: OddRun | None, measured: Campaign, nominal: Fit) -> Disturbance | None:
-    """An odd run as a fact, with the start of the part that moves as the others do."""
-    if odd is None:
-        return None
-    run, start = nominal.problem.data.runs[odd.index], _free_from(odd, nominal)
-    if start is not None:
-        stamps = next(one.record.time_s for one in measured.runs if one.id == run.id)
-        start = float(stamps[0]) + nominal.problem.data.similarity.own(run.start + start, "s")
-    return Disturbance(run.id, None, None, odd.p_value, kept_from_s=start)
+def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
+    """Odd runs as facts, with the start of the part that moves as the others do."""
+    found, data = list[Disturbance](), nominal.problem.data
+    for name, p_value in {} if odd is None else odd.p_values.items():
+        index = [run.id for run in data.runs].index(name)
+        start = _free_from(odd.beside.fit, nominal, index)
+        if start is not None:
+            stamps = next(one.record.time_s for one in measured.runs if one.id == name)
+            start = float(stamps[0]) + data.similarity.own(data.runs[index].start + start, "s")
+        found.append(Disturbance(name, None, None, p_value, kept_from_s=start))
+    return tuple(found)
 
 
-def _free_from(odd: OddRun, nominal: Fit) -> float | None:
+def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
     """The time since the start of a run's fitted part from which the model of the others explains it, s.
 
     None where there is none within the first quarter of the run, or too few cycles are left.
     """
-    chosen, run = nominal.settings.selection, nominal.problem.data.runs[odd.index]
-    cycle = 1.0 / (resonance(nominal, odd.index) * run.interval)  # in blocks
-    others = odd.beside.fit
-    for quarters in range(1, round(run.reading.size / cycle) + 1):
+    chosen, run = nominal.settings.selection, nominal.problem.data.runs[index]
+    cycle = 1.0 / (resonance(nominal, index) * run.interval)  # in blocks
+    for quarters in range(1, int(run.reading.size / cycle) + 1):
         first = round(quarters * cycle / 4.0)
         if run.reading.size - first < chosen.disturbed_kept * cycle:
             return None
@@ -147,7 +146,7 @@ def _sets(study: Study) -> list[Hypothesis]:
     return found
 
 
-def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRun]:
+def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRuns]:
     """The runs without which a set explains the others up to chance and an error of its form.
 
     Args:
@@ -157,40 +156,63 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
     data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
     if data.driven or len(data.runs) < chosen.disturbed_fewest:
         return []
-    tried = list(_without_a_run(sets, replaceable(data)))
-    gaps = {one.index: gap_left(one.beside.fit) for one in tried if not one.beside.effects}
-    tried = [one for one in tried if one.p_value < chosen.disturbed_rate and one.index in gaps]
+    tried = [one for one in _without_a_run(sets) if max(one.p_values.values()) < chosen.disturbed_rate]
+    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in tried if not one.beside.effects}
     found = [
         one
         for one in tried
-        if one.beside.leaves_within(error_of_form(gaps[one.index], weighing) * bool(one.beside.effects))
+        if (gap := gaps.get(tuple(one.p_values))) is not None
+        and one.beside.leaves_within(error_of_form(gap, weighing) * bool(one.beside.effects))
     ]
-    return found or list(_beside_scatter([one for one in tried if not one.beside.effects], nominal, kinds))
-
-
-def _beside_scatter(tried: Sequence[OddRun], nominal: Fit, kinds: Sequence[type[Effect]]) -> Iterator[OddRun]:
-    """The runs without which chance differences explain the others, but which these do not explain themselves."""
-    differing = None if nominal.problem.scatter or not tried else scattered(nominal, kinds)
-    if differing is None:
-        return
-    for one in sorted(tried, key=lambda one: one.beside.fit.total)[:_RUNS]:
-        fitted = scattered(one.beside.fit, kinds)
+    if found or nominal.problem.scatter:
+        return found
+    several = _without_several([one for one in tried if not one.beside.effects], nominal)
+    differing = scattered(nominal, kinds)
+    for one in several:
+        if one.beside.leaves_within(np.zeros(len(CHANNELS))):
+            return [one]
+        fitted = None if differing is None else scattered(one.beside.fit, kinds)
         others = None if fitted is None else Hypothesis((), fitted)
-        if others is not None and others.explains_runs and not _is_explained(differing, one.index):
-            yield replace(one, beside=others)
+        if others is not None and others.explains_runs and not _are_explained(differing, one):
+            return [replace(one, beside=others)]
+    return []
 
 
-def _is_explained(fitted: Fit, index: int) -> bool:
-    """Whether a fit explains one of its runs up to chance."""
-    residual, chosen = fitted.residuals[index], fitted.settings.weighing
-    margin = chosen.needless_chi2 + chosen.chance_stds * np.sqrt(2.0 * residual.size)
-    return float(residual @ residual) - residual.size < margin
+def _without_several(tried: Sequence[OddRuns], nominal: Fit) -> Iterator[OddRuns]:
+    """The nominal model without a run, without a further one, and so on.
+
+    Each shows most of the gap of the runs that are left. One odd run may hide another.
+
+    Args:
+        tried: the nominal model without each run.
+    """
+    chosen, whole = nominal.settings.selection, nominal
+    known: dict[str, float] = {}
+    for _ in range(max(1, int(chosen.disturbed_share * len(nominal.problem.data.runs)))):
+        best = min(tried, key=lambda one: one.beside.fit.total, default=None)
+        if best is None or best.beside.fit.total - best.beside.fit.count > 0.5 * (whole.total - whole.count):
+            return
+        whole, known = best.beside.fit, {**known, **best.p_values}
+        yield OddRuns(known, best.beside)
+        if len(whole.problem.data.runs) < chosen.disturbed_fewest:
+            return
+        tried = [o for o in _without_a_run([best.beside]) if max(o.p_values.values()) < chosen.disturbed_rate]
+
+
+def _are_explained(fitted: Fit, odd: OddRuns) -> bool:
+    """Whether a fit explains some of its runs up to chance."""
+    chosen = fitted.settings.weighing
+    for run, residual in zip(fitted.problem.data.runs, fitted.residuals, strict=True):
+        margin = chosen.needless_chi2 + chosen.chance_stds * np.sqrt(2.0 * residual.size)
+        if run.id in odd.p_values and float(residual @ residual) - residual.size > margin:
+            return False
+    return True
 
 
 def _simplest(
-    found: Sequence[OddRun], rivals: Sequence[Hypothesis], nominal: Fit, at_random: FittedSet | None = None
-) -> OddRun | None:
-    """The likeliest odd run; None where there is none, or a rival set of causes of all runs weighs as much.
+    found: Sequence[OddRuns], rivals: Sequence[Hypothesis], nominal: Fit, at_random: FittedSet | None = None
+) -> OddRuns | None:
+    """The likeliest odd runs; None where there is none, or a rival set of causes of all runs weighs as much.
 
     Args:
         at_random: a rival set with a random moment.
@@ -202,14 +224,14 @@ def _simplest(
     scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
     best = max(found, key=lambda one: _weight(one.beside, scale))
     # one of the runs is odd in a share of the campaigns
-    weight = _weight(best.beside, scale) - np.log(count * (1.0 - share) / share)
+    weight = _weight(best.beside, scale) - len(best.p_values) * np.log(count * (1.0 - share) / share)
     # the forms of an answer are free where that pays, and are not compared with an odd run
     weights = [_weight(one, scale) + scale.chosen.form_price * one.further_numbers for one in rivals]
     weights += [] if at_random is None else [scale.weight_of(at_random)]
     if weight <= max(weights, default=-np.inf):
         return None
     # a deviation of its stiffness, damping or wind speed may be chance
-    by_chance = any(one.fit.problem.scatter and _is_explained(one.fit, best.index) for one in rivals)
+    by_chance = any(one.fit.problem.scatter and _are_explained(one.fit, best) for one in rivals)
     return None if by_chance else best
 
 
@@ -246,24 +268,27 @@ def _acts_at_random(nominal: Fit) -> bool:
     return any(one is not None and is_steady_noise(one, chosen) for one in tried)
 
 
-def _without_a_run(sets: Sequence[Hypothesis], runs: Sequence[int]) -> Iterator[OddRun]:
+def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
     """The sets without the runs that they explain least, the sets of least misfit first.
 
     The nominal model, the first of them, is fitted without each of the runs.
     """
+    data = sets[0].fit.problem.data
+    runs = replaceable(data)
     if not runs:
         return
     tried = []
     for one in sets:
         without = WithoutRuns.of(one.fit)
-        left = (without.total - without.count)[list(runs)]
+        left = (without.total - without.count)[runs]
         tried.append((float(left.min()), one, [runs[place] for place in np.argsort(left)[:_RUNS]]))
     likely = sorted(tried[1:], key=lambda given: given[0])[:_SETS]
-    for _, one, order in [(0.0, sets[0], list(runs)), *likely]:
+    for _, one, order in [(0.0, sets[0], runs), *likely]:
         for index in order:
             fitted = refitted_without(one.fit, index)
             if fitted is not None:
-                yield OddRun(index, Hypothesis(one.effects, fitted), _p_value(one.fit, fitted, index))
+                p_value = _p_value(one.fit, fitted, index)
+                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(one.effects, fitted))
 
 
 def _p_value(whole: Fit, others: Fit, index: int) -> float:
