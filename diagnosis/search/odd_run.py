@@ -190,7 +190,8 @@ def _without_several(tried: Sequence[OddRuns], nominal: Fit) -> Iterator[OddRuns
     known: dict[str, float] = {}
     for _ in range(max(1, int(chosen.disturbed_share * len(nominal.problem.data.runs)))):
         best = min(tried, key=lambda one: one.beside.fit.total, default=None)
-        if best is None or best.beside.fit.total - best.beside.fit.count > 0.5 * (whole.total - whole.count):
+        left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
+        if best is None or left > (1.0 - chosen.odd_holds) * (whole.total - whole.count):
             return
         whole, known = best.beside.fit, {**known, **best.p_values}
         yield OddRuns(known, best.beside)

@@ -100,6 +100,12 @@ class SelectionSettings:
         "judgement",
         "In one campaign in ten something happens to a run: a hand at the release, a filter, another gain.",
     )
+    odd_holds: float = setting(
+        0.5,
+        "Minimum share of the gap in each of several odd runs, of the gap of the runs that are left.",
+        "convention",
+        "Most of it.",
+    )
     gross_misfit: float = setting(
         0.01,
         "Minimum residual, as a share of the power of the readings, at which a fit fails to describe the motion.",

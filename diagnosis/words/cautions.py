@@ -40,9 +40,9 @@ def _few_runs(given: Figures) -> str:
     if given["windy"]:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
-    alone = ", and a fault of this run cannot be told from a cause" if given["runs"] == 1 else ""
-    told = f"the form of the {motion} alone distinguishes the causes{alone}"
-    return f"There {number} only: {told}. Add runs {others}."
+    told = f"the form of the {motion} alone distinguishes the causes"
+    fault = " A fault of this run cannot be told from a cause." if given["runs"] == 1 else ""
+    return f"There {number} only: {told}.{fault} Add runs {others}."
 
 
 def _none_held_out(given: Figures) -> str:
