@@ -88,15 +88,16 @@ def diagnose(
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
         answer = _answered(study, chosen, joint, say)
-        if answer.repeatability is not None and answer.repeatability.outlier:
-            say(f"without run {answer.repeatability.outlier}")
-            others = _without_outlier(study, answer.repeatability, chosen, settings, rivals)
+        runs = answer.repeatability
+        if runs is not None and runs.outlier:
+            say(f"without run {runs.outlier}")
+            others = _without_outlier(study, runs, chosen, settings, rivals)
             if others is not None and _explained_without(others, study):
                 answer = _answered(others, chosen, joint, say)
             elif others is not None:
                 known = 1.0 if others.answer is None else others.answer.probability
-                beside = replace(answer.repeatability, without_outlier=AnswerWithout(others.causes, known))
-                answer = replace(answer, repeatability=beside)
+                without = AnswerWithout(others.causes, known)
+                answer = replace(answer, repeatability=replace(runs, without_outlier=without))
         return _without(answer, leave_out).in_words()
 
 

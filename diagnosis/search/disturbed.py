@@ -68,7 +68,7 @@ def prepared_undisturbed(
     for some in dict.fromkeys([odd, tuple(replace(one, kept_from_s=None) for one in odd)]) if odd else ():
         with suppress(TunnelError):
             others, without = prepared_of(undisturbed(measured, some))
-            if not others.cut and (not without.detected or differs(others.nominal, kinds)):
+            if not others.cut and (not without.detected or differs(others.in_wider_blocks().nominal, kinds)):
                 return others, without, together(disturbed, some)
     return prepared, test, disturbed
 

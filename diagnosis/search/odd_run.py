@@ -13,7 +13,7 @@ from math import isclose
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import chdtrc, fdtrc
 
 from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.least_squares import Fit
@@ -25,7 +25,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale
-from diagnosis.search.process_noise import likeliest, random_moments
+from diagnosis.search.process_noise import acts_by, likeliest, random_moments, with_response
 from diagnosis.search.random_spectra import SOURCES
 from diagnosis.search.scatter import scattered
 from diagnosis.search.steady_noise import is_steady_noise
@@ -65,7 +65,7 @@ def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -
     """
     none = Hypothesis((), nominal)
     found = _explaining([none], nominal, kinds)
-    if not found or _acts_at_random(nominal):
+    if not found or _acts_at_random(nominal, found[0].beside.fit):
         return ()
     differing = scattered(nominal, kinds)
     single = sets_with_one_more([none], [kind for kind in kinds if kind.fitted])
@@ -98,7 +98,9 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
 def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     """Odd runs as facts, with the start of the part that moves as the others do."""
     found, data = list[Disturbance](), nominal.problem.data
-    for name, p_value in {} if odd is None else odd.p_values.items():
+    if odd is None:
+        return ()
+    for name, p_value in odd.p_values.items():
         index = [run.id for run in data.runs].index(name)
         start = _free_from(odd.beside.fit, nominal, index)
         if start is not None:
@@ -166,22 +168,20 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
     ]
     if found or nominal.problem.scatter:
         return found
-    several = _without_several([one for one in tried if not one.beside.effects], nominal)
     differing = scattered(nominal, kinds)
-    for one in several:
-        if one.beside.leaves_within(np.zeros(len(CHANNELS))):
-            return [one]
-        fitted = None if differing is None else scattered(one.beside.fit, kinds)
-        others = None if fitted is None else Hypothesis((), fitted)
-        if others is not None and others.explains_runs and not _are_explained(differing, one):
-            return [replace(one, beside=others)]
+    for one in _without_several([one for one in tried if not one.beside.effects], nominal, kinds):
+        if one.beside.explains_runs or one.beside.leaves_within(np.zeros(len(CHANNELS))):
+            known = not one.beside.fit.problem.scatter
+            return [one] if known or (differing is not None and not _are_explained(differing, one)) else []
     return []
 
 
-def _without_several(tried: Sequence[OddRuns], nominal: Fit) -> Iterator[OddRuns]:
-    """The nominal model without a run, without a further one, and so on.
+def _without_several(
+    tried: Sequence[OddRuns], nominal: Fit, kinds: Sequence[type[Effect]]
+) -> Iterator[OddRuns]:
+    """The nominal model without a run, without a further one, and so on, beside chance differences if they show.
 
-    Each shows most of the gap of the runs that are left. One odd run may hide another.
+    Each run shows most of the gap of the runs that are left. One odd run may hide another.
 
     Args:
         tried: the nominal model without each run.
@@ -189,15 +189,42 @@ def _without_several(tried: Sequence[OddRuns], nominal: Fit) -> Iterator[OddRuns
     chosen, whole = nominal.settings.selection, nominal
     known: dict[str, float] = {}
     for _ in range(max(1, int(chosen.disturbed_share * len(nominal.problem.data.runs)))):
-        best = min(tried, key=lambda one: one.beside.fit.total, default=None)
-        left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
-        if best is None or left > (1.0 - chosen.odd_holds) * (whole.total - whole.count):
+        differing = scattered(whole, kinds)
+        best = _worst_of(whole, tried) if differing is None else _worst_beside(differing, whole)
+        if best is None or len(best.beside.fit.residuals) < chosen.disturbed_fewest - 1:
             return
         whole, known = best.beside.fit, {**known, **best.p_values}
-        yield OddRuns(known, best.beside)
-        if len(whole.problem.data.runs) < chosen.disturbed_fewest:
-            return
-        tried = [o for o in _without_a_run([best.beside]) if max(o.p_values.values()) < chosen.disturbed_rate]
+        beside = scattered(whole, kinds)
+        yield OddRuns(known, best.beside if beside is None else Hypothesis((), beside))
+        tried = [] if beside is not None else list(_without_a_run([best.beside]))
+
+
+def _worst_of(whole: Fit, tried: Sequence[OddRuns]) -> OddRuns | None:
+    """The run without which most of the gap vanishes; None where there is none."""
+    chosen = whole.settings.selection
+    best = min(tried, key=lambda one: one.beside.fit.total, default=None)
+    left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
+    if best is None or max(best.p_values.values()) >= chosen.disturbed_rate:
+        return None
+    return best if left < (1.0 - chosen.odd_holds) * (whole.total - whole.count) else None
+
+
+def _worst_beside(differing: Fit, whole: Fit) -> OddRuns | None:
+    """The run that shows most of the gap beside chance differences; None where there is none.
+
+    Args:
+        whole: the fit without them.
+    """
+    chosen, data = whole.settings.selection, whole.problem.data
+    own = np.array([float(r @ r) - r.size for r in differing.residuals])
+    index = int(np.argmax(own))
+    size = differing.residuals[index].size
+    p_value = min(1.0, own.size * float(chdtrc(size, own[index] + size)))
+    alone = own[index] > chosen.odd_holds * float(np.maximum(own, 0.0).sum())
+    if index not in replaceable(data) or not alone or p_value >= chosen.disturbed_rate:
+        return None
+    fitted = refitted_without(whole, index)
+    return None if fitted is None else OddRuns({data.runs[index].id: p_value}, Hypothesis((), fitted))
 
 
 def _are_explained(fitted: Fit, odd: OddRuns) -> bool:
@@ -221,6 +248,11 @@ def _simplest(
     if not found:
         return None
     share, count = nominal.settings.selection.odd_share, len(nominal.problem.data.runs)
+    if any(
+        one.beside.fit.problem.scatter for one in found
+    ):  # a set that leaves a gap has no evidence to compare
+        rivals = [one for one in rivals if one.leaves_within(np.zeros(len(CHANNELS)))]
+        at_random = None
     sets = [*rivals, *(one.beside for one in found)]
     scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
     best = max(found, key=lambda one: _weight(one.beside, scale))
@@ -262,11 +294,27 @@ def _same_spring(one: float | None, other: float | None) -> bool:
     return isclose(one, other, rel_tol=SPRING_TOLERANCE)
 
 
-def _acts_at_random(nominal: Fit) -> bool:
-    """Whether a random moment that is alike in all runs in which it acts explains the residual."""
+def _acts_at_random(nominal: Fit, others: Fit) -> bool:
+    """Whether a random moment alike in all runs in which it acts explains the residual, and the others may hide it.
+
+    Args:
+        others: the fit to the runs that are not odd, which needs no random moment.
+    """
     chosen = nominal.settings.moment
-    tried = (likeliest(random_moments(nominal, source), chosen) for source in SOURCES)
-    return any(one is not None and is_steady_noise(one, chosen) for one in tried)
+    for source in SOURCES:
+        found = likeliest(random_moments(nominal, source), chosen)
+        if found is not None and is_steady_noise(found, chosen):
+            noisy = with_response(others, found.spectrum)
+            if noisy is None or not acts_by(_expected(others.problem.data, noisy), chosen):
+                return True
+    return False
+
+
+def _expected(data: Data, noisy: Data) -> float:
+    """The drop of −2 ln L by a random moment that runs with its response as noise would show, dimensionless."""
+    pairs = zip(data.runs, noisy.runs, strict=True)
+    ratios = [(run.reading.size, more.noise.variance / run.noise.variance) for run, more in pairs]
+    return float(sum(size * (ratio - 1.0 - np.log(ratio)) for size, ratio in ratios))
 
 
 def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:

@@ -64,9 +64,8 @@ def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
             left += float(residual @ residual) - residual.size
             freedom += residual.size
     chosen = repeating.settings.moment
-    return process.drop > chosen.explains_most * max(left, 0.0) + chosen.explains_stds * np.sqrt(
-        2.0 * freedom
-    )
+    margin = chosen.explains_stds * float(np.sqrt(2.0 * freedom))
+    return process.drop > chosen.explains_most * max(left, 0.0) + margin
 
 
 def contradicted(whole: Fit) -> dict[str, str]:

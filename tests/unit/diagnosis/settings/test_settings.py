@@ -48,6 +48,7 @@ KNOWN_IN_SEVERAL = {
     "disturbed_share": "of either kind of disturbed run",
     "disturbed_kept": "before a disturbance, and after the start of a run",
     "survives_stds": "what shows an effect, and what contradicts it",
+    "odd_holds": "of the runs that repeat, and beside chance differences",
     "odd_share": "the price of an odd run, and the doubt about a cause that one run alone shows",
     "set_price": "scatter pays the price of an effect, and so would one that acts later on",
     "steepness": "by the same measure as an effect",
