@@ -16,6 +16,7 @@ from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable, without_short
+from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.repeatability import AnswerWithout, Repeatability
@@ -27,7 +28,9 @@ from diagnosis.noise.mains import hum_noted
 from diagnosis.remainder.ways import way_for
 from diagnosis.result import Coefficients, Diagnosis
 from diagnosis.search.clock import Progress
+from diagnosis.search.disturbed import together
 from diagnosis.search.investigate import investigate
+from diagnosis.search.odd_run import replaceable
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.study import Study
@@ -89,32 +92,55 @@ def diagnose(
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings, rivals)
-        say("explained share")  # the place, and the answer without the remainder
-        study, closes = confirmed(study)
-        patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
-        answer = _assembled(study, chosen, closes, patched, unpatched)
-        if chosen.limit_cycles:
-            answer = limit_cycle_answer(answer, chosen.remarks)
-        else:
-            answer = _with_remainder(answer, study, chosen, say)
-        if answer.repeatability is not None and answer.repeatability.outlier:
-            say(f"without run {answer.repeatability.outlier}")
-            answer = _and_without_outlier(answer, answer.repeatability, chosen, settings, rivals)
+        answer = _answered(study, chosen, joint, say)
+        runs = answer.repeatability
+        if runs is not None and runs.outlier:
+            say(f"without run {runs.outlier}")
+            others = _without_outlier(study, runs, chosen, settings, rivals)
+            if others is not None and _explained_without(others, study):
+                answer = _answered(others, chosen, joint, say)
+            elif others is not None:
+                known = 1.0 if others.answer is None else others.answer.probability
+                without = AnswerWithout(others.causes, known)
+                answer = replace(answer, repeatability=replace(runs, without_outlier=without))
         answer = replace(_withheld(answer), remarks=(*short, *answer.remarks))
         return _without(answer, leave_out).in_words()
 
 
-def _and_without_outlier(
-    answer: Diagnosis, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
-) -> Diagnosis:
-    """The answer, with the answer for the other runs beside it; unchanged where they cannot be diagnosed."""
-    others = replace(chosen, campaign=chosen.campaign.without([runs.outlier]))
+def _answered(study: Study, chosen: Chosen, joint: JointModel | None, say: Progress) -> Diagnosis:
+    """The answer of a study."""
+    say("explained share")  # the place, and the answer without the remainder
+    study, closes = confirmed(study)
+    patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
+    answer = _assembled(study, chosen, closes, patched, unpatched)
+    if chosen.limit_cycles:
+        return limit_cycle_answer(answer, chosen.remarks)
+    return _with_remainder(answer, study, chosen, say)
+
+
+def _without_outlier(
+    study: Study, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
+) -> Study | None:
+    """The study without the run that deviates far beyond the others; None where these cannot be diagnosed."""
+    p_value = next(one.p_value for one in runs.runs if one.id == runs.outlier)
+    odd = Disturbance(runs.outlier, None, None, p_value)
     try:
-        study = _studied(others, None, settings, rivals)
+        campaign = chosen.campaign.without([runs.outlier])
+        found = _studied(replace(chosen, campaign=campaign), None, settings, rivals)
     except TunnelError:
-        return answer
-    known = 1.0 if study.answer is None else study.answer.probability
-    return replace(answer, repeatability=replace(runs, without_outlier=AnswerWithout(study.causes, known)))
+        return None
+    return replace(found, disturbed=together(study.disturbed, found.disturbed, [odd]))
+
+
+def _explained_without(others: Study, study: Study) -> bool:
+    """Whether the gap vanishes without the runs that one study leaves out and another does not.
+
+    A run that alone has its wind state or its spring may differ for that reason.
+    """
+    data = study.nominal.problem.data
+    able = {data.runs[index].id for index in replaceable(data)}
+    kept = {run.id for run in others.campaign.runs}
+    return not others.gap.test.detected and all(run.id in able | kept for run in data.runs)
 
 
 def _withheld(answer: Diagnosis) -> Diagnosis:

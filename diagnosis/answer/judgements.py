@@ -64,12 +64,18 @@ def cautions(
 
 
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
-    """The parts of the records that no fit uses, and the effects that other readings do not confirm."""
+    """The parts of the records that no fit uses, and the effects that the runs do not confirm."""
+    refused = list(study.refused.values())
+    alone = {name: run for name, run in study.single.items() if name in study.fitted}
+    single = {
+        run: tuple(name for name in alone if alone[name] == run) for run in dict.fromkeys(alone.values())
+    }
     return (
         *((Fact("cut"),) if study.prepared.cut else ()),
         *one_amplitude(study),
         *((Fact("needless", {"effects": study.needless}),) if study.needless else ()),
-        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
+        *(Fact("only one run", {"effects": names, "run": run}) for run, names in single.items()),
+        *(fact for place, fact in enumerate(refused) if fact not in refused[:place]),
         *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )
 

@@ -7,23 +7,30 @@ the greatest jumps of the other runs, so dropped samples, turbulence or a ringin
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from diagnosis.facts.disturbance import Disturbance
+from diagnosis.likelihood.compression import compressed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.clock import Clock
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.odd_run import odd_alone
 from diagnosis.search.prepared import Prepared, prepared_and_tested
+from diagnosis.search.scatter import scattered
 from diagnosis.settings import SelectionSettings, Settings
 from diagnosis.where.jumps import Jumps, jumps
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
+
+_EARLY = 0.25  # share of a run, within which a disturbance may belong to its release
 
 
 def prepared_undisturbed(
@@ -33,23 +40,49 @@ def prepared_undisturbed(
     clock: Clock,
     settings: Settings,
 ) -> tuple[Prepared, GapTest, tuple[Disturbance, ...]]:
-    """As `prepared_and_tested`, without disturbances where there is a gap.
+    """As `prepared_and_tested`, without disturbances where there is a gap, and without a run that alone shows it.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
+
+    def prepared_of(campaign: Campaign) -> tuple[Prepared, GapTest]:
+        return prepared_and_tested(campaign, model.of(campaign), kinds, clock, settings)
+
     prepared, test = prepared_and_tested(measured, model, kinds, clock, settings)
-    if not test.detected:
+    if not test.detected and not prepared.cut:
         return prepared, test, ()
     with clock.step("where"):
         disturbed = disturbances(measured, prepared.nominal)
     if disturbed:
         try:
-            kept = undisturbed(measured, disturbed)
-            return *prepared_and_tested(kept, model.of(kept), kinds, clock, settings), disturbed
+            measured = undisturbed(measured, disturbed)
+            prepared, test = prepared_of(measured)
         except TunnelError:  # the others do not determine the model
             disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
+    if not (test.detected or prepared.cut) or any(one.used for one in disturbed):
+        return prepared, test, disturbed
+    with clock.step("where"):
+        nominal = compressed(prepared.uncut) if prepared.uncut else prepared.in_wider_blocks().nominal
+        odd = odd_alone(measured, nominal, kinds)
+    for some in dict.fromkeys([odd, tuple(replace(one, kept_from_s=None) for one in odd)]) if odd else ():
+        with suppress(TunnelError):
+            others, without = prepared_of(undisturbed(measured, some))
+            if not others.cut and (not without.detected or differs(others.in_wider_blocks().nominal, kinds)):
+                return others, without, together(disturbed, some)
     return prepared, test, disturbed
+
+
+def differs(nominal: Fit, kinds: Sequence[type[Effect]]) -> bool:
+    """Whether chance differences between the runs explain the whole gap of the nominal model."""
+    fitted = scattered(nominal, kinds)
+    return fitted is not None and Hypothesis((), fitted).explains_runs
+
+
+def together(*found: Sequence[Disturbance]) -> tuple[Disturbance, ...]:
+    """Disturbances of several campaigns, one of each run: the last."""
+    by_run = {one.run: one for several in found for one in several}
+    return tuple(by_run[run] for run in sorted(by_run))
 
 
 def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
@@ -76,7 +109,14 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         begun = origins[name] + similarity.own(runs[name].start, "s")
         at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
         kept = until if last * frequency >= chosen.disturbed_kept else None
-        found.append(Disturbance(name, at, kept, p_value))
+        after = float(one.time[most]) + 1.0 / frequency
+        span = runs[name].reading.size * runs[name].interval
+        # of a start that is not free, as of a hand that holds the body, the rest is used
+        begins = (
+            kept is None and (span - after) * frequency >= chosen.disturbed_kept and after < _EARLY * span
+        )
+        starts = begun + similarity.own(after, "s") if begins else None
+        found.append(Disturbance(name, at, kept, p_value, kept_from_s=starts))
     return tuple(sorted(found, key=lambda one: one.run))
 
 
@@ -85,8 +125,7 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
 
     The logarithms of the greatest jumps are tested for up to a given share of outliers from the outside inwards
     (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
-    Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a run among the runs that
-    jump less. Their scatter is estimated with a prior, since few runs do not determine it.
+    run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not determine it.
     """
     if len(runs) < chosen.disturbed_fewest:
         return []
@@ -116,18 +155,20 @@ def _clear(p_value: float, chosen: SelectionSettings) -> bool:
 
 
 def undisturbed(campaign: Campaign, disturbed: Sequence[Disturbance]) -> Campaign:
-    """The campaign with disturbed runs up to their disturbance, or without them.
+    """The campaign with the undisturbed part of disturbed runs, or without them.
 
     Raises:
         TunnelError: where no run would remain.
     """
-    until = {one.run: one.kept_until_s for one in disturbed}
-    kept = campaign.without([name for name, end in until.items() if end is None])
+    found = {one.run: one for one in disturbed}
+    kept = campaign.without([name for name, one in found.items() if one.left_out])
     runs = []
     for run in kept.runs:
-        end = until.get(run.id)
-        if end is not None:
-            inside = run.record.time_s < end - run.clock_s
+        one = found.get(run.id)
+        if one is not None and not one.used:
+            clock = run.record.time_s + run.clock_s
+            begin = -np.inf if one.kept_from_s is None else one.kept_from_s
+            inside = (clock >= begin) & (clock < (np.inf if one.kept_until_s is None else one.kept_until_s))
             run = replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
         runs.append(run)
     return replace(kept, runs=tuple(runs))

@@ -145,6 +145,13 @@ class Scale:
         cost = hypothesis.fit.scatter_cost(self.known)
         return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
+    def weight_of(self, given: FittedSet) -> float:
+        """Logarithm of the weight of a set whose misfit is known."""
+        costs, left = (given.scatter_cost, self.scatter_cost), given.excess - self.least
+        return log_weight(
+            left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.compared
+        )
+
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
         """Logarithm of the weight of the set with one more effect and no residual.
 

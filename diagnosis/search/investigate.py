@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,8 @@ from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
 from diagnosis.search.clock import Clock, Progress
-from diagnosis.search.disturbed import prepared_undisturbed
+from diagnosis.search.disturbed import prepared_undisturbed, together, undisturbed
+from diagnosis.search.odd_run import odd_runs
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets, compared
@@ -23,6 +24,7 @@ from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def investigate(
@@ -55,7 +57,7 @@ def investigate(
     """
     model = model or nominal_model(campaign)
 
-    def study(model: NominalModel) -> Study:
+    def study(campaign: Campaign, model: NominalModel) -> Study:
         clock = Clock(progress)
         prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
         with clock.step("where" if test.detected else "nominal fit"):
@@ -73,10 +75,48 @@ def investigate(
             raise ValueError("no view of the runs applies")
         return replace(Study.of_sets(sets, gap, clock), disturbed=disturbed)
 
-    found = study(model)
+    found = study(campaign, model)
     lead = likeliest_lead(found)
-    again = found if lead == 0.0 else study(model.with_lead(lead))
-    return again if explains_more(again, found) else found
+    again = found if lead == 0.0 else study(campaign, model.with_lead(lead))
+    return without_odd_runs(again if explains_more(again, found) else found, campaign, model, study)
+
+
+def without_odd_runs(
+    found: Study, campaign: Campaign, model: NominalModel, study: Callable[[Campaign, NominalModel], Study]
+) -> Study:
+    """The study of the runs without those that differ from the others as a whole.
+
+    Args:
+        found: the study of all runs.
+        model: the nominal model of all runs.
+        study: makes the study of a campaign.
+
+    Returns:
+        With the runs that are left out among the disturbed ones; unchanged where no set explains the others.
+    """
+    chosen = found.settings.selection
+    for _ in range(max(1, int(chosen.disturbed_share * len(campaign.runs)))):
+        odd = odd_runs(campaign, found)
+        if not odd:
+            break
+        try:
+            campaign = undisturbed(campaign, odd)
+            again = study(campaign, model.of(campaign))
+        except TunnelError:  # the others do not determine the model
+            break
+        if again.causes == UNKNOWN:
+            break
+        disturbed = together(found.disturbed, odd, again.disturbed)
+        found = replace(again, disturbed=disturbed, seconds=_sum(found, again))
+    return found
+
+
+def _sum(one: Study, other: Study) -> dict[str, float]:
+    """Wall time by step of two studies, s."""
+    return {
+        step: one.seconds.get(step, 0.0) + other.seconds.get(step, 0.0)
+        for step in {**one.seconds, **other.seconds}
+    }
 
 
 def nominal_study(

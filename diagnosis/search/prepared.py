@@ -66,6 +66,7 @@ class Prepared:
         rested: runs that end with a long rest, which the fits leave out.
         tested: the nominal fit in the blocks in which noise and gap were tested, where those of ``nominal`` are
             wider.
+        uncut: the nominal fit to whole runs, where these were cut.
     """
 
     campaign: Campaign
@@ -80,6 +81,7 @@ class Prepared:
     cut: bool = False
     rested: tuple[str, ...] = ()
     tested: Fit | None = None
+    uncut: Fit | None = None
 
     @property
     def read_off(self) -> tuple[str, ...]:
@@ -180,12 +182,13 @@ def prepared_and_tested(
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
         missed = misses_motion(nominal) and not campaign.driven
         cut = missed and second_mode_alone(nominal, kinds) is None
+        uncut = nominal if cut else None
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal = as_stated(nominal, kinds)
         nominal, noise, test = gap_or_colour(nominal, noise, trend, step=step, coarse_step=coarse)
     known = (noise, trend, step, coarse, hum, nominal, cut)
-    return Prepared(campaign, similarity, tuple(kinds), *known), test
+    return Prepared(campaign, similarity, tuple(kinds), *known, uncut=uncut), test
 
 
 def _without_hum(

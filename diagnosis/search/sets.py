@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
-from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.scatter import drifting, with_scatter
+from diagnosis.search.surviving import refusal, refusal_with_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 if TYPE_CHECKING:
@@ -37,10 +38,10 @@ class Sets:
         hypotheses: sets of effects fitted in it.
         random: answers with a random moment that passed its tests.
         rivals: causes from outside the vocabulary, weighed beside the sets.
-        refused: by names of refused answers, the effects that no half of the records confirms.
+        refused: by names of refused answers, the reason: effects that the runs do not confirm.
         left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
             None.
-        settled: the answer fitted to whole runs, with every effect confirmed by one half; None where the answer is
+        settled: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer is
             not a fitted set, or is not settled yet.
     """
 
@@ -48,7 +49,7 @@ class Sets:
     hypotheses: tuple[Hypothesis, ...]
     random: tuple[RandomAnswer, ...] = ()
     rivals: tuple[FoundRival, ...] = ()
-    refused: Mapping[Names, Names] = field(default_factory=dict)
+    refused: Mapping[Names, Fact] = field(default_factory=dict)
     left_by_all: float | None = None
     settled: Hypothesis | None = None
 
@@ -112,15 +113,23 @@ class Sets:
         found = self.fitted(names)
         return found if self.moment(names, found) is None else None
 
-    def without(self, names: Names, lost: Names) -> Sets:
-        """The sets without one that has effects unconfirmed by both halves of the records.
+    def without(self, names: Names, reason: Fact | None) -> Sets:
+        """The sets without one that the runs do not confirm.
 
         Args:
             names: of the set, sorted.
-            lost: the unconfirmed effects; empty where the set cannot be fitted to whole runs.
+            reason: of the refusal; None where the set cannot be fitted to whole runs.
         """
         kept = tuple(h for h in self.hypotheses if h.names != names)
-        return replace(self, hypotheses=kept, refused={**self.refused, **({names: lost} if lost else {})})
+        return replace(self, hypotheses=kept, refused=self._refused(names, reason))
+
+    def without_moment(self, moment: RandomAnswer, reason: Fact) -> Sets:
+        """The sets without a random moment that the runs do not confirm."""
+        kept = tuple(one for one in self.random if one is not moment)
+        return replace(self, random=kept, refused=self._refused(moment.effects, reason))
+
+    def _refused(self, names: Names, reason: Fact | None) -> Mapping[Names, Fact]:
+        return self.refused if reason is None else {**self.refused, names: reason}
 
     def in_whole_runs(self) -> dict[Names, Hypothesis | None]:
         """The answer and its parts fitted to whole runs, by names; None where that fails."""
@@ -137,7 +146,7 @@ class Sets:
 
 
 def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
-    """The sets with those that the answer is compared with, without those that no half of the runs confirms.
+    """The sets with those that the answer is compared with, without those that the runs do not confirm.
 
     Args:
         rivals: from outside the vocabulary.
@@ -174,14 +183,24 @@ def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
 
 
 def resolved(sets: Sets) -> Sets:
-    """Drop answers that cannot be fitted to whole runs, or have an effect that no half of them confirms."""
-    while (answer := sets.answer) is not None:
-        whole = sets.view.settled(answer)
-        lost = () if whole is None else unresolved(whole.fit)
-        if whole is not None and not lost:
-            return replace(sets, settled=whole)
-        sets = sets.without(answer.names, lost)
-    return sets
+    """Drop answers that cannot be fitted to whole runs, or have an effect that the runs do not confirm."""
+    while True:
+        names = sets.weighed[0].effects
+        found = sets.fitted(names)
+        moment = sets.moment(names, found)
+        if moment is not None:
+            reason = refusal_with_moment(moment, sets.view.repeating)
+            if reason is None:
+                return sets
+            sets = sets.without_moment(moment, reason)
+        elif found is not None:
+            whole = sets.view.settled(found)
+            reason = None if whole is None else refusal(whole.fit)
+            if whole is not None and reason is None:
+                return replace(sets, settled=whole)
+            sets = sets.without(names, reason)
+        else:
+            return sets
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from diagnosis.facts.disturbance import Disturbance
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
@@ -19,6 +20,7 @@ from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named
 from diagnosis.search.sets import Names, Sets
+from diagnosis.search.surviving import shown_by_one
 from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place
@@ -82,7 +84,7 @@ class Study:
         prepared: the campaign before any effect is fitted.
         gap: whether there is a gap, and where.
         answers: the answer first, then the most probable ones; empty without a gap.
-        refused: by names of refused answers, the effects that no half of the records confirms.
+        refused: by names of refused answers, the reason: effects that the runs do not confirm.
         needless: effects of the likeliest set that do not reduce the residual on held-out readings.
         rivals: causes weighed from outside the vocabulary.
         disturbed: disturbed runs, which are left out from the disturbance on.
@@ -90,19 +92,21 @@ class Study:
         caution: key of the caution about answers found in the view of the runs; empty: none.
         left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
             None.
+        single: by effect of the answer that one run alone can show, that run.
         seconds: wall time by step, s.
     """
 
     prepared: Prepared
     gap: Gap
     answers: tuple[Answer, ...] = ()
-    refused: Mapping[Names, Names] = field(default_factory=dict)
+    refused: Mapping[Names, Fact] = field(default_factory=dict)
     needless: Names = ()
     rivals: tuple[FoundRival, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
     between_runs: Fit | None = None
     caution: str = ""
     left_by_all: float | None = None
+    single: Mapping[str, str] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -226,18 +230,34 @@ class Study:
         answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
         with clock.step("choices"):
             answers = [replace(one, choices=_choices(one, sets)) for one in answers]
+        single = {} if answers[0].hypothesis is None else shown_by_one(answers[0].hypothesis.fit)
         base = sets.view.base
         return cls(
             prepared,
             gap,
-            tuple(answers),
+            tuple(_less_certain(answers) if single else answers),
             refused=sets.refused,
             rivals=sets.rivals,
             between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
             caution=sets.view.caution,
             left_by_all=sets.left_by_all,
+            single=single,
             seconds=clock.seconds,
         )
+
+
+def _less_certain(answers: Sequence[Answer]) -> list[Answer]:
+    """The answers where one run alone shows an effect of the first: that run may be odd, and its cause unknown."""
+    first, *others = answers
+    share = 0.0 if first.hypothesis is None else first.hypothesis.fit.settings.selection.odd_share
+    doubt = share * first.probability
+    if all(one.effects != UNKNOWN for one in others):
+        others.append(Answer(UNKNOWN, 1.0, 0.0))
+    moved = [replace(one, probability=one.probability + doubt * (one.effects == UNKNOWN)) for one in others]
+    return [
+        replace(first, probability=first.probability - doubt),
+        *sorted(moved, key=lambda one: -one.probability),
+    ]
 
 
 def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:

@@ -94,6 +94,18 @@ class SelectionSettings:
         "A record needs three cycles, and its damping needs twice as many.",
         unit="cycles",
     )
+    odd_share: float = setting(
+        0.1,
+        "Probability of a run that differs from all others as a whole, before the records are seen.",
+        "judgement",
+        "In one campaign in ten something happens to a run: a hand at the release, a filter, another gain.",
+    )
+    odd_holds: float = setting(
+        0.5,
+        "Minimum share of the gap in each of several odd runs, of the gap of the runs that are left.",
+        "convention",
+        "Most of it.",
+    )
     gross_misfit: float = setting(
         0.01,
         "Minimum residual, as a share of the power of the readings, at which a fit fails to describe the motion.",

@@ -202,6 +202,20 @@ class SearchSettings:
         "convention",
         unit="std",
     )
+    survives_size: float = setting(
+        0.5,
+        "Minimum size of an effect without any one run that the others could replace, as a share of its size.",
+        "convention",
+        "The other runs then confirm more than half of it.",
+    )
+    survives_stds: float = setting(
+        3.0,
+        "Minimum standard deviations by which the other runs must miss that size; and minimum size of an effect "
+        "for them to show it.",
+        "convention",
+        "One of 700 runs misses it by chance.",
+        unit="std",
+    )
     gravity_cancels: float = setting(
         0.8,
         "Maximum share of an unstated spring that gravity may cancel.",
@@ -319,6 +333,17 @@ class RandomMomentSettings:
         "Share of the residual explained by one law, on held-out runs, above which no random moment is sought.",
         "judgement",
         "At most a tenth of the residual then differs from run to run.",
+    )
+    explains_most: float = setting(
+        1.5,
+        "Maximum drop of −2 ln L by a random moment, as a multiple of the χ² beyond noise that the nominal model "
+        "leaves in its runs.",
+        "judgement",
+        "The release of a run absorbs part of a random motion, and the nominal model all that it can; a half is "
+        "allowed for both.",
+    )
+    explains_stds: float = setting(
+        4.0, "Margin of χ² of noise over that maximum.", "convention", "One campaign in 30,000.", unit="std"
     )
     steady_line_share: float = setting(
         0.9,

@@ -40,7 +40,9 @@ def _few_runs(given: Figures) -> str:
     if given["windy"]:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
-    return f"There {number} only: the form of the {motion} alone distinguishes the causes. Add runs {others}."
+    told = f"the form of the {motion} alone distinguishes the causes"
+    fault = " A fault of this run cannot be told from a cause." if given["runs"] == 1 else ""
+    return f"There {number} only: {told}.{fault} Add runs {others}."
 
 
 def _none_held_out(given: Figures) -> str:
@@ -62,6 +64,27 @@ def _unresolved(given: Figures) -> str:
     return (
         f"{plain(*given['effects']).capitalize()} was fitted to the whole records and left out of the answer: "
         "neither their early half nor their late half, fitted alone, shows it."
+    )
+
+
+def _contradicted(given: Figures) -> str:
+    return (
+        f"{plain(*given['effects']).capitalize()} was left out of the answer: without run {given['run']} the "
+        "other runs do not show it, although they could."
+    )
+
+
+def _only_one_run(given: Figures) -> str:
+    return (
+        f"Only run {given['run']} shows {plain(*given['effects'])}: the other runs could not, so a fault of this "
+        "run is not excluded. Repeat it."
+    )
+
+
+def _explains_too_much(given: Figures) -> str:
+    return (
+        f"{plain(*given['effects']).capitalize()} was left out of the answer: it would explain more than the "
+        "nominal model leaves in its runs."
     )
 
 
@@ -110,6 +133,9 @@ CAUTIONS: Mapping[str, Sentence] = {
         f"{plain(*given['effects']).capitalize()} was fitted and left out of the answer: with it the residual on "
         "held-out readings is no smaller than without it."
     ),
+    "contradicted": _contradicted,
+    "explains too much": _explains_too_much,
+    "only one run": _only_one_run,
     "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
     "stops a body says little about its motion.",
     "zeros apart": lambda given: (

@@ -60,8 +60,12 @@ def headline(document: Document) -> tuple[str, str]:
         words = words.replace(delay, f"{delay} or wrong hold")
     if kind == "found" and not without_scatter(document["causes"]) and systematic(document):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
-    disturbed = [one["run"] for one in document.get("disturbed", ())]
-    return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind
+    found = document.get("disturbed", ())
+    disturbed = [one["run"] for one in found if one["at_s"] is not None]
+    odd = [one["run"] for one in found if one["at_s"] is None]
+    said = f"; {_runs(disturbed)} disturbed" if disturbed else ""
+    differ = "differ from the others" if len(odd) > 1 else "differs from the others"
+    return words + said + (f"; {_runs(odd)} {differ}" if odd else ""), kind
 
 
 def _runs(names: Sequence[str]) -> str:
@@ -98,7 +102,7 @@ def verdict(document: Document, rest: str) -> str:
         said = ". ".join(f"{remark['runs'][0]}: {remark['what']}" for remark in cycling)
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
-        *map(_disturbed, document.get("disturbed", ())),
+        *(_disturbed(one, no_gap=not document["causes"]) for one in document.get("disturbed", ())),
         *_with_second_modes(_answer(document, rest), document),
         _choices(document),
         hold_words(document),
@@ -265,14 +269,26 @@ def _immaterial(changes: Mapping[str, float]) -> str:
 _NO_CHANGE = 0.01  # %: smaller changes are shown as this
 
 
-def _disturbed(found: Mapping[str, Any]) -> str:
-    """A disturbed run, and how much of it is used."""
-    kept = found["kept_until_s"]
+def _disturbed(found: Mapping[str, Any], *, no_gap: bool) -> str:
+    """A disturbed run, and how much of it is used.
+
+    Args:
+        no_gap: whether the runs show no gap without the disturbance.
+    """
+    run, kept, at, begins = found["run"], found["kept_until_s"], found["at_s"], found.get("kept_from_s")
+    if at is None:
+        if begins is not None:
+            part = "Without that part there is no gap, so it" if no_gap else "That part"
+            return f"Run {run} does not move as the others do before {begins:.4g} s. {part} is not used."
+        whole = "Without it there is no gap, so it" if no_gap else "It"
+        return f"Run {run} differs from the others. {whole} is not used."
     if found["used"]:
         why = "the other runs do not determine the model"
-        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s. It is used nevertheless, because {why}."
+        return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
     unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
-    return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; {unused}."
+    if begins is not None:
+        unused = f"its readings before {begins:.4g} s are not used"
+    return f"Run {run} was disturbed at {at:.4g} s; {unused}."
 
 
 def _with_second_modes(answer: str, document: Document) -> list[str]:
@@ -470,16 +486,25 @@ def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
 
 
+def _repeat(found: Mapping[str, Any]) -> str:
+    """What to do about a disturbed run."""
+    if found["at_s"] is not None:
+        return f"Repeat run {found['run']}, which was disturbed at {found['at_s']:.4g} s."
+    if found.get("kept_from_s") is not None:
+        return f"Look at the release of run {found['run']}: its free motion begins at {found['kept_from_s']:.4g} s."
+    return (
+        f"Repeat run {found['run']}, which differs from the others, or look at its release, its unit, its gain "
+        "and its filter."
+    )
+
+
 _SUSPECT = "State the suspected effect in a file, and diagnose again with --effects-file"
 
 
 def next_steps(document: Document) -> list[str]:
     """What to do next, in the order in which to do it."""
     causes = document["causes"]
-    steps = [
-        f"Repeat run {one['run']}, which was disturbed at {one['at_s']:.4g} s."
-        for one in document.get("disturbed", ())
-    ]
+    steps = [_repeat(one) for one in document.get("disturbed", ())]
     steps += _remedies(document.get("remarks", ()))
     steps += repeat_steps(document)
     if causes != _UNKNOWN and document.get("decided", True):

@@ -170,7 +170,8 @@ class DiagnosisDocument(Document):
     cautions: list[str] = Field(description="caveats")
     disturbed: list[Table] = Field(
         default_factory=list,
-        description="runs that were disturbed: run, at_s, kept_until_s (null: left out, or used), p_value, used",
+        description="runs that were disturbed: run, at_s (null: it differs from the others as a whole), "
+        "kept_until_s (null: left out, or used), kept_from_s, p_value, used",
     )
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")

@@ -238,7 +238,7 @@ def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monke
     first = disturbed_runs.prepared_and_tested
 
     def of_all_runs_only(given, *rest):
-        if len(given.runs) < 4 or any(run.record.time_s[-1] < 9.0 for run in given.runs):
+        if len(given.runs) < 6 or any(run.record.time_s[-1] < 9.0 for run in given.runs):
             raise TunnelError("cannot fit", where="runs", remedy="add runs")
         return first(given, *rest)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from diagnosis.facts.found import Fact
 from diagnosis.search.investigate import investigate
 from diagnosis.search.resolved import unresolved
 from tunnel_sim.effects import effect_class
@@ -63,8 +64,10 @@ def test_an_effect_that_only_joins_the_halves_is_not_resolved():
 
 
 def test_an_answer_with_an_effect_that_is_not_resolved_is_refused(monkeypatch):
-    monkeypatch.setattr("diagnosis.search.sets.unresolved", lambda fit: (fit.problem.effects[0].name,))
+    monkeypatch.setattr("diagnosis.search.surviving.unresolved", lambda fit: (fit.problem.effects[0].name,))
     found = study("cubic_stiffness", integrated(lambda angle, _: 10.0 * angle**3))
-    assert dict(found.refused) == {("cubic_stiffness",): ("cubic_stiffness",)}
+    assert dict(found.refused) == {
+        ("cubic_stiffness",): Fact("unresolved", {"effects": ("cubic_stiffness",)})
+    }
     assert found.fitted == ("unknown",)
     assert found.of(["cubic_stiffness"]) is None

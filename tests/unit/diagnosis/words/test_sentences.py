@@ -141,10 +141,12 @@ def test_caveats_state_their_figures() -> None:
     assert said(CAUTIONS, few).startswith(
         "There is one run only: the form of the decay alone distinguishes the causes."
     )
+    assert "A fault of this run cannot be told from a cause." in said(CAUTIONS, few)
+    assert "fault" not in said(CAUTIONS, few | {"runs": 2})
     assert said(CAUTIONS, few | {"runs": 2, "windy": True}).endswith(
         "springs, wind speeds and release angles."
     )
-    assert said(CAUTIONS, few | {"driven": True}).endswith(
+    assert said(CAUTIONS, few | {"runs": 2, "driven": True}).endswith(
         "form of the motion alone distinguishes the causes. Add runs with other inputs."
     )
     left_out = said(CAUTIONS, {"kind": "another mode", "ratio": 1.5, "runs": ["r1", "r3"]})

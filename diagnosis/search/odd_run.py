@@ -1,0 +1,349 @@
+"""A run that differs from all others as a whole.
+
+A cause acts in all runs. Where a few causes, or none, explain every run but one, and the other runs include its
+wind state and its spring, the simplest explanation is that something happened to that run: its start was held, its
+logger filtered, its gain was another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isclose
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtrc, fdtrc
+
+from diagnosis.facts.disturbance import Disturbance
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.partial import refit_releases
+from diagnosis.likelihood.residuals import CHANNELS, gap_left, resonance
+from diagnosis.likelihood.sensitivities import sensitivities
+from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
+from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import Data
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, Scale
+from diagnosis.search.process_noise import acts_by, likeliest, random_moments, with_response
+from diagnosis.search.random_spectra import SOURCES
+from diagnosis.search.scatter import scattered
+from diagnosis.search.steady_noise import is_steady_noise
+from diagnosis.search.weigh import UNKNOWN, FittedSet, error_of_form, log_weight
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.base import SPRING_TOLERANCE
+from tunnel_sim.vocabulary.campaign import Campaign
+
+if TYPE_CHECKING:
+    from diagnosis.search.study import Study
+
+_SETS, _RUNS = 6, 2  # sets, and runs of each, that are refitted
+
+
+@dataclass(frozen=True, eq=False)
+class OddRuns:
+    """One run or a few, and a set that may explain the others.
+
+    Args:
+        p_values: by id of the runs, the probability by chance of so large a misfit, times the number of runs.
+        beside: the set, fitted to the other runs.
+    """
+
+    p_values: Mapping[str, float]
+    beside: Hypothesis
+
+
+def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -> tuple[Disturbance, ...]:
+    """The runs without which the nominal model explains the others; none where a cause explains all as simply.
+
+    Two effects never do: they cost more than an odd run.
+
+    Args:
+        measured: the campaign in its own units.
+        nominal: fit of the nominal model to all runs of the similar campaign, which shows a gap.
+        kinds: the effects that may be named.
+    """
+    none = Hypothesis((), nominal)
+    found = _explaining([none], nominal, kinds)
+    if not found or _acts_at_random(nominal, found[0].beside.fit):
+        return ()
+    differing = scattered(nominal, kinds)
+    single = sets_with_one_more([none], [kind for kind in kinds if kind.fitted])
+    rivals = [*single, *([] if differing is None else [Hypothesis((), differing)])]
+    return _stated(_simplest(found, rivals, nominal), measured, nominal)
+
+
+def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
+    """The runs that differ from the others as a whole; none where the answer explains the runs more simply.
+
+    Args:
+        measured: the campaign in its own units.
+        study: of all its runs.
+
+    Returns:
+        The likeliest, at one rate of false alarms. Driven runs are not among them, nor is a run that alone has its
+        wind state or its spring: its difference may be that of its conditions.
+    """
+    nominal, answer = study.nominal, study.answer
+    if not study.gap.test.detected:
+        return ()
+    found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal, study.prepared.kinds)
+    rivals, at_random = list[Hypothesis](), None
+    if answer is not None and answer.effects != UNKNOWN:
+        at_random = None if answer.random is None else answer.random.left
+        rivals = [answer.hypothesis] if answer.hypothesis is not None and at_random is None else []
+    return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)
+
+
+def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
+    """Odd runs as facts, with the start of the part that moves as the others do."""
+    found, data = list[Disturbance](), nominal.problem.data
+    if odd is None:
+        return ()
+    for name, p_value in odd.p_values.items():
+        index = [run.id for run in data.runs].index(name)
+        start = _free_from(odd.beside.fit, nominal, index)
+        if start is not None:
+            run = next(one for one in measured.runs if one.id == name)
+            begun = float(run.record.time_s[0]) + run.clock_s
+            start = begun + data.similarity.own(data.runs[index].start + start, "s")
+        found.append(Disturbance(name, None, None, p_value, kept_from_s=start))
+    return tuple(found)
+
+
+def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
+    """The time since the start of a run's fitted part from which the model of the others explains it, s.
+
+    None where there is none within the first quarter of the run, or too few cycles are left.
+    """
+    chosen, run = nominal.settings.selection, nominal.problem.data.runs[index]
+    cycle = 1.0 / (resonance(nominal, index) * run.interval)  # in blocks
+    for quarters in range(1, int(run.reading.size / cycle) + 1):
+        first = round(quarters * cycle / 4.0)
+        if run.reading.size - first < chosen.disturbed_kept * cycle:
+            return None
+        data = others.problem.data.with_runs((run.part(first),))
+        start = Point(others.point.common, np.zeros((1, others.point.release.shape[1])))
+        start.release[0, 0] = data.runs[0].reading[0]
+        problem = replace(others.problem, data=data)
+        slopes = [slope for _, slope in sensitivities(problem, start)]
+        _, (left,) = refit_releases(problem, start, slopes)
+        level = max(others.total / others.count, 1.0)
+        if (
+            float(fdtrc(left.size, others.count, float(left @ left) / left.size / level))
+            > chosen.disturbed_rate
+        ):
+            return first * run.interval
+    return None
+
+
+def _sets(study: Study) -> list[Hypothesis]:
+    """The sets of effects that were weighed, in runs that repeat: an odd run makes them seem to differ."""
+    found = []
+    for answer in study.answers:
+        beside = None if answer.random is None else answer.random.beside
+        for one in (answer.hypothesis, beside):
+            fit = None if one is None else one.repeating if one.fit.problem.scatter else one.fit
+            if one is not None and fit is not None and one.effects:
+                found.append(Hypothesis(one.effects, fit))
+    return found
+
+
+def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRuns]:
+    """The runs without which a set explains the others up to chance and an error of its form.
+
+    Args:
+        sets: the nominal model first, in runs that repeat.
+        kinds: the effects that may be named, those between runs among them.
+    """
+    data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
+    if data.driven or len(data.runs) < chosen.disturbed_fewest:
+        return []
+    tried = [one for one in _without_a_run(sets) if max(one.p_values.values()) < chosen.disturbed_rate]
+    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in tried if not one.beside.effects}
+    found = [
+        one
+        for one in tried
+        if (gap := gaps.get(tuple(one.p_values))) is not None
+        and one.beside.leaves_within(error_of_form(gap, weighing) * bool(one.beside.effects))
+    ]
+    if found or nominal.problem.scatter:
+        return found
+    differing = scattered(nominal, kinds)
+    for one in _without_several([one for one in tried if not one.beside.effects], nominal, kinds):
+        if one.beside.explains_runs or one.beside.leaves_within(np.zeros(len(CHANNELS))):
+            known = not one.beside.fit.problem.scatter
+            return [one] if known or (differing is not None and not _are_explained(differing, one)) else []
+    return []
+
+
+def _without_several(
+    tried: Sequence[OddRuns], nominal: Fit, kinds: Sequence[type[Effect]]
+) -> Iterator[OddRuns]:
+    """The nominal model without a run, without a further one, and so on, beside chance differences if they show.
+
+    Each run shows most of the gap of the runs that are left. One odd run may hide another.
+
+    Args:
+        tried: the nominal model without each run.
+    """
+    chosen, whole = nominal.settings.selection, nominal
+    known: dict[str, float] = {}
+    for _ in range(max(1, int(chosen.disturbed_share * len(nominal.problem.data.runs)))):
+        differing = scattered(whole, kinds)
+        best = _worst_of(whole, tried) if differing is None else _worst_beside(differing, whole)
+        if best is None or len(best.beside.fit.residuals) < chosen.disturbed_fewest - 1:
+            return
+        whole, known = best.beside.fit, {**known, **best.p_values}
+        beside = scattered(whole, kinds)
+        yield OddRuns(known, best.beside if beside is None else Hypothesis((), beside))
+        tried = [] if beside is not None else list(_without_a_run([best.beside]))
+
+
+def _worst_of(whole: Fit, tried: Sequence[OddRuns]) -> OddRuns | None:
+    """The run without which most of the gap vanishes; None where there is none."""
+    chosen = whole.settings.selection
+    best = min(tried, key=lambda one: one.beside.fit.total, default=None)
+    left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
+    if best is None or max(best.p_values.values()) >= chosen.disturbed_rate:
+        return None
+    return best if left < (1.0 - chosen.odd_holds) * (whole.total - whole.count) else None
+
+
+def _worst_beside(differing: Fit, whole: Fit) -> OddRuns | None:
+    """The run that shows most of the gap beside chance differences; None where there is none.
+
+    Args:
+        whole: the fit without them.
+    """
+    chosen, data = whole.settings.selection, whole.problem.data
+    own = np.array([float(r @ r) - r.size for r in differing.residuals])
+    index = int(np.argmax(own))
+    size = differing.residuals[index].size
+    p_value = min(1.0, own.size * float(chdtrc(size, own[index] + size)))
+    alone = own[index] > chosen.odd_holds * float(np.maximum(own, 0.0).sum())
+    if index not in replaceable(data) or not alone or p_value >= chosen.disturbed_rate:
+        return None
+    fitted = refitted_without(whole, index)
+    return None if fitted is None else OddRuns({data.runs[index].id: p_value}, Hypothesis((), fitted))
+
+
+def _are_explained(fitted: Fit, odd: OddRuns) -> bool:
+    """Whether a fit explains some of its runs up to chance."""
+    chosen = fitted.settings.weighing
+    for run, residual in zip(fitted.problem.data.runs, fitted.residuals, strict=True):
+        margin = chosen.needless_chi2 + chosen.chance_stds * np.sqrt(2.0 * residual.size)
+        if run.id in odd.p_values and float(residual @ residual) - residual.size > margin:
+            return False
+    return True
+
+
+def _simplest(
+    found: Sequence[OddRuns], rivals: Sequence[Hypothesis], nominal: Fit, at_random: FittedSet | None = None
+) -> OddRuns | None:
+    """The likeliest odd runs; None where there is none, or a rival set of causes of all runs weighs as much.
+
+    Args:
+        at_random: a rival set with a random moment.
+    """
+    if not found:
+        return None
+    share, count = nominal.settings.selection.odd_share, len(nominal.problem.data.runs)
+    if any(
+        one.beside.fit.problem.scatter for one in found
+    ):  # a set that leaves a gap has no evidence to compare
+        rivals = [one for one in rivals if one.leaves_within(np.zeros(len(CHANNELS)))]
+        at_random = None
+    sets = [*rivals, *(one.beside for one in found)]
+    scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
+    best = max(found, key=lambda one: _weight(one.beside, scale))
+    # one of the runs is odd in a share of the campaigns
+    weight = _weight(best.beside, scale) - len(best.p_values) * np.log(count * (1.0 - share) / share)
+    # the forms of an answer are free where that pays, and are not compared with an odd run
+    weights = [_weight(one, scale) + scale.chosen.form_price * one.further_numbers for one in rivals]
+    weights += [] if at_random is None else [scale.weight_of(at_random)]
+    if weight <= max(weights, default=-np.inf):
+        return None
+    # a deviation of its stiffness, damping or wind speed may be chance
+    by_chance = any(one.fit.problem.scatter and _are_explained(one.fit, best) for one in rivals)
+    return None if by_chance else best
+
+
+def _weight(one: Hypothesis, scale: Scale) -> float:
+    """Logarithm of the weight of a set; chance differences between its runs count by their own evidence."""
+    if not one.fit.problem.scatter:
+        return scale.weight(one)
+    cost = gap_left(one.fit).scatter_cost
+    excess = one.excess - scale.least
+    return log_weight(excess, scale.misfit, len(one.effects), one.further_numbers, scale.chosen, (cost, cost))
+
+
+def replaceable(data: Data) -> list[int]:
+    """Indices of the runs of which others have the wind state, and others the spring."""
+    found = []
+    for index, run in enumerate(data.runs):
+        others = [other for other in data.runs if other is not run]
+        wind = any(other.wind_on == run.wind_on for other in others)
+        if wind and any(_same_spring(run.spring_stiffness, other.spring_stiffness) for other in others):
+            found.append(index)
+    return found
+
+
+def _same_spring(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return isclose(one, other, rel_tol=SPRING_TOLERANCE)
+
+
+def _acts_at_random(nominal: Fit, others: Fit) -> bool:
+    """Whether a random moment alike in all runs in which it acts explains the residual, and the others may hide it.
+
+    Args:
+        others: the fit to the runs that are not odd, which needs no random moment.
+    """
+    chosen = nominal.settings.moment
+    for source in SOURCES:
+        found = likeliest(random_moments(nominal, source), chosen)
+        if found is not None and is_steady_noise(found, chosen):
+            noisy = with_response(others, found.spectrum)
+            if noisy is None or not acts_by(_expected(others.problem.data, noisy), chosen):
+                return True
+    return False
+
+
+def _expected(data: Data, noisy: Data) -> float:
+    """The drop of −2 ln L by a random moment that runs with its response as noise would show, dimensionless."""
+    pairs = zip(data.runs, noisy.runs, strict=True)
+    ratios = [(run.reading.size, more.noise.variance / run.noise.variance) for run, more in pairs]
+    return float(sum(size * (ratio - 1.0 - np.log(ratio)) for size, ratio in ratios))
+
+
+def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
+    """The sets without the runs that they explain least, the sets of least misfit first.
+
+    The nominal model, the first of them, is fitted without each of the runs.
+    """
+    data = sets[0].fit.problem.data
+    runs = replaceable(data)
+    if not runs:
+        return
+    tried = []
+    for one in sets:
+        without = WithoutRuns.of(one.fit)
+        left = (without.total - without.count)[runs]
+        tried.append((float(left.min()), one, [runs[place] for place in np.argsort(left)[:_RUNS]]))
+    likely = sorted(tried[1:], key=lambda given: given[0])[:_SETS]
+    for _, one, order in [(0.0, sets[0], runs), *likely]:
+        for index in order:
+            fitted = refitted_without(one.fit, index)
+            if fitted is not None:
+                p_value = _p_value(one.fit, fitted, index)
+                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(one.effects, fitted))
+
+
+def _p_value(whole: Fit, others: Fit, index: int) -> float:
+    """Probability by chance that a run adds so much to χ², with the misfit of the others as noise."""
+    filled = whole.problem.data.runs[index].filled
+    added = max(whole.total - others.total, 0.0) / filled
+    level = max(others.total / others.count, 1.0)
+    return min(1.0, len(whole.residuals) * float(fdtrc(filled, others.count, added / level)))

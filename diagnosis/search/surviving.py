@@ -1,0 +1,121 @@
+"""Whether a cause survives the loss of a run.
+
+A cause acts in every run that could show it. An effect that only repairs one odd run loses its size without that
+run, although the others determine it. A random moment beside effects that fit worse than none explains more than
+the nominal model leaves in its runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.facts.found import Fact
+from diagnosis.likelihood.least_squares import Fit, FitError, fit_at
+from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
+from diagnosis.search.process_noise import ProcessNoise, with_response
+from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.resolved import unresolved
+from tunnel_sim.vocabulary.record import Array
+
+
+def refusal(whole: Fit) -> Fact | None:
+    """Why a set is not an answer; None where every effect of it is confirmed.
+
+    Args:
+        whole: fit of the set to whole runs.
+    """
+    if unconfirmed := unresolved(whole):
+        return Fact("unresolved", {"effects": unconfirmed})
+    lost = contradicted(whole)
+    run = next(iter(lost.values()), "")
+    names = tuple(name for name, without in lost.items() if without == run)
+    return Fact("contradicted", {"effects": names, "run": run}) if lost else None
+
+
+def refusal_with_moment(answer: RandomAnswer, repeating: Fit) -> Fact | None:
+    """As `refusal`, for a set with a random moment.
+
+    Args:
+        repeating: fit of the nominal model to runs that repeat.
+    """
+    if explains_too_much(answer.process, repeating):
+        return Fact("explains too much", {"effects": tuple(kind.name for kind in answer.kinds)})
+    beside = answer.beside
+    noisy = None if beside is None else with_response(beside.fit, answer.process.spectrum)
+    if beside is None or noisy is None:
+        return None
+    try:
+        return refusal(fit_at(replace(beside.fit.problem, data=noisy), beside.fit.point))
+    except (FitError, np.linalg.LinAlgError):
+        return None
+
+
+def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
+    """Whether a random moment explains more than the nominal model leaves in the runs in which it acts.
+
+    The effects beside it then fit these runs worse than no effect, and the moment pays for them.
+    """
+    left, freedom = 0.0, 0
+    for run, residual in zip(repeating.problem.data.runs, repeating.residuals, strict=True):
+        if run.id in process.runs:
+            left += float(residual @ residual) - residual.size
+            freedom += residual.size
+    chosen = repeating.settings.moment
+    margin = chosen.explains_stds * float(np.sqrt(2.0 * freedom))
+    return process.drop > chosen.explains_most * max(left, 0.0) + margin
+
+
+def contradicted(whole: Fit) -> dict[str, str]:
+    """The effects that lose their size without a run, although the others could show it, with that run.
+
+    Linear theory finds them, and a fit without the run confirms it.
+    """
+    chosen, found = whole.settings.search, dict[str, str]()
+    for name, full, sizes, could in _without_each(whole):
+        judged = np.where(could * (1.0 - chosen.survives_size) > chosen.survives_stds, sizes, 1.0)
+        for index in np.argsort(judged)[:1]:
+            if judged[index] >= chosen.survives_size:
+                continue
+            again = refitted_without(whole, int(index))
+            if again is None or again.value(full) / whole.value(full) < chosen.survives_size:
+                found[name] = whole.problem.data.runs[index].id
+    return found
+
+
+def shown_by_one(whole: Fit) -> dict[str, str]:
+    """The effects that only one run can show, with that run."""
+    least, found = whole.settings.search.survives_stds, dict[str, str]()
+    if len(whole.residuals) > 1:
+        for name, _, _, could in _without_each(whole):
+            if could.min() < least and np.median(could) >= least:
+                found[name] = whole.problem.data.runs[int(np.argmin(could))].id
+    return found
+
+
+def _without_each(whole: Fit) -> Iterator[tuple[str, str, Array, Array]]:
+    """By effect whose severity is fitted and evident, its size without each run, and the evidence for that size.
+
+    Returns:
+        Name, full name of the severity, the size relative to that of all runs, shape (runs,), and the size of all
+        runs in standard deviations of the fit without the run, shape (runs,).
+    """
+    if len(whole.residuals) < 2:
+        return
+    names, least = whole.problem.names, whole.settings.search.survives_stds
+    severities = {kind.name: f"{kind.name}.{kind.parameters()[0].name}" for kind in whole.problem.effects}
+    fitted = {name: full for name, full in severities.items() if full in names and whole.bound(full) is None}
+    if not fitted:
+        return
+    without = WithoutRuns.of(whole)
+    for name, full in fitted.items():
+        place, value = names.index(full), whole.value(full)
+        if value != 0.0 and abs(value) >= least * whole.std(full):
+            yield (
+                name,
+                full,
+                without.common[:, place] / value,
+                abs(value) / np.maximum(without.stds[:, place], 1e-300),
+            )

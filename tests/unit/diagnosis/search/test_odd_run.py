@@ -1,0 +1,142 @@
+"""A run that differs from the others is left out and named, unless it stands alone or a cause explains all runs.
+
+Truth: decays of the same rig, of which one was held at its start, or read by a filtered or clipped sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter, lfilter_zi
+
+from diagnosis import diagnose
+from diagnosis.result import Diagnosis
+from diagnosis.search.disturbed import undisturbed
+from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.search.odd_run import replaceable
+from diagnosis.words.verdict import headline, next_steps
+from tests.marks import slow
+from tests.support.gap_campaigns import CONDITIONS, INTERVAL, NOISE, campaign, nominal
+from tunnel_sim.effects import effect_class, effect_from, known_effects
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array, Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
+FEW = tuple(map(effect_class, ("coulomb_friction", "cubic_stiffness", "buffeting")))
+
+
+def spoilt(data: Campaign, run: str, change: Callable[[Array], Array]) -> Campaign:
+    """The campaign with other readings of one run."""
+    runs = []
+    for one in data.runs:
+        yaw = change(one.record.yaw_rad) if one.id == run else one.record.yaw_rad
+        runs.append(replace(one, record=Record(INTERVAL * np.arange(yaw.size), yaw)))
+    return replace(data, runs=tuple(runs))
+
+
+def held(yaw: Array) -> Array:
+    """Held for 0.3 s after the record begins."""
+    noise = np.random.default_rng(1).normal(0.0, NOISE, 75)
+    return np.concatenate([0.35 + noise, yaw])
+
+
+def filtered(yaw: Array) -> Array:
+    """Low-passed at 4 Hz."""
+    numerator, denominator = butter(2, 2.0 * 4.0 * INTERVAL)
+    return np.asarray(lfilter(numerator, denominator, yaw, zi=lfilter_zi(numerator, denominator) * yaw[0])[0])
+
+
+def clipped(yaw: Array) -> Array:
+    return np.clip(yaw, -0.2, 0.2)
+
+
+@pytest.fixture(scope="module")
+def plain() -> Campaign:
+    return campaign(duration=8.0)
+
+
+@pytest.mark.parametrize("change", [held, filtered, slow(clipped)])
+def test_without_the_odd_run_there_is_no_gap(plain: Campaign, change: Callable[[Array], Array]) -> None:
+    found = nominal_study(spoilt(plain, "r5", change), FEW)
+    assert [(one.run, one.at_s) for one in found.disturbed] == [("r5", None)]
+    assert not found.gap.test.detected
+    assert found.disturbed[0].p_value < found.settings.selection.disturbed_rate
+
+
+def test_of_a_held_start_the_free_motion_is_kept(plain: Campaign) -> None:
+    found = nominal_study(spoilt(plain, "r5", held), FEW)
+    (one,) = found.disturbed
+    assert one.kept_from_s is not None
+    assert 0.3 <= one.kept_from_s < 1.3
+    kept = next(run for run in found.campaign.runs if run.id == "r5")
+    assert kept.record.time_s[0] >= one.kept_from_s
+
+
+def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -> None:
+    kept = replace(plain, runs=(*plain.runs[:3], plain.runs[4]))
+    assert replaceable(nominal(kept).problem.data) == [1, 2]
+    assert nominal_study(spoilt(kept, "r5", filtered), FEW).disturbed == ()
+
+
+def test_a_cause_of_all_runs_accuses_none() -> None:
+    """One run alone swings far enough for the cubic spring: without it there is no gap."""
+    cubic = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=8.0)
+    rng, zero = np.random.default_rng(4), 0.001
+    small = [
+        replace(run, record=Record(run.record.time_s, zero + 0.05 * (run.record.yaw_rad - zero) + own))
+        for run in campaign(duration=8.0).runs
+        for own in [rng.normal(0.0, NOISE, run.record.yaw_rad.size)]
+    ]
+    found = investigate(replace(cubic, runs=(*small[:4], cubic.runs[4], small[5])), FEW)
+    assert found.disturbed == ()
+    assert found.causes == ("cubic_stiffness",)
+    assert found.single == {"cubic_stiffness": "r5"}
+    assert found.answer is not None
+    assert found.answer.probability < 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [held, filtered, clipped])
+def test_the_causes_beside_an_odd_run_are_those_of_the_others(change: Callable[[Array], Array]) -> None:
+    cubic = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=8.0)
+    found = diagnose(spoilt(cubic, "r2", change), kinds=known_effects())
+    assert [one.run for one in found.disturbed] == ["r2"]
+    assert found.causes == ("cubic_stiffness",)
+    assert found.decision.decided
+
+
+@pytest.mark.slow
+def test_two_odd_runs_do_no_harm() -> None:
+    """They may hide each other, but no false cause is decided."""
+    twice = (*CONDITIONS, *CONDITIONS)
+    found = diagnose(spoilt(spoilt(campaign(duration=8.0, conditions=twice), "r5", held), "r3", filtered))
+    assert not found.decision.decided or found.causes in ((), ("unknown",))
+
+
+@pytest.fixture(scope="module")
+def answer(plain: Campaign) -> Diagnosis:
+    return diagnose(spoilt(plain, "r5", filtered), kinds=FEW)
+
+
+def test_the_words_name_the_odd_run(answer: Diagnosis) -> None:
+    document = answer.to_json_dict()
+    assert headline(document) == ("No gap; run r5 differs from the others", "none")
+    assert answer.verdict.startswith(
+        "Run r5 differs from the others. Without it there is no gap, so it is not used."
+    )
+    assert next_steps(document)[0].startswith("Repeat run r5, which differs from the others")
+    assert document["disturbed"][0]["at_s"] is None
+    part = document | {"disturbed": [document["disturbed"][0] | {"kept_from_s": 0.4}]}
+    assert next_steps(part)[0] == "Look at the release of run r5: its free motion begins at 0.4 s."
+
+
+def test_an_odd_run_is_left_out_or_its_start(plain: Campaign, answer: Diagnosis) -> None:
+    (odd,) = answer.disturbed
+    assert odd.left_out
+    assert "r5" not in [run.id for run in undisturbed(plain, [odd]).runs]
+    begun = replace(odd, kept_from_s=1.0)
+    assert undisturbed(plain, [begun]).runs[4].record.time_s[0] == pytest.approx(1.0)
