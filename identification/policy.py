@@ -120,8 +120,8 @@ LEAST_FACTOR: Mapping[str, float] = {
     "along": 0.05,
 }
 """Least relative error of a statement that is called a slip; smaller ones are calibration or scatter. Of a wind in
-runs that state none, over the least stated wind; along a campaign, from its first to its last run. Speeds: 2.5 times
-`SPEED_DEPARTURE`, so that runs whose speeds scatter as widely are not slips. Judgement."""
+runs that state none, over the least stated wind; along a campaign, from its first to its last run. That of a speed
+is 2.5 times `SPEED_DEPARTURE`, so that runs whose speeds scatter as widely are not slips. Judgement."""
 
 LEAST_OF_WIND = 0.005
 """Least relative change of ωn² by the wind that a campaign is designed to measure. Judgement."""
