@@ -309,7 +309,7 @@ def widened_by_rounding(estimate: Estimate, runs: Sequence[Run]) -> Estimate:
     names = [name for name in ("cn_beta", "cn_r") if getattr(estimate, name) is not None]
     if share == 0.0 or not names:
         return estimate
-    wider = {name: _wider(getattr(estimate, name), share) for name in names}
+    wider: dict[str, Any] = {name: _wider(getattr(estimate, name), share) for name in names}
     change = np.array(
         [share * wider[n].value if n in wider else 0.0 for n in estimate.parameters], np.float64
     )

@@ -9,13 +9,18 @@ To first order in the reduced frequency a lag of a l/V is −a Cnβ of Cnr.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_reference import moments
 from tunnel_reference.conditions import REFERENCE_LENGTH, Array
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import Term
 from tunnel_reference.severity import bind_effects
+
+Response = NDArray[np.complex128]
 
 
 def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
@@ -41,18 +46,22 @@ def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
     }
 
 
-def _one(omega: Array, p: dict[str, Array]) -> np.ndarray:
-    return 1.0 - p["w1"] + p["w1"] / (1.0 + 1j * omega * p["tau1"])
+def _one(omega: Array, p: Mapping[str, Array]) -> Response:
+    return np.asarray(1.0 - p["w1"] + p["w1"] / (1.0 + 1j * omega * p["tau1"]))
 
 
-def _two(omega: Array, p: dict[str, Array]) -> np.ndarray:
+def _two(omega: Array, p: Mapping[str, Array]) -> Response:
     parts = [(p["w1"], p["tau1"]), (p["w2"], p["tau2"])]
-    return 1.0 - p["w1"] - p["w2"] + sum(w / (1.0 + 1j * omega * tau) for w, tau in parts)
+    return np.asarray(1.0 - p["w1"] - p["w2"] + sum(w / (1.0 + 1j * omega * tau) for w, tau in parts))
 
 
-def _cascade(omega: Array, p: dict[str, Array]) -> np.ndarray:
-    return (1.0 + 0.5j * omega * p["tau1"]) ** -2
+def _cascade(omega: Array, p: Mapping[str, Array]) -> Response:
+    return np.asarray((1.0 + 0.5j * omega * p["tau1"]) ** -2)
 
 
-_RESPONSES = {moments.lag_one: _one, moments.lag: _two, moments.lag_cascade: _cascade}
+_RESPONSES: Mapping[object, Callable[[Array, Mapping[str, Array]], Response]] = {
+    moments.lag_one: _one,
+    moments.lag: _two,
+    moments.lag_cascade: _cascade,
+}
 """The response to the angle, by the law of the motion."""

@@ -110,8 +110,13 @@ def assemble(
         after = as_identified(after, identified, study.campaign, similarity)
     phase, covariance = in_phase(study.stated)
     before = before_the_causes(study.nominal, {**after, **phase}) if study.causes else after
-    sized = (sized_coefficients(one, rig) for one in (before, after, phase))
-    found = Coefficients(*sized, covariance, correlation=correlation(answers, after))
+    found = Coefficients(
+        sized_coefficients(before, rig),
+        sized_coefficients(after, rig),
+        sized_coefficients(phase, rig),
+        covariance,
+        correlation=correlation(answers, after),
+    )
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
     rivals = _rivals(study)
     fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]

@@ -67,7 +67,6 @@ BAD = {
     "constant": (Drive("drive", np.full(TIME.size, 3.0)), "is constant"),
     "itself": (Drive("drive", -4.0 * RESPONSE + 1.0), "is proportional to the response"),
     "saturates": (Drive("moment_nm", CLIPPED), "saturates"),
-    "nan": (Drive("moment_nm", np.where(TIME[5] == TIME, np.nan, INPUT)), "NaN"),
 }
 
 

@@ -140,6 +140,7 @@ def test_a_compressed_table_is_read_with_the_name_of_its_content(tmp_path: Path)
         (gzip.compress(b""), "the file is empty"),
         (gzip.compress(b"\x89HDF\r\n\x1a\n"), "it begins like an HDF5 file"),
     ],
+    ids=["cut", "not gzip", "huge", "empty", "empty inside", "another format"],
 )
 def test_a_damaged_or_huge_compressed_file_is_refused_in_one_line(
     content: bytes, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
