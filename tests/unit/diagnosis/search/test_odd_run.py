@@ -19,8 +19,8 @@ from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
 from diagnosis.words.verdict import headline, next_steps
 from tests.marks import slow
-from tests.support.gap_campaigns import CONDITIONS, INTERVAL, NOISE, campaign, nominal
-from tunnel_sim.effects import effect_class, effect_from, known_effects
+from tests.support.gap_campaigns import INTERVAL, NOISE, campaign, nominal
+from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -97,24 +97,6 @@ def test_a_cause_of_all_runs_accuses_none() -> None:
     assert found.single == {"cubic_stiffness": "r5"}
     assert found.answer is not None
     assert found.answer.probability < 0.95
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("change", [held, filtered, clipped])
-def test_the_causes_beside_an_odd_run_are_those_of_the_others(change: Callable[[Array], Array]) -> None:
-    cubic = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=8.0)
-    found = diagnose(spoilt(cubic, "r2", change), kinds=known_effects())
-    assert [one.run for one in found.disturbed] == ["r2"]
-    assert found.causes == ("cubic_stiffness",)
-    assert found.decision.decided
-
-
-@pytest.mark.slow
-def test_two_odd_runs_do_no_harm() -> None:
-    """They may hide each other, but no false cause is decided."""
-    twice = (*CONDITIONS, *CONDITIONS)
-    found = diagnose(spoilt(spoilt(campaign(duration=8.0, conditions=twice), "r5", held), "r3", filtered))
-    assert not found.decision.decided or found.causes in ((), ("unknown",))
 
 
 @pytest.fixture(scope="module")
