@@ -67,6 +67,15 @@ class Mixture:
         """Standard deviation, by the law of total variance: within and between the distributions."""
         return math.sqrt(float(self.weights @ self.variances) + self.between)
 
+    def mean_between(self, low: float, high: float) -> float:
+        """Mean of the part between two values, in the quantity's unit."""
+        stds = np.maximum(np.sqrt(self.variances), 1e-300)
+        ends = [(end - self.means) / stds for end in (low, high)]
+        inside = self.weights * (ndtr(ends[1]) - ndtr(ends[0]))
+        densities = [np.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in ends]
+        moments = self.means * inside - self.weights * stds * (densities[1] - densities[0])
+        return float(moments.sum() / inside.sum()) if inside.sum() > 0.0 else self.mean
+
     def quantile(self, share: float) -> float:
         """The value below which the mixture has a given probability.
 
@@ -327,10 +336,10 @@ class Central:
     """The centre of a mixture.
 
     An improbable rival with a distant mean may contribute most of a variance, and move the mean by more than the
-    deviation of the answer. The quantiles hold it only as far as its probability reaches.
+    deviation of the answer. The central interval holds it only as far as its probability reaches.
 
     Args:
-        value: the median.
+        value: mean of the part within the central interval.
         std: half the length of the central interval over that of a standard normal distribution.
         interval: the ends of the interval where it is not the one of a normal distribution; else None.
     """
@@ -343,7 +352,8 @@ class Central:
     def of(cls, whole: Mixture, chosen: AnswerSettings) -> Central:
         """The centre of a mixture, in its unit."""
         tail = 0.5 * (1.0 - chosen.coefficient_interval)
-        low, middle, high = (whole.quantile(share) for share in (tail, 0.5, 1.0 - tail))
+        low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
+        middle = whole.mean_between(low, high)
         reach = 0.5 * (high - low)
         std = reach / float(ndtri(1.0 - tail))
         skew = max(abs(low - middle + reach), abs(high - middle - reach))

@@ -92,6 +92,7 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
     if answer is not None and answer.effects != UNKNOWN:
         at_random = None if answer.random is None else answer.random.left
         rivals = [answer.hypothesis] if answer.hypothesis is not None and at_random is None else []
+    rivals += [one for rival in study.rivals for one in rival.hypotheses]
     return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)
 
 

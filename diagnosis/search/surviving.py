@@ -71,7 +71,8 @@ def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
 def contradicted(whole: Fit) -> dict[str, str]:
     """The effects that lose their size without a run, although the others could show it, with that run.
 
-    Linear theory finds them, and a fit without the run confirms it.
+    Linear theory finds them, and a fit without the run confirms it. That fit explains the other runs: where more
+    than the noise remains in them, sizes depend on the runs in any case.
     """
     chosen, found = whole.settings.search, dict[str, str]()
     for name, full, sizes, could in _without_each(whole):
@@ -80,7 +81,9 @@ def contradicted(whole: Fit) -> dict[str, str]:
             if judged[index] >= chosen.survives_size:
                 continue
             again = refitted_without(whole, int(index))
-            if again is None or again.value(full) / whole.value(full) < chosen.survives_size:
+            if again is None or again.excess > chosen.survives_excess:
+                continue
+            if again.value(full) / whole.value(full) < chosen.survives_size:
                 found[name] = whole.problem.data.runs[index].id
     return found
 

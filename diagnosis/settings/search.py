@@ -216,6 +216,13 @@ class SearchSettings:
         "One of 700 runs misses it by chance.",
         unit="std",
     )
+    survives_excess: float = setting(
+        1.0,
+        "Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of an "
+        "effect.",
+        "convention",
+        "A residual as large as the noise. A fit that leaves more is not a model of the other runs.",
+    )
     gravity_cancels: float = setting(
         0.8,
         "Maximum share of an unstated spring that gravity may cancel.",

@@ -127,7 +127,7 @@ def test_a_rival_of_ones_own_is_weighed_counts_for_unknown_and_is_said():
     assert hypothesis.fit.excess < 0.01 * with_rival.nominal.excess
     assert hypothesis.names not in [answer.effects for answer in with_rival.answers]
     before, after = (study.of(UNKNOWN).probability for study in (without, with_rival))
-    assert before < 0.05  # the other springs explain the gap as well
+    assert before < 0.15  # the other springs explain the gap as well; one run alone shows which
     assert 0.4 < after < 0.6
     said = diagnose(one_run_off(), kinds=kinds, rivals=(OneRunOff(),))
     assert said.verdict.endswith("The spring of r4 would explain the gap: measure it again.")
