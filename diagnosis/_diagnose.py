@@ -190,7 +190,9 @@ def _assembled(
     beyond = () if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)
     left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead, *beyond)
     identified = _identified(study, chosen)
-    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds, closes, identified)
+    answer = assemble(
+        study, *localise(study, closes.gap.closed), left_out, patched, chosen.kinds, closes, identified
+    )
     noted = (
         *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),
         *hum_noted(study.campaign, study.prepared.hum, study.similarity),
@@ -208,7 +210,7 @@ def _assembled(
 def _identified(study: Study, chosen: Chosen) -> Estimate | None:
     """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
     scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
-    own_model = type(study.model) is not type(nominal_model(chosen.campaign, None))
+    own_model = study.model.of_robot or type(study.model) is not type(nominal_model(chosen.campaign, None))
     if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
         return None
     try:

@@ -46,10 +46,13 @@ from identification.estimate import Estimate
 from tunnel_sim.effects import Effect, effect_class
 
 
-def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
+def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     """Locate the departure of the nominal model from the runs, with the reason.
 
     The place follows from the residuals alone. The causes only have to agree with it.
+
+    Args:
+        explained: share of the gap that they explain on held-out readings.
     """
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     survey = place.survey
@@ -72,7 +75,8 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
         frequency_hz=survey.frequency_interval,
     )
     kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)
-    return where, maps, described(where, place, kinds, study.settings, scattering=scattering)
+    said = described(where, place, kinds, study.settings, scattering=scattering, explained=explained)
+    return where, maps, said
 
 
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")

@@ -146,6 +146,14 @@ class AnswerSettings:
         "judgement",
         "A model that misses a tenth of the motion lacks a part of it.",
     )
+    place_overruled: float = setting(
+        0.99,
+        "Minimum share of the gap on held-out readings that causes explain for the place of the gap not to "
+        "contradict them.",
+        "convention",
+        "Causes that predict all but a hundredth of the gap act where it is. The residuals of a grossly wrong model "
+        "may look like another place.",
+    )
     credible_from: float = setting(
         0.9, "Total probability of the stated set of likely answers.", "convention"
     )

@@ -218,8 +218,8 @@ class SearchSettings:
     )
     survives_excess: float = setting(
         1.0,
-        "Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of an "
-        "effect.",
+        "Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of "
+        "an effect.",
         "convention",
         "A residual as large as the noise. A fit that leaves more is not a model of the other runs.",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from diagnosis.facts.found import BETWEEN_RUNS, Nowhere, PlaceFound
 from diagnosis.result import Where
@@ -31,12 +31,14 @@ def described(
     settings: Settings,
     *,
     scattering: bool = False,
+    explained: float = 0.0,
 ) -> PlaceFound:
     """The facts about a place.
 
     Args:
         compared: causes that have to agree with it.
         scattering: whether the runs differ from each other by chance in the answer.
+        explained: share of the gap that they explain on held-out readings.
     """
     maps, chosen = place.survey.maps, settings.words
     length, greatest = float(maps.time.edges[-1]), float(maps.amplitude.edges[-1])
@@ -48,6 +50,8 @@ def described(
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
     shown = [b for b in maps.bands if b.band in beyond and b.excess > chosen.band_listed * whole]
     against = judged(where.channel, place.channel.reason.kind, compared, scattering=scattering)
+    predicted = explained >= settings.answer.place_overruled and not any(kind.random for kind in compared)
+    against = replace(against, elsewhere=against.elsewhere and not predicted)
     return PlaceFound(
         runs=len(maps.runs),
         share=sum(run.share for run in maps.runs if run.id in where.runs),

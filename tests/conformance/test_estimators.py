@@ -10,6 +10,7 @@ import pytest
 from identification import Estimate, Status, identify
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES, make_estimator
 from identification.examination.examine import examine
+from identification.status import Outcome
 from tests.marks import slow
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign, with_records
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -234,7 +235,9 @@ def contradictory(case):
 @pytest.mark.parametrize("case", [slow(c) if "three" in c else c for c in CONTRADICTIONS])
 def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
     estimate = checked(identify(contradictory(case), name, throw=False), contradictory(case))
-    assert len(estimate.remarks) == 1
+    (remark, *others) = estimate.remarks
+    assert remark.outcome is Outcome.NOTED
+    assert all(other.what.endswith("so the result is that of output error") for other in others)
     if estimate.status.failed:  # a method may refuse instead
         assert estimate.parameters == ()
         return
@@ -254,8 +257,12 @@ def test_an_inertia_that_the_springs_contradict_widens_the_intervals(name, slip)
     settings = TWO_SPRINGS[::2]
     data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
     stated = replace(data, rig=replace(data.rig, yaw_inertia=Truth().yaw_inertia / slip))
-    found = identify(stated, name)
-    assert abs(found.yaw_inertia.value - stated.rig.yaw_inertia) < 1.96 * found.yaw_inertia.std
+    found = identify(stated, name, throw=False)
+    if slip == 1e3:  # a wrong unit makes the coefficients wrong by decades
+        assert Status.COEFFICIENTS_WITHHELD in found.statuses
+        assert found.yaw_inertia is found.cn_beta is None
+    else:
+        assert abs(found.yaw_inertia.value - stated.rig.yaw_inertia) < 1.96 * found.yaw_inertia.std
     kept = replace(stated, sensor=replace(stated.sensor, plausible=False))
     assert identify(kept, name) == identify(data, name)
 

@@ -60,7 +60,8 @@ def read_only_column(values: object, name: str, where: str, *, times: bool = Fal
     if array.size and not max(-array.min(), array.max()) <= limits.LARGEST_NUMBER:
         wrong = np.flatnonzero(~(np.abs(array) <= limits.LARGEST_NUMBER))
         at = int(wrong[0])
-        what = f"{name} is {array[at]:g}, not a finite number, at index {at} ({wrong.size} such)"
+        why = f"beyond {limits.LARGEST_NUMBER:g}" if np.isfinite(array[at]) else "not a finite number"
+        what = f"{name} is {array[at]:g}, {why}, at index {at} ({wrong.size} such)"
         raise TunnelError(what, where=where, remedy=_CUT)
     return array
 

@@ -20,7 +20,7 @@ def _with_first(values: Array) -> Campaign:
     return replace(sound, runs=(replace(first, record=Record(first.record.time_s, values)), *sound.runs[1:]))
 
 
-@pytest.mark.parametrize("scale", [0.0, 1e-200, 1e160])
+@pytest.mark.parametrize("scale", [0.0, 1e-200])
 def test_a_run_without_motion_is_refused_by_name(scale):
     count = campaign().runs[0].record.time_s.size
     values = scale * np.cos(np.arange(count) / 30.0)

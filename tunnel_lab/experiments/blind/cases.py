@@ -13,13 +13,12 @@ from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
 from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
+from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.files.toml_input import NotNegative
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
-LAG = "unsteady_aero_lag"
-"""The effect that changes what Cnβ and Cnr mean where it is named."""
 MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 noise variances."""
 
@@ -292,7 +291,8 @@ def case(
     _Answer.model_validate(answer)
     effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
-    meant = truth if LAG in (answer["causes"] or ()) else {**truth, **stated.in_phase}
+    lagging = {kind.name for kind in known_effects() if kind.in_phase is not Effect.in_phase}
+    meant = truth if lagging & {*(answer["causes"] or ())} else {**truth, **stated.in_phase}
     return Case(
         name=name,
         truth=UNKNOWN if withheld else effects,

@@ -17,7 +17,7 @@ from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.inputs import INPUTS
 from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
@@ -137,9 +137,9 @@ def _on_the_cut(raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readi
         remarks.append(f"ends at {clock_text(float(clock[-1]))} s, {why}")
     for level, samples in clipped(reading):
         until = clock_text(float(clock[samples[-1]]))
+        cut = counted(samples.size, "sample")
         remarks.append(
-            f"the peaks are cut off at {level:.4g} {unit}: {samples.size} samples until {until} s; a later start "
-            "leaves them out"
+            f"the peaks are cut off at {level:.4g} {unit}: {cut} until {until} s; a later start leaves them out"
         )
     return remarks
 

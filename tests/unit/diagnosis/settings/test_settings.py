@@ -61,7 +61,6 @@ KNOWN_IN_SEVERAL = {
     "interval_share": "of time, amplitude and frequency; the sentence states the share",
     "misfit_degrees": "one dispersion, of small causes and of hidden effects",
     "dispersion_stds": "one dispersion, of small causes and of hidden effects",
-    "hidden_stds": "the largest size is taken back to a standard deviation",
     "integrator_tolerance": "the caution states the tolerance",
     "steady_line_rate": "the sentence states the rate",
 }
