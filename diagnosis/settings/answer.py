@@ -151,7 +151,7 @@ class AnswerSettings:
         "Minimum share of the gap on held-out readings that causes explain for the place of the gap not to "
         "contradict them.",
         "convention",
-        "Causes that predict all but a hundredth of the gap act where it is. The residuals of a grossly wrong model "
+        "Causes that predict all but a hundredth of the gap act where it is. Residuals of a grossly wrong model "
         "may look like another place.",
     )
     credible_from: float = setting(

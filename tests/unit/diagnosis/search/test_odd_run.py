@@ -101,7 +101,7 @@ def test_a_cause_of_all_runs_accuses_none() -> None:
 
 @pytest.fixture(scope="module")
 def answer(plain: Campaign) -> Diagnosis:
-    return diagnose(spoilt(plain, "r5", filtered), kinds=FEW)
+    return diagnose(spoilt(plain, "r5", clipped), kinds=FEW)
 
 
 def test_the_words_name_the_odd_run(answer: Diagnosis) -> None:
