@@ -67,7 +67,7 @@ _WINDY = re.compile(
 """Words of a name that suggest a speed of the wind."""
 _NOT_WINDY = re.compile(
     r"(?i)ang|winkel|dreh|omega|motor|shaft|servo|joint|wheel|yaw|gyro|temp|press(ure)?$|druck$|humid|feucht|density|"
-    r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light"
+    r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light|step|index|count|code"
 )
 _FAN = re.compile(r"(?i)(?<![a-z])(fan|blower|gebl[äa]se|tunnel|wind|windkanal)(?![a-z])")
 _JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
