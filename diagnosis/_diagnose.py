@@ -90,7 +90,8 @@ def diagnose(
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
-        chosen = choose(campaign, kinds, settings.selection, own)
+        judged = not isinstance(model, NominalModel)
+        chosen = choose(campaign, kinds, settings.selection, own, judged=judged)
         study = _studied(chosen, progress, settings, rivals)
         answer = _answered(study, chosen, joint, say)
         runs = answer.repeatability

@@ -46,15 +46,20 @@ class Diagnosable:
     limit_cycles: bool = False
 
 
-def diagnosable(campaign: Campaign) -> Diagnosable:
+def diagnosable(campaign: Campaign, *, judged: bool = True) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
     Where all are in one, their whole records are kept.
 
+    Args:
+        judged: whether stated values are judged by the rig's own model; a model of your own may have others.
+
     Raises:
         TunnelError: when the examination refuses the records.
     """
-    examined = examine(campaign).accepted()
+    sensor = campaign.sensor if judged else replace(campaign.sensor, plausible=False)
+    examined = examine(replace(campaign, sensor=sensor)).accepted()
+    examined = replace(examined, campaign=replace(examined.campaign, sensor=campaign.sensor))
     cycling = {name for r in examined.remarks if in_limit_cycle(r.figures) for name in r.runs}
     if not cycling:
         return Diagnosable(examined.campaign, examined.remarks)
@@ -95,16 +100,19 @@ def choose(
     kinds: Sequence[type[Effect]],
     settings: SelectionSettings,
     given: NominalModel | None = None,
+    *,
+    judged: bool = True,
 ) -> Chosen:
     """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
 
     Args:
         given: your own nominal model; None: that of the campaign's kind.
+        judged: as in `diagnosable`.
 
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
     """
-    found = diagnosable(campaign)
+    found = diagnosable(campaign, judged=judged)
     if not found.limit_cycles:
         refuse_motionless(found.campaign, nominal_model(found.campaign, given))
     compared, left_out = comparable_runs(found.campaign, settings)

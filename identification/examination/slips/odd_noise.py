@@ -66,8 +66,8 @@ def _less(swing: Swing, first: float, ratio: float) -> Remark:
         ratio: logarithm of the least ratio of the noise to that of the others.
     """
     what = (
-        f"above {first:.2g} Hz its noise is 1/{significant(np.exp(-ratio), 2)} of that of every other run: the logger "
-        "filtered the run, or its file was smoothed"
+        f"above {first:.2g} Hz its noise is 1/{significant(np.exp(-ratio), 2)} of that of every other run: the "
+        "logger filtered the run, or its file was smoothed"
     )
     remedy = "record or export it with the bandwidth of the others, or leave the run out"
     outcome = Outcome.REFUSED if ratio < -np.log(policy.FILTERED_NOISE) else Outcome.NOTED
