@@ -17,7 +17,6 @@ from tunnel_reference.conditions import (
     WIDTH,
 )
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
-from tunnel_reference.in_phase import in_phase
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, Hold
@@ -143,10 +142,8 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     none). ``small`` lists small effects, which need not be found. ``severity`` is the excess after
     refitting the nominal model. ``parameters`` gives each effect's form, severity parameter with its symbol,
     secondary parameters, and the excess to which it was scaled alone; its times and moments are values before
-    ``scale`` was applied. With a lag of the air, ``in_phase`` has Cnβ and Cnr as an answer without the lag means
-    them (`tunnel_reference.in_phase`). Where the runs differ, ``scatter`` has the standard deviations between
-    them, ``runs`` every run's own deviations, and ``repeatability`` the campaign's statement; ``severity``
-    includes them.
+    ``scale`` was applied. Where the runs differ, ``scatter`` has the standard deviations between them, ``runs``
+    every run's own deviations, and ``repeatability`` the campaign's statement; ``severity`` includes them.
     """
     draw, c = simulated.draw, simulated.draw.conditions
     mattering = [e for e in draw.effects if not e.small]
@@ -188,7 +185,6 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
             }
             for e in draw.effects
         },
-        **({} if (found := in_phase(draw)) is None else {"in_phase": found}),
         **({} if draw.scatter is None else draw.scatter.truth(c.runs)),
     }
 

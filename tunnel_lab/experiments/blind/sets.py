@@ -14,6 +14,7 @@ from typing import Any
 
 from tunnel_lab.experiments.runner import Progress
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
+from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_reference.severity import ATTEMPTS, Simulated
 from tunnel_sim.files.campaign_folder import write_campaign
@@ -128,7 +129,9 @@ def make_blind(
         for start in range(0, count, CHUNK):
             for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
                 name = f"c{len(truths) + 1:0{width}d}"
-                truths[name] = truth_of(written(simulated, partial / name, show_steps))
+                kept = written(simulated, partial / name, show_steps)
+                meant = in_phase(kept.draw)  # of a lag that an answer may not name
+                truths[name] = truth_of(kept) | ({} if meant is None else {"in_phase": meant})
                 if progress is not None:
                     progress(len(truths), count)
         document = {
