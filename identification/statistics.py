@@ -284,21 +284,23 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     return replace(estimate, runs=tuple(runs), covariance=tuple(map(tuple, covariance.tolist())), **wider)
 
 
-_DENSITY_DECIMALS = 4  # fewest of a rounded density: a zero at its end is not seen, so 1.191 may be 1.1910
+_DENSITY_DECIMALS = 4  # from which a density is a computed value that was rounded, not a nominal one
 
 
 def density_rounding(runs: Sequence[Run]) -> float:
     """Relative standard deviation of the stated air densities by their rounding, the largest of the wind-on runs.
 
-    Rounding is a rectangular distribution of half a unit of the last decimal (GUM 4.3.7), at least the fourth: a
-    larger uncertainty of a nominal value is the user's to state.
+    Rounding is a rectangular distribution of half a unit of the last decimal (GUM 4.3.7). A density of fewer than
+    four decimals is a nominal value, taken as stated: its uncertainty is the user's to state. A rounded density
+    that ends in a zero looks like one.
     """
     found = 0.0
     for run in runs:
         if run.wind_on and run.air_density:
             exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
-            decimals = max(-exponent if isinstance(exponent, int) else 0, _DENSITY_DECIMALS)
-            found = max(found, 0.5 * 10.0**-decimals / sqrt(3.0) / run.air_density)
+            decimals = -exponent if isinstance(exponent, int) else 0
+            if decimals >= _DENSITY_DECIMALS:
+                found = max(found, 0.5 * 10.0**-decimals / sqrt(3.0) / run.air_density)
     return found
 
 
