@@ -150,7 +150,7 @@ class AnswerSettings:
         0.99,
         "Minimum share of the gap on held-out readings that causes explain for the place of the gap not to "
         "contradict them.",
-        "convention",
+        "judgement",
         "Causes that predict all but a hundredth of the gap act where it is. Residuals of a grossly wrong model "
         "may look like another place.",
     )
@@ -252,7 +252,7 @@ class AnswerSettings:
     )
     hidden_stds: float = setting(
         2.0,
-        "Distance of the largest possible size of a hidden effect from its most probable size.",
+        "Distance of the upper limit of an undetected effect from its most probable size.",
         "convention",
         unit="std",
     )

@@ -220,7 +220,7 @@ class SearchSettings:
         1.0,
         "Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of "
         "an effect.",
-        "convention",
+        "judgement",
         "A residual as large as the noise. A fit that leaves more is not a model of the other runs.",
     )
     gravity_cancels: float = setting(
