@@ -83,14 +83,6 @@ repeats to a few parts in ten thousand, and the amplitude of the release may cha
 SCATTER_OF_DAMPING = 0.02
 """Relative scatter of the decay rate between runs of equal statements: bearings repeat to a per cent or two."""
 
-USUAL_SCATTER: Mapping[str, float] = {
-    "wind_speed": 0.003,
-    "spring_stiffness": 0.0005,
-    "mechanical_damping": 0.01,
-}
-"""Relative scatter between runs of a usual rig, one standard deviation: a tunnel keeps its speed to 0.3 %, a spring
-clamped again repeats to 0.05 %, and a bearing with its cable to 1 %."""
-
 LEVELS_OF_SCATTER = (0.02, 5.0)
 """Least and greatest scatter between runs that chance is believed to cause, in `USUAL_SCATTER`. Judgement."""
 

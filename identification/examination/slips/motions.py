@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from identification import policy
 from identification.examination.self_excited import Swing
+from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.quantities import Vector
 from tunnel_sim.vocabulary.record import Array
 
@@ -225,7 +226,7 @@ def _tolerances(
     springs = of_spring * usual * np.unique(m.stated)
     std = np.concatenate((m.stiffness_std, m.rate_std, springs, np.full(m.springs, of_damping * damping)))
     flow = 0.5 * m.conditions.density * m.conditions.speed
-    scatter = policy.USUAL_SCATTER
+    scatter = USUAL_SCATTER
     chance = np.concatenate(
         (
             np.hypot(
