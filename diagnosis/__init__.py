@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         Coefficients,
         Diagnosis,
         GapSummary,
-        ParameterEstimate,
         RunGap,
         Where,
     )
@@ -24,7 +23,7 @@ else:
         __name__,
         {
             "._diagnose": "diagnose read_model vocabulary",
-            ".result": "Candidate Coefficients Diagnosis GapSummary ParameterEstimate RunGap Where",
+            ".result": "Candidate Coefficients Diagnosis GapSummary RunGap Where",
             ".settings": "Settings",
         },
     )
@@ -34,7 +33,6 @@ __all__ = [
     "Coefficients",
     "Diagnosis",
     "GapSummary",
-    "ParameterEstimate",
     "RunGap",
     "Settings",
     "Where",

@@ -16,12 +16,12 @@ from diagnosis.answer.units import own_next_run
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.facts.closure import share_closed
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
-from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
 from diagnosis.search.study import Answer
 from diagnosis.settings import Settings
 from diagnosis.words.numbers import plain
+from identification.estimate import Quantity
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -43,7 +43,7 @@ class Closure:
     before: float
     after: float
     held_out: str
-    parameters: Mapping[str, ParameterEstimate]
+    parameters: Mapping[str, Quantity]
 
     @property
     def closed(self) -> float:

@@ -23,7 +23,7 @@ from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
 from identification.blocks import as_notebook, as_text
-from identification.estimate import AsNumber, as_pandas, correlated, wide_frame
+from identification.estimate import Quantity, as_pandas, correlated, wide_frame
 from identification.status import Remark
 from identification.trade_off import TradeOff
 from tunnel_sim.files.writing import as_json
@@ -41,40 +41,6 @@ _LAST = (
     "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
     "maps", "provenance",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class ParameterEstimate(AsNumber):
-    """A value with its standard deviation and unit; ``float`` and NumPy take it as its value.
-
-    Args:
-        value: estimate, in ``unit``.
-        std: standard deviation, in ``unit``; 0 where the value was given, not fitted; None where it is not known.
-        unit: of both.
-        bound: ``lower`` or ``upper`` where the fit ended at that end of the allowed range; ``std`` is then None.
-        determined: whether the runs determine it; if not, ``value`` is meaningless and ``std`` is None.
-        shares: of ``std`` squared by source, fractions; empty where they are not known.
-        interval: ends of the central interval of 0.95, in ``unit``, where it is not value ± 1.96 std; else None.
-    """
-
-    value: float
-    std: float | None
-    unit: str
-    bound: str | None = None
-    determined: bool = True
-    shares: Mapping[str, float] = field(default_factory=dict)
-    interval: tuple[float, float] | None = None
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """Value, std, unit; bound, shares and interval where there are any, ``determined`` where it is false."""
-        data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
-        if self.shares and self.std is not None:
-            data["shares"] = dict(self.shares)
-        if self.interval is not None and self.std is not None:
-            data["interval"] = list(self.interval)
-        if self.bound is not None:
-            data["bound"] = self.bound
-        return data if self.determined else data | {"determined": False}
 
 
 @dataclass(frozen=True)
@@ -170,7 +136,7 @@ class Candidate:
     probability: float
     excess_after: float
     closed: float
-    parameters: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+    parameters: Mapping[str, Quantity] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -218,8 +184,8 @@ class Hidden:
 
     effect: str
     parameter: str
-    size: ParameterEstimate
-    moves: Mapping[str, ParameterEstimate]
+    size: Quantity
+    moves: Mapping[str, Quantity]
     significance: float = 0.0
 
 
@@ -241,9 +207,9 @@ class Coefficients:
             the other parts of their variances count as independent. Shape (n, n); empty where it is not known.
     """
 
-    before: Mapping[str, ParameterEstimate]
-    after: Mapping[str, ParameterEstimate]
-    in_phase: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+    before: Mapping[str, Quantity]
+    after: Mapping[str, Quantity]
+    in_phase: Mapping[str, Quantity] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
     note: str = ""
     correlation: tuple[tuple[float, ...], ...] = ()

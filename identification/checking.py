@@ -91,7 +91,7 @@ class _Subject:
     def _check_deviations(self, owner: object, names: Iterable[str], of: str) -> None:
         for name in names:
             quantity: Quantity | None = getattr(owner, name)
-            if quantity is not None and quantity.std <= 0.0:
+            if quantity is not None and quantity.known_std <= 0.0:
                 what = f"the standard deviation of {name} {of} is {quantity.std}"
                 raise self.refuse(what, "give its uncertainty, which is above 0 with noise")
 
@@ -181,7 +181,7 @@ def _check_values(subject: _Subject) -> None:
 def _compare(subject: _Subject, name: str, quantity: Quantity | None, truth: float) -> None:
     if quantity is None:
         return
-    if abs(quantity.value - truth) > _FAR * abs(truth) + _DEVIATIONS * quantity.std:
+    if abs(quantity.value - truth) > _FAR * abs(truth) + _DEVIATIONS * quantity.known_std:
         value = f"{quantity.value:.4g} ± {quantity.std:.2g}{beside(quantity.unit)}"
         what = f"{name} is {value}, and the truth is {truth:.4g}"
         right = " and ".join(filter(None, (beside(quantity.unit, "is in "), "has its sign")))

@@ -103,14 +103,15 @@ def _fault_of_quantity(name: str, quantity: object, unit: str, of: str) -> Fault
         return f"{name} {of} is {quantity!r}", f'give Quantity(value, std, "{unit}")'
     if quantity.unit != unit:
         return f"the unit of {name} {of} is {quantity.unit!r}", f"give it in {unit}"
-    for part, number in (("value", quantity.value), ("standard deviation", quantity.std)):
+    std = quantity.std
+    for part, number in (("value", quantity.value), ("standard deviation", std)):
         if not _is_number(number):
             what = f"the {part} of {name} {of} is {_described(number)}"
             return what, "give one number, such as float(values.mean())"
-    if not (isfinite(quantity.value) and isfinite(quantity.std)):
+    if std is None or not (isfinite(quantity.value) and isfinite(std)):
         what = f"{name} {of} is {quantity.value} ± {quantity.std}"
         return what, "give None and a status where there is no value"
-    if quantity.std < 0.0:
+    if std < 0.0:
         return f"the standard deviation of {name} {of} is {quantity.std}", "give its uncertainty, 0 or more"
     ends = quantity.interval
     if ends is None:

@@ -90,7 +90,7 @@ def collect(outcomes: Iterable[ScoredEstimate]) -> Trials:
     if len(units) > 1:
         raise ValueError(f"units are mixed: {', '.join(sorted(units))}")
     error = read_only([found.value - one.truth for one, found in kept])
-    std = read_only([found.std for _, found in kept])
+    std = read_only([found.known_std for _, found in kept])
     if not (np.isfinite(error).all() and np.isfinite(std).all()):
         raise ValueError("an estimate is not finite")
     bounds = [one.bound for one, _ in kept if one.bound is not None]
@@ -177,7 +177,7 @@ def root_mean_square(values: Array, unit: str) -> Quantity:
     squares, mean, variance = mean_figure(scaled**2, "1"), float(scaled.mean()), float(scaled.var(ddof=1))
     normal = sqrt((2.0 * variance**2 + 4.0 * mean**2 * variance) / values.size)
     root = sqrt(squares.value)
-    std = max(squares.std, normal)
+    std = max(squares.known_std, normal)
     return Quantity(scale * root, scale * std / (2.0 * root) if root > 0.0 else 0.0, unit)
 
 
@@ -202,7 +202,7 @@ def overall(scores: Iterable[Score]) -> Quantity | None:
     if not figures:
         return None
     root = sqrt(sum(one.value**2 for one in figures) / len(figures))
-    spread = hypot(*(one.value * one.std for one in figures)) / len(figures)
+    spread = hypot(*(one.value * one.known_std for one in figures)) / len(figures)
     return Quantity(root, spread / root if root > 0.0 else 0.0, "1")
 
 

@@ -324,7 +324,7 @@ def _wider(found: Quantity, share: float) -> Quantity:
     if interval is not None:
         low, high = (hypot(end - found.value, float(ndtri(0.975)) * own) for end in interval)
         interval = (found.value - low, found.value + high)
-    return replace(found, std=hypot(found.std, own), interval=interval)
+    return replace(found, std=hypot(found.known_std, own), interval=interval)
 
 
 def withheld(estimate: Estimate, remarks: Sequence[Remark]) -> Estimate:
@@ -350,9 +350,9 @@ def _reaching(
         return None
     away = [abs(factor - 1.0) * abs(found.value) for factor in factors]
     away += [abs(other - found.value) for other in others]
-    std = max(found.std, max(away) / sqrt(3.0))
+    std = max(found.known_std, max(away) / sqrt(3.0))
     interval = found.interval
-    if interval is not None and std > found.std:
+    if interval is not None and std > found.known_std:
         half = float(ndtri(0.975)) * std
         interval = min(interval[0], found.value - half), max(interval[1], found.value + half)
     return replace(found, std=std, interval=interval)

@@ -13,12 +13,13 @@ from diagnosis.answer.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
-from diagnosis.result import Candidate, CauseSize, ParameterEstimate
+from diagnosis.result import Candidate, CauseSize
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
+from identification.estimate import Quantity
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from tunnel_sim.effects import known_effects
@@ -26,9 +27,7 @@ from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 
 
-def meant_parameter(
-    found: ParameterEstimate, info: ParameterInfo, swing: float, undetermined: float
-) -> ParameterEstimate:
+def meant_parameter(found: Quantity, info: ParameterInfo, swing: float, undetermined: float) -> Quantity:
     """A fitted parameter, its standard deviation omitted where it is meaningless.
 
     Args:
@@ -45,7 +44,7 @@ def meant_parameter(
     return _limited(found, min(uniform, size))
 
 
-def meant_coefficient(estimate: ParameterEstimate, fit: Fit, name: str) -> ParameterEstimate:
+def meant_coefficient(estimate: Quantity, fit: Fit, name: str) -> Quantity:
     """A coefficient, its standard deviation omitted where it is meaningless.
 
     Args:
@@ -75,7 +74,7 @@ def meant_coefficient(estimate: ParameterEstimate, fit: Fit, name: str) -> Param
     return _limited(estimate, greatest)
 
 
-def _limited(found: ParameterEstimate, greatest: float) -> ParameterEstimate:
+def _limited(found: Quantity, greatest: float) -> Quantity:
     if found.std is None or 0.0 < found.std <= greatest:  # 0: the readings do not depend on it
         return found
     return replace(found, std=None, determined=False)
@@ -141,21 +140,21 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
 
 def _parameters(
     study: Study, answer: Answer | None = None, errors: Mapping[str, float] = {}
-) -> dict[str, ParameterEstimate]:
+) -> dict[str, Quantity]:
     """Parameters of the causes detected in the records, and of an answer; unprefixed for a single effect.
 
     Args:
         errors: as in `candidates`.
     """
-    estimates: dict[str, ParameterEstimate] = {}
+    estimates: dict[str, Quantity] = {}
     prepared, hum = study.prepared, study.prepared.hum
     if hum is not None:
         amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
-        estimates[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
-        estimates[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
+        estimates[amplitude] = Quantity(hum.amplitude, hum.std, "rad")
+        estimates[frequency] = Quantity(hum.frequency, hum.frequency_std, "Hz")
     if prepared.coarse:
         step = f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"
-        estimates[step] = ParameterEstimate(prepared.step, None, "rad")
+        estimates[step] = Quantity(prepared.step, None, "rad")
     random = None if answer is None else answer.random
     stated = None if answer is None else answer.stated
     hypothesis = stated if random is None else random.beside
@@ -167,15 +166,15 @@ def _parameters(
             bound = fit.bound(name)
             further = errors.get(name, 0.0) if fit is study.chosen else 0.0
             std = None if bound else math.hypot(fit.std(name) * inflate, further)
-            given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
+            given = Quantity(fit.value(name), std, infos[name].unit, bound=bound)
             undetermined = study.settings.answer.undetermined_from
             estimates[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for one in problem.scatter:
             if one.shown:
                 spread = one.kind.parameters()[0]
-                estimates[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
+                estimates[f"{one.name}.{spread.name}"] = Quantity(one.width, None, spread.unit)
         for name, value in problem.fixed:
-            estimates[name] = ParameterEstimate(value, 0.0, infos[name].unit)
+            estimates[name] = Quantity(value, 0.0, infos[name].unit)
     if random is not None:
         seconds = random.process.interval * sum(i.size for i in random.process.innovations)
         data = study.nominal.problem.data
@@ -191,17 +190,13 @@ def _parameters(
                 size = float(np.sqrt(2.0)) * intensity
                 speeds = [run.wind_speed for run in data.runs if run.wind_on]
                 reduced = float(np.sqrt(np.mean(np.square(speeds)))) / data.width  # Hz
-                estimates[severity] = ParameterEstimate(size, size * relative, "1")
-                estimates[place] = ParameterEstimate(
-                    part.strouhal_number, part.bandwidth / reduced * relative, "1"
-                )
+                estimates[severity] = Quantity(size, size * relative, "1")
+                estimates[place] = Quantity(part.strouhal_number, part.bandwidth / reduced * relative, "1")
             else:
                 # a corner above the rig's frequencies looks white: only size over square root is known there
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-                estimates[severity] = ParameterEstimate(
-                    intensity, intensity * relative, kind.parameters()[0].unit
-                )
-                estimates[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
+                estimates[severity] = Quantity(intensity, intensity * relative, kind.parameters()[0].unit)
+                estimates[place] = Quantity(part.bandwidth, None, "Hz", bound=limit)
     own = own_parameters(estimates, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}

@@ -24,7 +24,7 @@ from diagnosis.answer.linear_theory import (
 )
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
-from diagnosis.result import Hidden, ParameterEstimate
+from diagnosis.result import Hidden
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import AnswerSettings
@@ -176,7 +176,7 @@ def _by_choice(
     return share, others
 
 
-def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEstimate]:
+def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
     """The coefficients averaged over the answers.
 
     Args:
@@ -226,7 +226,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
     return estimates
 
 
-def correlation(answers: Answers, found: Mapping[str, ParameterEstimate]) -> tuple[tuple[float, ...], ...]:
+def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
     """The correlation of the coefficients by noise, small causes and rivals; see `Coefficients`.
 
     Args:
@@ -258,8 +258,8 @@ def correlation(answers: Answers, found: Mapping[str, ParameterEstimate]) -> tup
 
 
 def as_identified(
-    found: Mapping[str, ParameterEstimate], estimate: Estimate, campaign: Campaign, similarity: Similarity
-) -> dict[str, ParameterEstimate]:
+    found: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
+) -> dict[str, Quantity]:
     """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
 
     Without a cause both fit the same model to the same readings, so there is one number for each coefficient. A
@@ -269,7 +269,7 @@ def as_identified(
     repeatability, same = estimate.repeatability, dict(found)
     for name in found:
         given = next((one for of in (estimate, *runs) if (one := getattr(of, name, None)) is not None), None)
-        if not isinstance(given, Quantity) or given.std <= 0.0:
+        if not isinstance(given, Quantity) or given.known_std <= 0.0:
             continue
         parts = {"scatter": 0.0, "air density": 0.0}
         if name in estimate.parameters and repeatability is not None:
@@ -277,19 +277,19 @@ def as_identified(
             parts["scatter"] = sum(one[place][place] for one in repeatability.covariances)
         if name.startswith("cn_"):
             parts["air density"] = (given.value * density_rounding(campaign.runs)) ** 2
-        shares = {source: min(part / given.std**2, 1.0) for source, part in parts.items()}
+        shares = {source: min(part / given.known_std**2, 1.0) for source, part in parts.items()}
         shares = {"noise": max(1.0 - sum(shares.values()), 0.0), **shares}
-        value, std = (similarity.similar(one, given.unit) for one in (given.value, given.std))
+        value, std = (similarity.similar(one, given.unit) for one in (given.value, given.known_std))
         ends = given.interval and tuple(similarity.similar(end, given.unit) for end in given.interval)
         interval = (ends[0], ends[1]) if ends else None
-        same[name] = ParameterEstimate(value, std, given.unit, shares=shares, interval=interval)
+        same[name] = Quantity(value, std, given.unit, shares=shares, interval=interval)
     return same
 
 
 _STEP = 1e-3  # of a parameter, in standard deviations, for the derivatives of the coefficients in phase
 
 
-def in_phase(fit: Fit) -> tuple[dict[str, ParameterEstimate], tuple[tuple[float, ...], ...]]:
+def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ...]]:
     """Cnβ and Cnr in phase with angle and rate (decision 0004), and the covariance of all four coefficients.
 
     The part of an effect's form that no free decay shows moves Cnr along the effect's own part, so it adds nothing
@@ -325,7 +325,7 @@ def in_phase(fit: Fit) -> tuple[dict[str, ParameterEstimate], tuple[tuple[float,
         unseen = np.array([*effect.unseen_form(here[0], runs), 0.0, 0.0])
         matrix += np.diag(unseen**2)
     estimates = {
-        name: ParameterEstimate(float(here[i]), math.sqrt(max(float(matrix[i, i]), 0.0)), "1/rad")
+        name: Quantity(float(here[i]), math.sqrt(max(float(matrix[i, i]), 0.0)), "1/rad")
         for i, name in ((2, "cn_beta"), (3, "cn_r"))
     }
     return estimates, tuple(map(tuple, matrix.tolist()))
@@ -360,7 +360,7 @@ class Central:
         return cls(middle, std, (low, high) if skew > chosen.skewed_from * std else None)
 
 
-def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """The coefficients of the nominal model.
 
     Args:
@@ -427,7 +427,7 @@ def _of_answer(
     return answer.probability, found, within | common
 
 
-def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> ParameterEstimate:
+def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> Quantity:
     """A coefficient, marked where the fit ends at a bound or the runs do not determine it."""
     whole = sum(parts.values())
     shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}
@@ -435,7 +435,7 @@ def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str,
     limiting = model.bounded_by(fit.problem.names, name)
     bound = None if limiting is None else fit.bound(limiting)
     unit = model.coefficient_units[name]
-    found = ParameterEstimate(value, None if bound else std, unit, bound, shares=shares)
+    found = Quantity(value, None if bound else std, unit, bound=bound, shares=shares)
     return meant_coefficient(found, fit, name)
 
 

@@ -32,8 +32,9 @@ from diagnosis.likelihood.starting_points import (
     second_order_starts,
 )
 from diagnosis.model.parameters import Point
-from diagnosis.result import Hidden, ParameterEstimate
+from diagnosis.result import Hidden
 from diagnosis.search.hypothesis import own_gain
+from identification.estimate import Quantity
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -71,9 +72,9 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
         largest = next((one for one in tried if one is not None), None)
         if largest is not None:
             severity = kind.parameters()[0]
-            size = ParameterEstimate(largest.size, None, severity.unit)
+            size = Quantity(largest.size, None, severity.unit)
             moves = {
-                name: ParameterEstimate(float(abs(move)), None, units[name])
+                name: Quantity(float(abs(move)), None, units[name])
                 for name, move in zip(names, largest.moves, strict=True)
             }
             stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one, _ in sizes) / reach))

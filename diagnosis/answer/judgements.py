@@ -15,14 +15,15 @@ from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.noise.gap import gap_test
 from diagnosis.noise.kinds import Noise
-from diagnosis.result import Hidden, ParameterEstimate, RunGap
+from diagnosis.result import Hidden, RunGap
 from diagnosis.search.rivals.two_springs import ONE_SPRING, spring_error
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
+from identification.estimate import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
-Estimates = Mapping[str, ParameterEstimate]
+Estimates = Mapping[str, Quantity]
 
 
 def cautions(

@@ -11,8 +11,8 @@ from scipy.special import ndtr, ndtri
 from diagnosis.answer.candidates import damping_ratio
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.result import ParameterEstimate
 from diagnosis.search.study import Study
+from identification.estimate import Quantity
 
 _WIDE = 30.0  # standard deviations over the allowed range from which the distribution in it is uniform
 _FAR = 6.0  # standard deviations within which the whole distribution lies
@@ -55,7 +55,7 @@ def truncated(value: float, std: float, lower: float, upper: float, probability:
     return Truncated(value + std * moved, std * spread, (max(low, lower), min(high, upper)))
 
 
-def within_bounds(given: Mapping[str, ParameterEstimate], study: Study) -> dict[str, ParameterEstimate]:
+def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quantity]:
     """Coefficients with the damping of a passive rig within its bounds.
 
     Args:

@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.answer.units import own_estimate, own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.result import ParameterEstimate
+from identification.estimate import Quantity
 from identification.trade_off import ROLES, Combination, Role, Setting, TradeOff, trade_off
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -60,7 +60,7 @@ def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combinatio
 def _own_scale(fit: Fit, campaign: Campaign, name: str) -> tuple[float, str]:
     """Factor from a fit's parameter to the same in the units of the measured campaign, and its unit there."""
     data, (given,) = fit.problem.data, [one for one in fit.problem.parameters.common if one.name == name]
-    one = ParameterEstimate(1.0, None, given.unit)
+    one = Quantity(1.0, None, given.unit)
     if not given.effect:
         return own_estimate(one, data.similarity).value, given.unit
     known = {

@@ -10,7 +10,8 @@ from typing import Any
 from diagnosis.facts.repeatability import Repeatability
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
-from diagnosis.result import Diagnosis, Hidden, ParameterEstimate
+from diagnosis.result import Diagnosis, Hidden
+from identification.estimate import Quantity
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
@@ -50,9 +51,7 @@ _PRODUCTS = {
 }
 
 
-def sized_coefficients(
-    found: Mapping[str, ParameterEstimate], rig: RigProperties
-) -> dict[str, ParameterEstimate]:
+def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dict[str, Quantity]:
     """Coefficients under the names of the identified quantities.
 
     Args:
@@ -82,7 +81,7 @@ _STEPS = {
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     """The answer with the parameters of the measured rig; the remainder (`Remainder`) has its units already."""
 
-    def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+    def own(values: Mapping[str, Quantity]) -> dict[str, Quantity]:
         return {name: own_estimate(value, similarity) for name, value in values.items()}
 
     given, noise, found = answer.coefficients, answer.noise, answer.confirmation
@@ -116,8 +115,8 @@ def own_repeatability(given: Repeatability, similarity: Similarity) -> Repeatabi
 
 
 def own_parameters(
-    given: Mapping[str, ParameterEstimate], campaign: Campaign, similarity: Similarity, model: NominalModel
-) -> dict[str, ParameterEstimate]:
+    given: Mapping[str, Quantity], campaign: Campaign, similarity: Similarity, model: NominalModel
+) -> dict[str, Quantity]:
     """Parameters of effects in the measured campaign's units.
 
     Args:
@@ -145,7 +144,7 @@ def own_parameters(
 
 def own_hidden(
     given: Sequence[Hidden],
-    coefficients: Mapping[str, ParameterEstimate],
+    coefficients: Mapping[str, Quantity],
     campaign: Campaign,
     similarity: Similarity,
     model: NominalModel,
@@ -170,7 +169,7 @@ def own_hidden(
     return tuple(found)
 
 
-def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
+def own_estimate(estimate: Quantity, similarity: Similarity) -> Quantity:
     """An estimate in the measured campaign's units, its value and standard deviation scaled alike."""
 
     def own(value: float) -> float:

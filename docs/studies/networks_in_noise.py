@@ -113,5 +113,5 @@ def noise_row(
         zeta=zeta,
         window=ratio_of(np.array([one.value - zeta for one in first]), three),
         runs={m: ratio_of(e, whole) if e.size == trials else None for m, e in errors.items()},
-        coverage=float(np.mean([abs(one.value - zeta) < 1.96 * one.std for one in own])),
+        coverage=float(np.mean([abs(one.value - zeta) < 1.96 * one.known_std for one in own])),
     )

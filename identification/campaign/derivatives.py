@@ -318,13 +318,13 @@ def wind_off(
     """
     spring, between = None if repeatability is None else repeatability.spring_stiffness, 0.0
     if spring is not None:
-        widened = student_factor(np.array([4.0 * (spring.std / spring.value) ** 2]))
+        widened = student_factor(np.array([4.0 * (spring.known_std / spring.value) ** 2]))
         between = 0.5 * spring.value * float(widened[0])
     rows = [
         (
             run.spring_stiffness,
             found.omega_n.value,
-            float(np.hypot(found.omega_n.std, between * found.omega_n.value)),
+            float(np.hypot(found.omega_n.known_std, between * found.omega_n.value)),
         )
         for run, found in zip(runs, estimates, strict=True)
         if not run.wind_on and run.spring_stiffness is not None and found.omega_n is not None

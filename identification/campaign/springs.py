@@ -124,13 +124,15 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
         run = stated.get(found.id)
         if run is not None and run.spring_stiffness and found.omega_n is not None:
             inertia = run.spring_stiffness / found.omega_n.value**2
-            std = 2.0 * inertia * found.omega_n.std / found.omega_n.value
+            std = 2.0 * inertia * found.omega_n.known_std / found.omega_n.value
             inertias.setdefault(run.spring_stiffness, []).append(Quantity(inertia, std, "kg m2"))
     if len(inertias) != 2 or {run.spring_stiffness for run in campaign.runs} != inertias.keys():
         return None
     (soft, one), (stiff, other) = sorted(inertias.items())
     means = [float(np.mean([each.value for each in several])) for several in (one, other)]
-    stds = [float(np.sqrt(sum(each.std**2 for each in several))) / len(several) for several in (one, other)]
+    stds = [
+        float(np.sqrt(sum(each.known_std**2 for each in several))) / len(several) for several in (one, other)
+    ]
     apart = abs(means[0] / means[1] - 1.0)
     std = float(np.hypot(stds[0] / means[0], stds[1] / means[1]))
     allowed = DIFFERENCE_DEVIATIONS * float(np.hypot(std, np.sqrt(2.0) * SPRING_AT_BEST))

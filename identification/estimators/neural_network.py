@@ -85,7 +85,7 @@ class NeuralNetwork(Paired):
             statuses |= noise_statuses([check.noise])
         if check is not None and check.noise.departs:
             least_omega, least_zeta = modal_quantities(Decay.from_modal(omega, zeta), check.covariance)
-            zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
+            zeta_std, omega_std = max(zeta_std, least_zeta.known_std), max(omega_std, least_omega.known_std)
         if run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
         shown = []

@@ -99,7 +99,7 @@ def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:
         windows = []
         for window in run.windows:
             factor = window.omega_n.value**-sensor.derivative
-            amplitude = Quantity(factor * window.amplitude.value, factor * window.amplitude.std, "rad")
+            amplitude = Quantity(factor * window.amplitude.value, factor * window.amplitude.known_std, "rad")
             windows.append(replace(window, amplitude=amplitude))
         runs.append(
             replace(

@@ -293,10 +293,10 @@ def _departing_windows(
     found = np.array([window.omega_n.value for window in windows])
     if found.size < 2:
         return ()
-    noisy = float(np.mean([window.omega_n.std**2 for window in windows]))
+    noisy = float(np.mean([window.omega_n.known_std**2 for window in windows]))
     variance = noisy + 0.5 * float(np.mean(np.diff(found) ** 2))
     along = abs(found[-1] - found[0]) / np.sqrt(2.0 * variance)
-    away = abs(found.mean() - omega_n.value) / np.sqrt(variance / found.size + omega_n.std**2)
+    away = abs(found.mean() - omega_n.value) / np.sqrt(variance / found.size + omega_n.known_std**2)
     return windows if max(along, away) > MISFIT_DEVIATIONS else ()
 
 
@@ -315,7 +315,7 @@ def _mean_over_a_cycle(residual: Array, reading: Reading, decay: Decay) -> Array
 def _spanning(value: Quantity, windows: Sequence[Quantity]) -> Quantity:
     """A quantity of the run whose standard deviation includes its distance from the windows' values."""
     away = np.array([window.value for window in windows]) - value.value
-    return Quantity(value.value, float(np.hypot(value.std, np.sqrt(np.mean(away**2)))), value.unit)
+    return Quantity(value.value, float(np.hypot(value.known_std, np.sqrt(np.mean(away**2)))), value.unit)
 
 
 @dataclass(frozen=True, eq=False)

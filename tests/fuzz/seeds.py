@@ -213,10 +213,10 @@ def answer_document() -> dict[str, Any]:
     from diagnosis.facts.closure import ON_RUNS
 
     values = {
-        "cn_beta": result.ParameterEstimate(0.45, 0.01, "1/rad"),
-        "cn_r": result.ParameterEstimate(-0.1, 0.01, "1/rad"),
+        "cn_beta": result.Quantity(0.45, 0.01, "1/rad"),
+        "cn_r": result.Quantity(-0.1, 0.01, "1/rad"),
     }
-    friction = {"friction_moment": result.ParameterEstimate(0.004, 1e-5, "N m")}
+    friction = {"friction_moment": result.Quantity(0.004, 1e-5, "N m")}
     gap = result.GapSummary(
         True, 2.0, 0.1, 0.99, ON_RUNS, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9}
     )

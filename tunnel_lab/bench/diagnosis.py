@@ -40,7 +40,7 @@ from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
-    from diagnosis.result import ParameterEstimate
+    from identification.estimate import Quantity
 
 
 WORK = "diagnosis"
@@ -309,7 +309,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     from diagnosis.words.numbers import misfit_shown, share
     from identification.printing import estimated, unit_mark
 
-    def size(given: ParameterEstimate) -> str:
+    def size(given: Quantity) -> str:
         return typeset(estimated(given.to_json_dict(), unit_mark(beside(given.unit, ""))))
 
     show_facts(

@@ -135,7 +135,7 @@ def _draw(axes: Axes, scores: Sequence[Score], place: int, count: int, covered: 
     else:
         errors = [(row + shift, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound]
         rows, values = [row for row, _ in errors], np.array([error.value for _, error in errors])
-        spans = [min(INTERVAL * error.std, 0.9 * error.value) for _, error in errors]
+        spans = [min(INTERVAL * error.known_std, 0.9 * error.value) for _, error in errors]
     return axes.errorbar(
         values, rows, xerr=spans, color=COLOURS[place], marker=MARKERS[place], linestyle="none",
         markersize=3.0, elinewidth=0.8,

@@ -218,7 +218,7 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
             ):
                 axes.errorbar(
                     at, [found.value for found in figures if found],
-                    yerr=[INTERVAL * found.std for found in figures if found],
+                    yerr=[INTERVAL * found.known_std for found in figures if found],
                     color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)], markersize=4.0,
                     linewidth=1.0, label=estimator.replace("_", " "),
                 )  # fmt: skip

@@ -69,7 +69,7 @@ def scaled(quantity: Quantity | None, factor: float) -> Quantity | None:
     Args:
         factor: the old unit in the new unit.
     """
-    return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.std, "")
+    return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.known_std, "")
 
 
 Part = Callable[[Path], Section]

@@ -217,11 +217,11 @@ def windows_figure(estimate: Estimate) -> Figure:
                 shifts = deviations(quantities)
                 mean = quantities[0].value - shifts[0].value
                 scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
-                quantities = [Quantity(scale * q.value, scale * q.std, unit) for q in shifts]
+                quantities = [Quantity(scale * q.value, scale * q.known_std, unit) for q in shifts]
             axes.errorbar(
                 [window.amplitude.value for window in run.windows],
                 [q.value for q in quantities],
-                yerr=[INTERVAL * q.std for q in quantities],
+                yerr=[INTERVAL * q.known_std for q in quantities],
                 color=COLOURS[index],
                 marker=MARKERS[index],
                 label=figure_text(run.id),
@@ -258,7 +258,7 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
     weights = np.maximum(stds, least if np.isfinite(least) else 1.0) ** -2.0  # a value may be exact
     mean = float(weights @ [quantity.value for quantity in quantities] / weights.sum())
     of_mean = 1.0 / float(weights.sum())
-    return [Quantity(q.value - mean, sqrt(max(q.std**2 - of_mean, 0.0)), q.unit) for q in quantities]
+    return [Quantity(q.value - mean, sqrt(max(q.known_std**2 - of_mean, 0.0)), q.unit) for q in quantities]
 
 
 @styled

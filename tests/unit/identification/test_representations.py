@@ -8,7 +8,7 @@ import re
 import polars as pl
 import pytest
 
-from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
+from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, RunGap, Where
 from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.blocks import (
@@ -120,8 +120,8 @@ def test_frames_without_rows_keep_their_columns() -> None:
 @pytest.fixture
 def diagnosis() -> Diagnosis:
     friction = {
-        "friction_moment": ParameterEstimate(0.00399, 0.00006, "N m"),
-        "ratio": ParameterEstimate(2.0, None, "1", "upper"),
+        "friction_moment": Quantity(0.00399, 0.00006, "N m"),
+        "ratio": Quantity(2.0, None, "1", bound="upper"),
     }
     return Diagnosis(
         campaign="by hand",
@@ -145,10 +145,10 @@ def diagnosis() -> Diagnosis:
         ambiguous_with=(),
         next_run=None,
         coefficients=Coefficients(
-            {"cn_r": ParameterEstimate(-0.3132, 0.0225, "1/rad")},
+            {"cn_r": Quantity(-0.3132, 0.0225, "1/rad")},
             {
-                "cn_r": ParameterEstimate(-0.2574, 0.0118, "1/rad"),
-                "zeta": ParameterEstimate(0.01, 0.001, "1"),
+                "cn_r": Quantity(-0.2574, 0.0118, "1/rad"),
+                "zeta": Quantity(0.01, 0.001, "1"),
             },
         ),
         confirmation=Confirmation(True, 1e-6, "a", 1e-7, 1e-5),

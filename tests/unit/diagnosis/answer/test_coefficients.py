@@ -25,8 +25,8 @@ from diagnosis.answer.units import own_estimate
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.similarity import Similarity
-from diagnosis.result import ParameterEstimate
 from diagnosis.settings import AnswerSettings, Settings
+from identification.estimate import Quantity
 from identification.printing import estimated
 from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
@@ -248,5 +248,5 @@ def test_a_skewed_interval_is_printed(value, std, interval, text):
 
 
 def test_an_interval_has_the_units_of_the_measured_campaign():
-    found = own_estimate(ParameterEstimate(10.0, 1.0, "rad/s", interval=(9.0, 13.0)), Similarity(time=4.0))
+    found = own_estimate(Quantity(10.0, 1.0, "rad/s", interval=(9.0, 13.0)), Similarity(time=4.0))
     assert found.interval == pytest.approx((0.9 * found.value, 1.3 * found.value))

@@ -9,8 +9,8 @@ from scipy.stats import truncnorm
 from diagnosis.answer.candidates import damping_ratio
 from diagnosis.answer.held_out import one_more
 from diagnosis.answer.passive import truncated, within_bounds
-from diagnosis.result import ParameterEstimate
 from diagnosis.search.investigate import nominal_study
+from identification.estimate import Quantity
 from tests.reference.free_decays import Setting, campaign
 from tests.support.gap_campaigns import answer
 from tunnel_sim.effects import effect_class
@@ -53,24 +53,24 @@ def test_the_deviation_of_the_damping_is_within_the_whole_rate(study):
     assert whole == pytest.approx(
         nominal.coefficient(study.nominal.problem.names, study.nominal.point.common, "zeta"), rel=0.1
     )
-    given = {"zeta": ParameterEstimate(0.0, 0.1, "1"), "omega_n": ParameterEstimate(10.0, 1e-3, "rad/s")}
+    given = {"zeta": Quantity(0.0, 0.1, "1"), "omega_n": Quantity(10.0, 1e-3, "rad/s")}
     found = within_bounds(given, study)
     assert found["omega_n"] is given["omega_n"]
     zeta = found["zeta"]
     assert zeta.value == 0.0
     assert zeta.std < 0.7 * whole
     assert 0.0 <= zeta.interval[0] < zeta.interval[1] < 1.1 * whole
-    unknown = {"zeta": ParameterEstimate(0.3 * whole, None, "1", determined=False)}
+    unknown = {"zeta": Quantity(0.3 * whole, None, "1", determined=False)}
     assert within_bounds(unknown, study)["zeta"].determined
 
 
 def test_what_the_bounds_allow_is_unchanged(study):
     whole = damping_ratio(study.chosen)
     for given in (
-        {"zeta": ParameterEstimate(0.5 * whole, 0.05 * whole, "1")},
-        {"zeta": ParameterEstimate(0.0, None, "1", "lower")},
-        {"cn_r": ParameterEstimate(-0.2, 5.0, "1/rad")},
+        {"zeta": Quantity(0.5 * whole, 0.05 * whole, "1")},
+        {"zeta": Quantity(0.0, None, "1", bound="lower")},
+        {"cn_r": Quantity(-0.2, 5.0, "1/rad")},
     ):
         assert within_bounds(given, study) == given
-    nothing = {"zeta": ParameterEstimate(0.0, 0.1, "1")}
+    nothing = {"zeta": Quantity(0.0, 0.1, "1")}
     assert within_bounds(nothing, replace(study, answers=())) == nothing

@@ -20,9 +20,9 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
-from diagnosis.result import ParameterEstimate
 from diagnosis.settings import Settings
 from diagnosis.words.remainder import rest_words
+from identification.estimate import Quantity
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.writing import as_json
@@ -78,7 +78,7 @@ def cut(base, part):
 
 
 def judged(study, moved, std, excess=0.4):
-    stated = {"cn_beta": ParameterEstimate(0.5, std, "1/rad")}
+    stated = {"cn_beta": Quantity(0.5, std, "1/rad")}
     found = remainder(study, stated, {"cn_beta": moved}, excess)
     document = {
         "causes": list(study.causes),
@@ -145,7 +145,7 @@ def test_no_gap_leaves_nothing(data, base):
 @pytest.mark.parametrize(("std", "determined"), [(0.05, True), (1.0, True), (1000.0, False), (0.0, False)])
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
-    given = ParameterEstimate(0.2, std, "1/rad2")
+    given = Quantity(0.2, std, "1/rad2")
     found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined_from)
     assert (found.std == std, found.determined) == (determined, determined)
 
@@ -154,10 +154,10 @@ def test_a_range_no_wider_than_chance_determines_nothing():
     info = effect_class("coulomb_friction").parameters()[0]
     bounded = replace(info, fit_lower=1.0, fit_upper=3.0, scale=100.0)
     assert meant_parameter(
-        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined_from
+        Quantity(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
     assert not meant_parameter(
-        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined_from
+        Quantity(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
 
 
@@ -168,7 +168,7 @@ def test_a_range_no_wider_than_chance_determines_nothing():
      ("cn_r", -0.1, 1e4, False), ("cn_r", -0.1, 0.3, True)],
 )  # fmt: skip
 def test_a_coefficient_that_could_be_anything_is_not_determined(base, name, value, std, determined):
-    found = meant_coefficient(ParameterEstimate(value, std, "1"), base, name)
+    found = meant_coefficient(Quantity(value, std, "1"), base, name)
     assert (found.determined, found.std) == (determined, std if determined else None)
     assert found.to_json_dict().get("determined", True) is determined
 
@@ -191,7 +191,7 @@ def test_the_limit_is_the_stiffness_or_the_critical_damping_in_the_fastest_wind(
         moments = {"cn_beta": stiffness, "cn_r": 2.0 * np.sqrt(INERTIA * stiffness)}
         greatest.append(moments[name] / loads(speed)[name == "cn_r"])
     for share, determined in ((0.99, True), (1.01, False)):
-        given = ParameterEstimate(0.1, share * min(greatest), "1/rad")
+        given = Quantity(0.1, share * min(greatest), "1/rad")
         assert meant_coefficient(given, base, name).determined is determined
 
 

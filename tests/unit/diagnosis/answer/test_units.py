@@ -10,8 +10,8 @@ from diagnosis.answer.units import own_parameters, parameter_unit, sized_coeffic
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.rig import PerInertia
 from diagnosis.model.similar import similar_campaign
-from diagnosis.result import ParameterEstimate
 from identification import identify
+from identification.estimate import Quantity
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting
@@ -60,7 +60,7 @@ def test_what_is_identified_is_the_coefficient_times_the_missing_sizes(data, nam
 
 
 def test_other_coefficients_keep_their_names():
-    found = {"omega_n": ParameterEstimate(12.0, 0.1, "rad/s")}
+    found = {"omega_n": Quantity(12.0, 0.1, "rad/s")}
     assert sized_coefficients(found, RigProperties()) == found
 
 
@@ -96,7 +96,7 @@ def test_every_parameter_is_given_in_a_unit_that_can_be_read_and_in_own_units(da
     _, change = similar_campaign(stated)
     for kind in ALL_EFFECTS:
         infos = {f"{kind.name}.{info.name}": info for info in kind.parameters()}
-        given = {key: ParameterEstimate(info.default + 0.7, 0.1, info.unit) for key, info in infos.items()}
+        given = {key: Quantity(info.default + 0.7, 0.1, info.unit) for key, info in infos.items()}
         textbook = {k: v for k, v in given.items() if not infos[k].form}
         found = own_parameters(textbook, stated, change, nominal_model(stated))
         for key, own in found.items():

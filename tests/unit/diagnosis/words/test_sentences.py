@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.facts.closure import Confirmation, NoiseSummary
 from diagnosis.facts.found import Fact, Found, Noted, Nowhere
-from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, Where
+from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, Where
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
 from diagnosis.words.numbers import KINDS
@@ -17,6 +17,7 @@ from diagnosis.words.tables import closable_table
 from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
+from identification.estimate import Quantity
 from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document
 
 Document = dict[str, Any]
@@ -307,7 +308,7 @@ def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None
 
 def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
     noise = NoiseSummary(4e-4, None, "estimated")
-    value = {"cn_beta": ParameterEstimate(0.5, 0.001, "1/rad")}
+    value = {"cn_beta": Quantity(0.5, 0.001, "1/rad")}
     found = Found(
         nowhere=Nowhere(3, 0.5, within_step=False),
         noise=Fact("not stated"),

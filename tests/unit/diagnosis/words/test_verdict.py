@@ -14,7 +14,7 @@ from diagnosis.facts.decision import Predictions, decision
 from diagnosis.facts.found import Nearly
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.result import GapSummary, ParameterEstimate, RunGap
+from diagnosis.result import GapSummary, RunGap
 from diagnosis.settings import Settings
 from diagnosis.words.cards import key_figures
 from diagnosis.words.causes import said_size
@@ -22,6 +22,7 @@ from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.tables import candidates_table, parameters_table, runs_table
 from diagnosis.words.verdict import headline, next_steps, rival_lines, undecided_words, verdict
 from identification.blocks import typeset
+from identification.estimate import Quantity
 from tests.support.diagnosis_document import campaign, document
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
@@ -388,7 +389,7 @@ def test_what_nearly_explains_a_gap_is_found_with_the_reason_why_it_is_not_named
 
 
 def estimates(**values):
-    return {name: ParameterEstimate(value, 0.01, "1/rad") for name, value in values.items()}
+    return {name: Quantity(value, 0.01, "1/rad") for name, value in values.items()}
 
 
 def test_a_change_of_two_per_cent_is_not_immaterial():

@@ -18,9 +18,9 @@ from diagnosis.result import (
     Coefficients,
     Diagnosis,
     GapSummary,
-    ParameterEstimate,
     RunGap,
 )
+from identification.estimate import Quantity
 from tests.support.diagnosis_document import scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
@@ -58,7 +58,7 @@ def document(data):
         (float(a @ a) / a.size - 1.0, float(b @ b) / b.size - 1.0)
         for a, b in zip(base.residuals, best.residuals, strict=True)
     ]
-    after = ParameterEstimate(best.value("cn_r"), best.std("cn_r"), "1/rad")
+    after = Quantity(best.value("cn_r"), best.std("cn_r"), "1/rad")
     answer = Diagnosis(
         campaign="<script>alert(1)</script>",
         causes=(CAUSE,),
@@ -69,7 +69,7 @@ def document(data):
         ),
         where=replace(where, words="The damping of all runs shows it."),
         candidates=(
-            Candidate(CAUSE, 0.912, best.excess, 0.987, {"coefficient": ParameterEstimate(0.003, 1e-5, "N m")}),
+            Candidate(CAUSE, 0.912, best.excess, 0.987, {"coefficient": Quantity(0.003, 1e-5, "N m")}),
             Candidate("coulomb_friction", 0.08, 1.5, 0.5),
             Candidate("unknown", 0.007, base.excess, 0.0),
             Candidate("none", 0.001, base.excess, 0.0),
@@ -79,7 +79,7 @@ def document(data):
             "spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0, "separation": 9.0,
         },
         coefficients=Coefficients(
-            {"cn_r": ParameterEstimate(-0.31, 0.02, "1/rad")}, {"cn_r": after}, note="A note."
+            {"cn_r": Quantity(-0.31, 0.02, "1/rad")}, {"cn_r": after}, note="A note."
         ),
         confirmation=Confirmation(True, 1.2e-5, "r2", 6e-6, 4e-5),
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),

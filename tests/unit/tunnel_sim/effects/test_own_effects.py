@@ -12,7 +12,8 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.model.similarity import Similarity
-from diagnosis.result import Diagnosis, ParameterEstimate
+from diagnosis.result import Diagnosis
+from identification.estimate import Quantity
 from tests.support.gap_campaigns import campaign
 from tests.support.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (
@@ -227,7 +228,7 @@ def hardened() -> dict[str, Diagnosis]:
     }
 
 
-def estimate(found: Diagnosis) -> ParameterEstimate:
+def estimate(found: Diagnosis) -> Quantity:
     (candidate,) = [c for c in found.candidates if c.effect == " + ".join(found.causes)]
     return next(iter(candidate.parameters.values()))
 

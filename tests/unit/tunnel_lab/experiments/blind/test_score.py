@@ -20,10 +20,7 @@ from tunnel_lab.experiments.blind.score import Score, calibration
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
     """A diagnosis with given causes, as its JSON."""
     name = " + ".join(causes) or "none"
-    values = {
-        k: result.ParameterEstimate(v, s, "1/rad")
-        for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
-    }
+    values = {k: result.Quantity(v, s, "1/rad") for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)}
     return result.Diagnosis(
         "c", tuple(causes),
         result.GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
