@@ -115,7 +115,7 @@ def _answered(study: Study, chosen: Chosen, joint: JointModel | None, say: Progr
     patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
     answer = _assembled(study, chosen, closes, patched, unpatched)
     if chosen.limit_cycles:
-        return limit_cycle_answer(answer, chosen.remarks)
+        return limit_cycle_answer(answer, chosen.remarks, study.settings.answer)
     return _with_remainder(answer, study, chosen, say)
 
 

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import polars as pl
+from pydantic import TypeAdapter
 
 from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
-from diagnosis.facts.decision import Decision, Predictions, decision
+from diagnosis.facts.decision import Decision
 from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
+from diagnosis.facts.reading import UNWRITTEN, from_json_fields
 from diagnosis.facts.remainder import Closable, Remainder
 from diagnosis.facts.repeatability import Repeatability
-from diagnosis.settings import settings_of
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
@@ -26,6 +29,7 @@ from identification.blocks import as_notebook, as_text
 from identification.estimate import Quantity, as_pandas, correlated, wide_frame
 from identification.status import Remark
 from identification.trade_off import TradeOff
+from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -169,6 +173,12 @@ class CauseSize:
         found = dict(vars(self))
         return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
 
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, without units in their names."""
+        return {**data, "amplitude": data["amplitude_rad"], "stands": data["stands_rad"]}
+
 
 @dataclass(frozen=True)
 class Hidden:
@@ -255,6 +265,7 @@ class Diagnosis:
     coefficients: Coefficients
     confirmation: Confirmation
     noise: NoiseSummary
+    decision: Decision
     verdict: str = ""
     hidden: tuple[Hidden, ...] = ()
     trade_off: TradeOff | None = None
@@ -273,20 +284,7 @@ class Diagnosis:
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()
     found: Found = field(default_factory=Found)
-    data: Campaign | None = field(default=None, compare=False)
-
-    @property
-    def decision(self) -> Decision:
-        """Whether the answer is decided, and the common part of the likely answers."""
-        chosen, gap = settings_of({"provenance": self.provenance}).answer, self.gap
-        predictions = Predictions(
-            held_out=gap.closed,
-            ahead=gap.closed_ahead,
-            patched=None if self.model is None else self.model.judged(chosen),
-            left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
-            elsewhere=self.found.place is not None and self.found.place.elsewhere,
-        )
-        return decision([(c.effect, c.probability) for c in self.candidates], chosen, predictions)
+    data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""
@@ -319,6 +317,23 @@ class Diagnosis:
             **self.waterfall.to_json_dict(),
             **{name: as_json(getattr(self, name)) for name in _LAST},
         }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: the document; further keys are ignored.
+
+        Raises:
+            TunnelError: when it is not a diagnosis: a key is missing, or a value has the wrong type.
+        """
+        where, remedy = "the diagnosis as JSON", "write it again with tunnel diagnose --json"
+        check_shape(data, where, remedy)
+        with as_described("is not a diagnosis", where, remedy):
+            return _adapter().validate_json(
+                json.dumps({**data, "waterfall": data, "decision": data}), strict=True
+            )
 
     def __str__(self) -> str:
         """The verdict, short tables of the answers, gaps and coefficients, the caveats and the next steps."""
@@ -438,3 +453,8 @@ class Diagnosis:
         kinds = {"id": pl.String, "before": pl.Float64, "after": pl.Float64, "held_out": pl.Boolean}
         rows = [{name: getattr(run, name) for name in kinds} for run in self.gap.runs]
         return pl.DataFrame(rows, schema=kinds)
+
+
+@cache
+def _adapter() -> TypeAdapter[Diagnosis]:
+    return TypeAdapter(Diagnosis)

@@ -31,13 +31,15 @@ from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.trade_off import least_separated
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.facts.closure import NoiseSummary, Waterfall
-from diagnosis.facts.found import Fact, Nowhere, PlaceFound
+from diagnosis.facts.decision import Predictions, decision
+from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Remainder
 from diagnosis.likelihood.compression import in_shorter_blocks
-from diagnosis.result import Coefficients, Diagnosis, Where
+from diagnosis.result import Coefficients, Diagnosis, GapSummary, Where
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import AnswerSettings
 from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
@@ -130,6 +132,7 @@ def assemble(
     )
     caveats = (*left_out, *of_answer, *outside_the_fits(study))
     rest = _remains(study, found, answers, closes.steps)
+    beside = beside_the_numbers(study, said, before, after, caveats, rest)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
@@ -137,6 +140,11 @@ def assemble(
         where=where,
         maps=maps.to_json_dict(),
         candidates=weighed,
+        decision=decision(
+            [(one.effect, one.probability) for one in weighed],
+            settings.answer,
+            _predictions(closes.gap, patched, beside, settings.answer),
+        ),
         ambiguous_with=tuple(
             sorted({name for answer in rivals for name in answer.effects} - set(study.causes))
         ),
@@ -163,7 +171,20 @@ def assemble(
         # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
         repeatability=repeatability(chosen if study.causes != UNKNOWN else study.between_runs or chosen),
         model=patched,
-        found=beside_the_numbers(study, said, before, after, caveats, rest),
+        found=beside,
+    )
+
+
+def _predictions(
+    gap: GapSummary, patched: PatchedModel | None, found: Found, chosen: AnswerSettings
+) -> Predictions:
+    """The success of the answer's predictions."""
+    return Predictions(
+        held_out=gap.closed,
+        ahead=gap.closed_ahead,
+        patched=None if patched is None else patched.judged(chosen),
+        left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
+        elsewhere=found.place is not None and found.place.elsewhere,
     )
 
 

@@ -95,8 +95,11 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
     assert start.scaled is not None
     if start.point.release.shape[1] > fit.point.release.shape[1]:
         return found
-    size, limit = found.size, fit.unlikelihood - found.lowered
+    limit = fit.unlikelihood - found.lowered
     least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
+    size = float(
+        np.clip(found.size, least, greatest)
+    )  # a multiple of a trial may be rounded beyond its bound
     inside = outside = 0.0  # sizes below and above the limit
     along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
     for _ in range(_REFITS):

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from diagnosis.facts.decision import decision
 from diagnosis.facts.found import Mode, TwoModes
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import WordsSettings
+from diagnosis.settings import AnswerSettings, WordsSettings
 from identification.examination.self_excited import in_limit_cycle
 from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
@@ -92,7 +93,7 @@ def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _M
     return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
 
 
-def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
+def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark], chosen: AnswerSettings) -> Diagnosis:
     """The answer without effects, replaced by ``unknown`` without coefficients, for runs in a limit cycle."""
     excess = nominal.gap.excess_before
     return replace(
@@ -100,6 +101,7 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
         causes=UNKNOWN,
         where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
         candidates=(Candidate("unknown", 1.0, excess, 0.0),),
+        decision=decision([("unknown", 1.0)], chosen),
         coefficients=Coefficients({}, {}),
         inclusion={},
         hidden=(),

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from diagnosis.facts.reading import from_json_fields
 from tunnel_sim.files.writing import as_json
 
 ON_RUNS = "on held-out runs"
@@ -84,6 +85,12 @@ class Waterfall:
             "without": dict(self.without),
         }
 
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, from a whole document."""
+        return {"steps": data["waterfall"], "without": data["without"], "held_out": data["waterfall_on"]}
+
 
 @dataclass(frozen=True)
 class Confirmation:
@@ -107,8 +114,18 @@ class Confirmation:
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, with units in their names."""
-        names = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
-        return {"model": "mujoco", **{names.get(name, name): value for name, value in vars(self).items()}}
+        written = {_WITH_UNIT.get(name, name): value for name, value in vars(self).items()}
+        return {"model": "mujoco", **written}
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, without units in their names."""
+        own = {written: name for name, written in _WITH_UNIT.items()}
+        return {own.get(key, key): value for key, value in data.items()}
+
+
+_WITH_UNIT = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from diagnosis.facts.reading import from_json_fields
 from diagnosis.settings import AnswerSettings
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.writing import as_json
@@ -86,6 +87,14 @@ class Decision:
             "credible": [{"effect": effect, "probability": value} for effect, value in self.credible],
             "common": {"effects": dict(self.effects), "channels": dict(self.channels)},
         }
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, from a whole document."""
+        kept = {name: data[name] for name in ("decided", "unpredictive", "doubts") if name in data}
+        likely = [(one["effect"], one["probability"]) for one in data["credible"]]
+        return {**kept, "credible": likely, **data["common"]}
 
 
 def decision(

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from diagnosis.facts.reading import from_json_fields
 from identification.status import Remark
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.drive import Hold
@@ -28,6 +29,12 @@ class Fact:
     def to_json_dict(self) -> dict[str, Any]:
         """The kind, and the figures by name beside it."""
         return {"kind": self.kind, **as_json(self.figures)}
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Kind and figures."""
+        return {"kind": data["kind"], "figures": {name: data[name] for name in data if name != "kind"}}
 
 
 def as_stated(words: str) -> Fact:
@@ -49,6 +56,12 @@ class Noted:
     def to_json_dict(self) -> dict[str, Any]:
         """The fact's fields and ``runs``."""
         return {**self.fact.to_json_dict(), "runs": list(self.runs)}
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Runs and fact."""
+        return {"runs": data["runs"], "fact": {name: data[name] for name in data if name != "runs"}}
 
 
 BETWEEN_RUNS = ("frequency between runs", "damping between runs")

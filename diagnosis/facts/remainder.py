@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from diagnosis.facts.reading import from_json_fields
 from diagnosis.settings import RemainderSettings
 from tunnel_sim.files.writing import as_json
 
@@ -137,6 +138,13 @@ class Law:
         parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
         found: dict[str, Any] = as_json({**vars(self), "parameters": parameters})
         return found
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, each parameter as its value and standard deviation."""
+        parameters = {name: (one["value"], one["std"]) for name, one in data["parameters"].items()}
+        return {**data, "parameters": parameters}
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 from diagnosis.answer.held_out import HeldOut, predict_held_out, predict_stretches, turns_of
 from diagnosis.facts.closure import ON_RUNS, ON_STRETCHES
 from diagnosis.facts.found import Fact
-from diagnosis.facts.patch import NativeClosure, PatchedModel
+from diagnosis.facts.patch import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
@@ -381,9 +381,10 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     if not needs_plugin:
         return found
     native, _ = _written_model(study, model, nominal_out, chosen_out, native_only=True)
-    shares = {"percent": found.closure.native_closed, "native_percent": native.closure.native_closed}
+    shares = {"percent": found.closed, "native_percent": native.closed}
     said = Fact("by plugin", {name: 100.0 * share for name, share in shares.items()})
-    return replace(found, native=native, differences=(*found.differences, said))
+    form = NativeForm(native.written, native.closed, native.engine)
+    return replace(found, native=form, differences=(*found.differences, said))
 
 
 def _written_model(
@@ -447,5 +448,5 @@ def _written_model(
     spec, written = patched(model, identified.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
-    found = PatchedModel(model, spec, written, differences, zero, closure)
+    found = PatchedModel.of(EngineModel(model, spec, closure), written, differences, zero)
     return found, identified.patch.by_plugin

@@ -1,0 +1,40 @@
+"""Values read back from the JSON document of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pydantic import GetCoreSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+
+def from_json_fields(read: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> Any:
+    """Mark the function of a class that rearranges its JSON into its fields: the inverse of ``to_json_dict``.
+
+    Args:
+        read: gives the fields by name, in JSON's types, from what ``to_json_dict`` has written.
+    """
+
+    def rearranged(_: type, data: Any) -> Any:
+        return _frozen(read(data)) if isinstance(data, Mapping) else data
+
+    as_class_method: Any = classmethod(rearranged)
+    return model_validator(mode="before")(as_class_method)
+
+
+def _frozen(value: Any) -> Any:
+    """A value of JSON with tuples for its lists, as the strict check of a field expects beyond JSON itself."""
+    if isinstance(value, Mapping):
+        return {name: _frozen(one) for name, one in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
+
+
+class _Unwritten:
+    """Mark of a field that no document has; it is None in a value that was read."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.none_schema()
+
+
+UNWRITTEN = _Unwritten()
