@@ -9,15 +9,12 @@ from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
     from diagnosis._diagnose import diagnose, read_model, vocabulary
-    from diagnosis.result import (
-        Candidate,
-        Coefficients,
-        Diagnosis,
-        GapSummary,
-        RunGap,
-        Where,
-    )
+    from diagnosis.findings.candidates import Candidate
+    from diagnosis.findings.closure import GapSummary, RunGap
+    from diagnosis.findings.coefficients import Coefficients
+    from diagnosis.result import Diagnosis
     from diagnosis.settings import Settings
+    from diagnosis.where.described import Where
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,

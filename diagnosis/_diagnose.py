@@ -7,38 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from diagnosis.answer.assemble import assemble, localise
-from diagnosis.answer.candidates import cause_sizes
-from diagnosis.answer.closing import Closing, confirmed
-from diagnosis.answer.judgements import zeros_apart
-from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
-from diagnosis.answer.units import in_own_units
-from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable, without_short
-from diagnosis.facts.disturbance import Disturbance
-from diagnosis.facts.found import Fact, as_stated
-from diagnosis.facts.patch import PatchedModel
-from diagnosis.facts.repeatability import AnswerWithout, Repeatability
-from diagnosis.model.choose import nominal_model
+from diagnosis.compose import Confirmed, Question, composed
+from diagnosis.diagnosable import Chosen, choose, refuse_undiagnosable, without_short
+from diagnosis.findings.other_motions import refused_limit_cycles
+from diagnosis.findings.repeatability import AnswerWithout, Repeatability
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
-from diagnosis.noise.gap import noise_noted
-from diagnosis.noise.mains import hum_noted
-from diagnosis.remainder.ways import way_for
-from diagnosis.result import Coefficients, Diagnosis
+from diagnosis.result import Diagnosis
 from diagnosis.search.clock import Progress
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import together
 from diagnosis.search.investigate import investigate
 from diagnosis.search.odd_run import replaceable
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.study import Study
-from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
-from identification import identify
-from identification.estimate import Estimate
-from identification.status import left_out_as_asked
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.as_campaign import as_campaign
@@ -93,30 +77,19 @@ def diagnose(
         judged = not isinstance(model, NominalModel)
         chosen = choose(campaign, kinds, settings.selection, own, judged=judged)
         study = _studied(chosen, progress, settings, rivals)
-        answer = _answered(study, chosen, joint, say)
-        runs = answer.repeatability
-        if runs is not None and runs.outlier:
-            say(f"without run {runs.outlier}")
-            others = _without_outlier(study, runs, chosen, settings, rivals)
+        asked = Question(joint, short, tuple(leave_out), say)
+        say("explained share")
+        found, without = Confirmed.of(study), None
+        if found.repeats is not None and found.repeats.outlier:
+            say(f"without run {found.repeats.outlier}")
+            others = _without_outlier(study, found.repeats, chosen, settings, rivals)
             if others is not None and _explained_without(others, study):
-                answer = _answered(others, chosen, joint, say)
+                found = Confirmed.of(others)
             elif others is not None:
-                known = 1.0 if others.answer is None else others.answer.probability
-                without = AnswerWithout(others.causes, known)
-                answer = replace(answer, repeatability=replace(runs, without_outlier=without))
-        answer = replace(_withheld(answer), remarks=(*short, *answer.remarks))
-        return _without(answer, leave_out).in_words()
-
-
-def _answered(study: Study, chosen: Chosen, joint: JointModel | None, say: Progress) -> Diagnosis:
-    """The answer of a study."""
-    say("explained share")  # the place, and the answer without the remainder
-    study, closes = confirmed(study)
-    patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
-    answer = _assembled(study, chosen, closes, patched, unpatched)
-    if chosen.limit_cycles:
-        return limit_cycle_answer(answer, chosen.remarks, study.settings.answer)
-    return _with_remainder(answer, study, chosen, say)
+                without = AnswerWithout(
+                    others.causes, 1.0 if others.answer is None else others.answer.probability
+                )
+        return composed(found, chosen, asked, without).in_words()
 
 
 def _without_outlier(
@@ -144,19 +117,6 @@ def _explained_without(others: Study, study: Study) -> bool:
     return not others.gap.test.detected and all(run.id in able | kept for run in data.runs)
 
 
-def _withheld(answer: Diagnosis) -> Diagnosis:
-    """The answer without coefficients where the examination says that a unit makes them wrong by decades."""
-    if not any(remark.withholds for remark in answer.remarks):
-        return answer
-    return replace(answer, coefficients=Coefficients({}, {}), hidden=(), trade_off=None)
-
-
-def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:
-    """The answer with the runs that were left out on request."""
-    provenance = {**answer.provenance, "left_out": list(left_out)}
-    return replace(answer, remarks=(*left_out_as_asked(left_out), *answer.remarks), provenance=provenance)
-
-
 def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]) -> Study:
     """Noise, nominal fit, place, search.
 
@@ -169,96 +129,6 @@ def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, riva
         if not chosen.limit_cycles:
             raise
         raise refused_limit_cycles(chosen.remarks) from error
-
-
-def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[Fact, ...]]:
-    """The model with the causes written into it; None with a caveat where that fails."""
-    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
-
-    try:
-        return patched_model(study, model), ()
-    except TunnelError as error:
-        return None, (Fact("unpatched", {"reason": error.what}),)
-
-
-def _assembled(
-    study: Study, chosen: Chosen, closes: Closing, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
-) -> Diagnosis:
-    """The answer in the units of the campaign, without the remainder and without words."""
-    in_view = (Fact(study.caution),) if study.caution else ()
-    gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
-    lead = map(as_stated, study.model.lead_words(study.similarity))
-    beyond = () if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)
-    left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead, *beyond)
-    identified = _identified(study, chosen)
-    answer = assemble(
-        study, *localise(study, closes.gap.closed), left_out, patched, chosen.kinds, closes, identified
-    )
-    noted = (
-        *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),
-        *hum_noted(study.campaign, study.prepared.hum, study.similarity),
-    )
-    sized = replace(
-        answer,
-        remarks=chosen.remarks,
-        sizes=cause_sizes(study) if study.named else (),
-        found=replace(answer.found, noted=noted),
-        data=chosen.examined,
-    )
-    return in_own_units(sized, study.similarity)
-
-
-def _identified(study: Study, chosen: Chosen) -> Estimate | None:
-    """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
-    scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
-    own_model = study.model.of_robot or type(study.model) is not type(nominal_model(chosen.campaign, None))
-    if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
-        return None
-    try:
-        return identify(chosen.campaign, throw=False)
-    except TunnelError:  # the examination refuses what the diagnosis may still compare
-        return None
-
-
-def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:
-    """The answer with the explainable part of the remainder, and other possible explanations."""
-    decided, way = answer.decision.decided, way_for(study)
-    caution = (Fact(way.caution),) if way.caution else ()
-    say("remainder")
-    # in an undecided diagnosis the whole gap remains
-    significant = not decided or (answer.rest is not None and answer.rest.significant)
-    try:
-        with np.errstate(over="raise"):  # a fitted model that runs away
-            left = way.closable(study, significant=significant, decided=decided)
-        answer = replace(answer, closable=left)
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without it
-        caution = (Fact("remainder not solved"),)
-    # below one half a set of effects comes first, though each may be less probable than none
-    odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
-    unknown = max(odds, key=odds.__getitem__, default="") in UNKNOWN
-    if unknown or not decided:
-        caution = (*caution, *zeros_apart(study))
-    found = replace(
-        answer.found,
-        second_modes=second_modes(chosen.campaign, study.settings.words)
-        if unknown and _tried_mode(study)
-        else (),
-        rivals=_rivals(study) if unknown or not decided else (),
-        cautions=(*answer.found.cautions, *caution),
-    )
-    return replace(answer, found=found)
-
-
-def _tried_mode(study: Study) -> bool:
-    """Whether a set with a second mode was weighed: only then its share of the gap is known."""
-    modes = {kind.name for kind in known_effects() if kind.line == "ringing"}
-    return any(modes.intersection(answer.effects) for answer in study.answers)
-
-
-def _rivals(study: Study) -> tuple[Fact, ...]:
-    """The facts about rivals from outside the vocabulary that would explain the gap."""
-    said = (one.fact(study.nominal, study.similarity) for one in study.rivals)
-    return tuple(fact for fact in said if fact is not None)
 
 
 def read_model(

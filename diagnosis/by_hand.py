@@ -9,12 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.answer.candidates import candidates
-from diagnosis.answer.held_out import HeldOut, both_ends, excess_base, one_more, predict_held_out
-from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.units import own_next_run
+from diagnosis.answer.held_out import (
+    HeldOut,
+    both_ends,
+    excess_base,
+    one_more,
+    predict_held_out,
+    share_closed,
+)
 from diagnosis.diagnosable import comparable_runs, diagnosable
-from diagnosis.facts.closure import share_closed
+from diagnosis.findings.candidates import candidates
+from diagnosis.findings.next_run import separating_run
+from diagnosis.findings.units import own_next_run
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study

@@ -10,9 +10,9 @@ from statistics import median
 
 import numpy as np
 
-from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.inputs import untried_by_inputs
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input

@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
-from pydantic import TypeAdapter
 
-from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
-from diagnosis.facts.decision import Decision
-from diagnosis.facts.disturbance import Disturbance
-from diagnosis.facts.found import Found
-from diagnosis.facts.patch import PatchedModel
-from diagnosis.facts.reading import UNWRITTEN, from_json_fields
-from diagnosis.facts.remainder import Closable, Remainder
-from diagnosis.facts.repeatability import Repeatability
+from diagnosis.findings.whole import Findings
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
 from identification.blocks import as_notebook, as_text
-from identification.estimate import Quantity, as_pandas, correlated, wide_frame
-from identification.status import Remark
-from identification.trade_off import TradeOff
-from tunnel_sim.files.reading import as_described, check_shape
+from identification.estimate import as_pandas, correlated, wide_frame
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -39,252 +25,10 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from uncertainties import UFloat
 
-SCHEMA_VERSION = 1
-_LAST = (
-    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
-    "maps", "provenance",
-)  # fmt: skip
-
 
 @dataclass(frozen=True)
-class RunGap:
-    """A run's excess before and after the causes are added.
-
-    Args:
-        before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
-            the other runs where the run could be held out.
-        after: the same ratio minus one with the causes added.
-        held_out: whether the run could be held out; else both are those of the fits of all runs.
-    """
-
-    id: str
-    before: float
-    after: float
-    held_out: bool = True
-
-
-@dataclass(frozen=True)
-class GapSummary:
-    """The gap of the campaign.
-
-    Args:
-        excess_before: of the nominal model, in units of the noise variance, on held-out readings; where
-            nothing is found, in the fitted runs.
-        excess_after: with the causes added, on the same readings, in units of the noise variance.
-        closed: share of the gap that is closed, 0 to 1.
-        closed_on: the readings on which these are measured (`diagnosis.facts.closure`).
-        false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
-        p_value: of the strongest test, corrected for the number of tests.
-        tests: p-value by name of test.
-        closed_ahead: share of the gap in the later half of driven runs that the causes explain, fitted to the
-            earlier half; None where runs are held out whole, or are not driven.
-    """
-
-    detected: bool
-    excess_before: float
-    excess_after: float
-    closed: float
-    closed_on: str
-    runs: tuple[RunGap, ...]
-    false_alarm_rate: float
-    p_value: float
-    tests: Mapping[str, float] = field(default_factory=dict)
-    misfit: Misfit | None = None
-    closed_ahead: float | None = None
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
-        found = {name: as_json(getattr(self, name)) for name in self.__dataclass_fields__}
-        if self.misfit is not None:
-            before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
-            found["misfit"] |= {"before": before, "after": after}
-        return found
-
-
-@dataclass(frozen=True)
-class Where:
-    """The place of the gap.
-
-    Args:
-        channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
-        condition: ``always`` or ``wind_on``; None: nowhere.
-        time_s: time in the runs at which most of it occurs, s.
-        amplitude_rad: amplitudes at which most of it lies, rad.
-        frequency_hz: frequencies at which most of it lies, Hz.
-    """
-
-    channel: str | None
-    condition: str | None
-    runs: tuple[str, ...] = ()
-    time_s: tuple[float, float] | None = None
-    amplitude_rad: tuple[float, float] | None = None
-    frequency_hz: tuple[float, float] | None = None
-    words: str = ""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An answer that was considered.
-
-    Args:
-        effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
-        probability: that it is the answer, a fraction.
-        excess_after: with it added, in the fitted runs, in units of the noise variance. Each instant and phase
-            of a single run counts as 10 of χ².
-        closed: share of the gap that it closes there.
-        parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
-    """
-
-    effect: str
-    probability: float
-    excess_after: float
-    closed: float
-    parameters: Mapping[str, Quantity] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CauseSize:
-    """Effect of a cause on three cycles of a swing, by the fitted model with it and without it.
-
-    Args:
-        run: id of the run whose conditions are taken.
-        amplitude: of the release, rad.
-        damping_ratio: with the cause, dimensionless.
-        damping_ratio_without: with every cause but this one, dimensionless.
-        frequency_change: of the natural frequency by the cause, a fraction.
-        zero_change: of the middle of the swing by the cause, in the unit of the readings.
-        reading_change: root mean square of the change of the reading, in its unit.
-        stands: angle from rest within which the cause stops the body for good, rad; 0 where it does not.
-    """
-
-    effect: str
-    run: str
-    amplitude: float
-    damping_ratio: float
-    damping_ratio_without: float
-    frequency_change: float
-    zero_change: float
-    reading_change: float
-    stands: float = 0.0
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields, with the units of angles in their names."""
-        found = dict(vars(self))
-        return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
-
-    @from_json_fields
-    @staticmethod
-    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The fields, without units in their names."""
-        return {**data, "amplitude": data["amplitude_rad"], "stands": data["stands_rad"]}
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """An effect that is not named, at the largest size that the runs do not exclude.
-
-    Args:
-        effect: its name.
-        parameter: name of its severity.
-        size: that parameter, of the sign that allows more, with its unit.
-        moves: by coefficient, the size of its change by the effect, with its unit.
-        significance: standard deviations by which its likeliest size differs from zero, a ratio.
-    """
-
-    effect: str
-    parameter: str
-    size: Quantity
-    moves: Mapping[str, Quantity]
-    significance: float = 0.0
-
-
-@dataclass(frozen=True)
-class Coefficients:
-    """Coefficients of the nominal model before and after the causes are added.
-
-    Args:
-        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's unstated sizes (``cn_beta_area_length``,
-            ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or ``yaw_inertia``,
-            ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
-        after: by the same names, with the causes.
-        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate, which the runs determine
-            better than the coefficients of the law beside the lag; else empty.
-        covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
-            empty without a named lag.
-        note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
-        correlation: of those after, in their order, by the noise of the readings, the small causes and the rivals;
-            the other parts of their variances count as independent. Shape (n, n); empty where it is not known.
-    """
-
-    before: Mapping[str, Quantity]
-    after: Mapping[str, Quantity]
-    in_phase: Mapping[str, Quantity] = field(default_factory=dict)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    note: str = ""
-    correlation: tuple[tuple[float, ...], ...] = ()
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """The whole answer.
-
-    Its text fields are empty until `in_words` writes them: ``verdict``, ``cautions`` and ``note``, ``reason``,
-    ``words`` and ``notes`` of its parts.
-
-    Args:
-        causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary explains.
-        candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
-        ambiguous_with: effects that these runs cannot distinguish from the causes.
-        next_run: the run expected to distinguish them; None where not needed.
-        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is computed.
-        hidden: the effects that could hide, ordered by their move of a coefficient against its standard deviation.
-        trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
-        blind_spots: what these runs cannot show, in sentences.
-        seconds: wall time by step, s.
-        maps: data of the figures, in JSON's types.
-        disturbed: disturbed runs; the answer excludes them from the disturbance on.
-        remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
-        inclusion: by effect of the vocabulary, the probability that it is among the causes.
-        rest: the remaining gap.
-        repeatability: of the runs; None for a single run, or a body without a spring.
-        model: the given model, with the causes written into it; None where none was given.
-        closable: the explainable share of the rest, and its law; None where the rest is within chance.
-        sizes: effect of each fitted cause on a swing.
-        found: facts for the words, beside the numbers.
-        data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
-    """
-
-    campaign: str
-    causes: tuple[str, ...]
-    gap: GapSummary
-    where: Where
-    candidates: tuple[Candidate, ...]
-    ambiguous_with: tuple[str, ...]
-    next_run: Mapping[str, Any] | None
-    coefficients: Coefficients
-    confirmation: Confirmation
-    noise: NoiseSummary
-    decision: Decision
-    verdict: str = ""
-    hidden: tuple[Hidden, ...] = ()
-    trade_off: TradeOff | None = None
-    blind_spots: tuple[str, ...] = ()
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    cautions: tuple[str, ...] = ()
-    maps: Mapping[str, Any] | None = None
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-    disturbed: tuple[Disturbance, ...] = ()
-    remarks: tuple[Remark, ...] = ()
-    inclusion: Mapping[str, float] = field(default_factory=dict)
-    waterfall: Waterfall = field(default_factory=Waterfall)
-    rest: Remainder | None = None
-    repeatability: Repeatability | None = None
-    model: PatchedModel | None = None
-    closable: Closable | None = None
-    sizes: tuple[CauseSize, ...] = ()
-    found: Found = field(default_factory=Found)
-    data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
+class Diagnosis(Findings):
+    """The answer for people: as text, figures, a page and tables."""
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""
@@ -301,39 +45,6 @@ class Diagnosis:
             remarks=(*self.remarks, *(remark for remark in said.remarks if remark not in self.remarks)),
             model=self.model and replace(self.model, notes=said.patch),
         )
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The answer in JSON's types, by the published schema."""
-        return {
-            "schema_version": SCHEMA_VERSION,
-            "campaign": self.campaign,
-            "causes": list(self.causes),
-            **self.decision.to_json_dict(),
-            "verdict": self.verdict,
-            "gap": as_json(self.gap),
-            "where": as_json(self.where),
-            "candidates": as_json(self.candidates),
-            "inclusion": dict(self.inclusion),
-            **self.waterfall.to_json_dict(),
-            **{name: as_json(getattr(self, name)) for name in _LAST},
-        }
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
-        """The inverse of `to_json_dict`.
-
-        Args:
-            data: the document; further keys are ignored.
-
-        Raises:
-            TunnelError: when it is not a diagnosis: a key is missing, or a value has the wrong type.
-        """
-        where, remedy = "the diagnosis as JSON", "write it again with tunnel diagnose --json"
-        check_shape(data, where, remedy)
-        with as_described("is not a diagnosis", where, remedy):
-            return _adapter().validate_json(
-                json.dumps({**data, "waterfall": data, "decision": data}), strict=True
-            )
 
     def __str__(self) -> str:
         """The verdict, short tables of the answers, gaps and coefficients, the caveats and the next steps."""
@@ -453,8 +164,3 @@ class Diagnosis:
         kinds = {"id": pl.String, "before": pl.Float64, "after": pl.Float64, "held_out": pl.Boolean}
         rows = [{name: getattr(run, name) for name in kinds} for run in self.gap.runs]
         return pl.DataFrame(rows, schema=kinds)
-
-
-@cache
-def _adapter() -> TypeAdapter[Diagnosis]:
-    return TypeAdapter(Diagnosis)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from diagnosis.facts.closure import ON_BOTH, ON_RUNS, ON_STRETCHES, Step, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
@@ -22,7 +22,70 @@ from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.scatter import with_scatter, without_deviations
 from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect
+from tunnel_sim.files.from_json import from_json_fields
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.record import Array
+
+
+def share_closed(before: float, after: float) -> float:
+    """Explained share of a gap, 0 to 1.
+
+    Args:
+        before: excess of the nominal model, in noise variances of a sample.
+        after: excess with the causes, in noise variances of a sample.
+    """
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """The model with one more cause.
+
+    Args:
+        effect: name of the cause added; None for the nominal model.
+        excess: with it and all causes before it, on held-out readings, in noise variances of a sample.
+    """
+
+    effect: str | None
+    excess: float
+
+
+@dataclass(frozen=True)
+class Waterfall:
+    """The residual gap as the causes are added one after another.
+
+    Args:
+        steps: the nominal model first; then the cause that closes most, and so on.
+        without: held-out excess by cause, with only that cause removed and the others refitted. A cause beside a
+            random moment has none: the random moment would absorb it.
+    """
+
+    steps: tuple[Step, ...] = ()
+    without: Mapping[str, float] = field(default_factory=dict)
+    held_out: str = ""
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields of a document: ``waterfall``, ``waterfall_on`` and ``without``."""
+        return {
+            "waterfall": as_json(self.steps),
+            "waterfall_on": self.held_out,
+            "without": dict(self.without),
+        }
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, from a whole document."""
+        return {"steps": data["waterfall"], "without": data["without"], "held_out": data["waterfall_on"]}
+
+
+ON_RUNS = "on held-out runs"
+
+
+ON_STRETCHES = "on held-out stretches of time"
+
+
+ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
 
 
 @dataclass(frozen=True, eq=False)

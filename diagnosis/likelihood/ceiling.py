@@ -13,11 +13,37 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.facts.remainder import Ceiling
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
 from diagnosis.model.run_data import folds
+from diagnosis.settings import RemainderSettings
 from tunnel_sim.vocabulary.record import Array
+
+KINDS = (
+    "angle", "rate", "state", "wind", "time", "reading", "line", "between", "event", "wander", "noise",
+)  # fmt: skip
+"""Kinds of missing law; ``noise`` where none of the others explains much."""
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """The greatest share that one kind could explain.
+
+    Args:
+        kind: of `KINDS`.
+        closed: share of the residual, on held-out readings; negative where the prediction is worse.
+        std: its standard deviation from the scatter of the runs, a share.
+    """
+
+    kind: str
+    closed: float
+    std: float
+    held_out: str
+
+    def determined(self, chosen: RemainderSettings) -> bool:
+        """Whether the share is known well enough; laws may explain more than all of a small excess."""
+        return self.std < chosen.known_to and self.closed < chosen.closes_at_most
+
 
 _WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response
 _TINY = 1e-10

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
 
-from diagnosis.facts.found import Fact, Noted
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import (
     HARMONICS,
@@ -20,6 +19,7 @@ from diagnosis.likelihood.mains_lines import (
     mains_lines,
     shown_multiples,
 )
+from diagnosis.model.fact import Fact, Noted
 from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity
 from diagnosis.model.similarity import frequency as motion_frequency
 from diagnosis.noise.sensor_noise import SmoothCurve

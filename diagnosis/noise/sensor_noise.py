@@ -14,8 +14,8 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.special import gammaincinv, ndtri
 
-from diagnosis.facts.found import Fact
 from diagnosis.model.blocks import BLOCK_INTERVAL
+from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import frequency
 from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
 from diagnosis.settings import NoiseSettings

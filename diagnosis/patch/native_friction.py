@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnosis.facts.found import Fact
+from diagnosis.model.fact import Fact
 from tunnel_sim.effects.friction import AGAINST_RATE, friction_of
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.moment_law import WEIGHTS

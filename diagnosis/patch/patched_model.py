@@ -12,19 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from diagnosis.answer.held_out import HeldOut, predict_held_out, predict_stretches, turns_of
-from diagnosis.facts.closure import ON_RUNS, ON_STRETCHES
-from diagnosis.facts.found import Fact
-from diagnosis.facts.patch import EngineModel, NativeClosure, NativeForm, PatchedModel
+from diagnosis.answer.held_out import (
+    ON_RUNS,
+    ON_STRETCHES,
+    HeldOut,
+    predict_held_out,
+    predict_stretches,
+    turns_of,
+)
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.fact import Fact
 from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.native_friction import native_friction, nearest_polynomial
+from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.search.study import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (

@@ -12,9 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import chdtri
 
-from diagnosis.facts.remainder import Ceiling, Closable
+from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import Ranges, paths, ranges
+from diagnosis.remainder.closable import Closable
 from diagnosis.remainder.formula import Formula, Proposal, Term, predicted_drop, propose
 from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.study import Study

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
-from diagnosis.facts.remainder import Ceiling, Closable, Curve, Law, Line
-from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
+from diagnosis.likelihood.ceiling import GAPS, Ceiling, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.model.similarity import Similarity
+from diagnosis.remainder.closable import Closable, Curve, Law, Line
 from diagnosis.remainder.formula import choose, propose
 from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.scatter import with_scatter

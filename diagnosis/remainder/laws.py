@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
-from diagnosis.facts.remainder import Law
 from diagnosis.likelihood.ceiling import ratio
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
+from diagnosis.remainder.closable import Law
 from diagnosis.remainder.formula import Proposal
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from diagnosis.facts.remainder import Closable
+from diagnosis.remainder.closable import Closable
 from diagnosis.remainder.driven import closable_driven
 from diagnosis.remainder.explain import closable
 from diagnosis.search.study import Study

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.compression import compressed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.clock import Clock
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.odd_run import odd_alone
 from diagnosis.search.prepared import Prepared, prepared_and_tested

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
-from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, resonance
@@ -23,6 +22,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale
 from diagnosis.search.process_noise import acts_by, likeliest, random_moments, with_response

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.residuals import misfit
+from diagnosis.model.fact import Fact
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from diagnosis.facts.disturbance import Disturbance
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.model.fact import Fact
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import Clock
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit_at
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
+from diagnosis.model.fact import Fact
 from diagnosis.search.process_noise import ProcessNoise, with_response
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved

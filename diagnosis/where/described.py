@@ -2,16 +2,88 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from diagnosis.facts.found import BETWEEN_RUNS, Nowhere, PlaceFound
-from diagnosis.result import Where
+from diagnosis.model.fact import Fact
 from diagnosis.settings import Settings
 from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.place import Place
 from diagnosis.where.survey import Survey
 from tunnel_sim.effects import Effect
+
+
+@dataclass(frozen=True)
+class Where:
+    """The place of the gap.
+
+    Args:
+        channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
+        condition: ``always`` or ``wind_on``; None: nowhere.
+        time_s: time in the runs at which most of it occurs, s.
+        amplitude_rad: amplitudes at which most of it lies, rad.
+        frequency_hz: frequencies at which most of it lies, Hz.
+    """
+
+    channel: str | None
+    condition: str | None
+    runs: tuple[str, ...] = ()
+    time_s: tuple[float, float] | None = None
+    amplitude_rad: tuple[float, float] | None = None
+    frequency_hz: tuple[float, float] | None = None
+    words: str = ""
+
+
+BETWEEN_RUNS = ("frequency between runs", "damping between runs")
+"""Kinds of reasons by which most of a gap is between the runs."""
+
+
+@dataclass(frozen=True)
+class PlaceFound:
+    """The reasons for the place of a gap.
+
+    Args:
+        runs: number of the runs compared.
+        share: of the gap, in the runs that show it, a fraction.
+        false_alarm_rate: of a gap in any run, all runs together, a fraction.
+        wind: excess by state of the wind, ``on`` and ``off``, a ratio; empty without runs of both.
+        narrow: the intervals that locate the gap: ``time_s``, ``amplitude_rad``, ``frequency_hz``.
+        bands: share of the gap by band beyond chance, fractions.
+        channel: the reason for the channel.
+        condition: the reason for the condition.
+        compared: all causes of the answer, whose channels are compared with the place.
+        agrees: whether any of them acts there, or its residual points there.
+        alike: whether the residual of one points there, though none acts there.
+        elsewhere: whether the place contradicts the causes: none of them acts there. Such an answer is not decided.
+    """
+
+    runs: int
+    share: float
+    false_alarm_rate: float
+    wind: Mapping[str, float]
+    narrow: tuple[str, ...]
+    bands: Mapping[str, float]
+    channel: Fact
+    condition: Fact
+    compared: tuple[str, ...] = ()
+    agrees: bool = False
+    alike: bool = False
+    elsewhere: bool = False
+
+
+@dataclass(frozen=True)
+class Nowhere:
+    """Residuals without a gap.
+
+    Args:
+        runs: number of the runs compared.
+        p_value: of the run that differs most, corrected for their number, a probability.
+        within_step: whether the residual is not white, but within the steps of the readings.
+    """
+
+    runs: int
+    p_value: float
+    within_step: bool
 
 
 def nowhere(found: Survey, *, within_step: bool) -> Nowhere:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.facts.friction import FrictionCurve
 from diagnosis.where.along_motion import Backbone, PhasePlane
 from diagnosis.where.excess import BandExcess, Profile, ResidualLine
 from tunnel_sim.vocabulary.record import Array
@@ -121,7 +120,6 @@ class Maps:
         traces: every run against time, the largest excess first.
         grid: excess by amplitude and speed, or amplitude and time.
         unit: of the readings and residuals.
-        friction: against the rate; None where the answer has none.
     """
 
     runs: tuple[RunMap, ...]
@@ -141,7 +139,6 @@ class Maps:
     traces: tuple[Trace, ...]
     grid: Grid
     unit: str = "rad"
-    friction: FrictionCurve | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name with their units, in JSON's types; null where a bin is empty."""
@@ -177,7 +174,6 @@ class Maps:
                 self.grid, amplitude="amplitude_edges_rad", speeds="wind_speeds", time="time_edges_s"
             ),
             "unit": self.unit,
-            "friction": None if self.friction is None else self.friction.to_json_dict(),
             "traces": [_fields(trace, **_OF_TRACE) for trace in self.traces],
         }
 

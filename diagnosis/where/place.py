@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
+from diagnosis.model.fact import Fact
 from diagnosis.settings import WhereSettings
 from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval

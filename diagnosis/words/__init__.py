@@ -7,7 +7,7 @@ The modules:
 - `where`: the place of the gap, and the reason.
 - `remainder`: the remaining gap, and the part of it that could be explained.
 - `cautions`: caveats, remarks on the noise, notes on coefficients and on a patched model, each under the kind of
-  its fact (`diagnosis.facts.found.Fact`).
+  its fact (`diagnosis.model.fact.Fact`).
 - `causes` and `scatter`: the causes and their sizes; how the runs repeat.
 - `tables`, `lines`, `cards` and `captions`: the tables, the lines beside them, the head of the report, its figures.
 - `sections`: all of these as the blocks that every face shows.

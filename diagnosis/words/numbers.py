@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from diagnosis.facts.closure import Misfit
+from diagnosis.findings.closure import Misfit
 from identification.printing import Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.quantities import Share
@@ -268,7 +268,7 @@ KINDS: Mapping[str, str] = {
     "wander": "a wandering or jumping zero of each run",
     "noise": "nothing smooth: the rest is noise",
 }
-"""Kinds of missing law (`diagnosis.facts.remainder.KINDS`)."""
+"""Kinds of missing law (`diagnosis.likelihood.ceiling.KINDS`)."""
 
 
 def plain(*names: str) -> str:

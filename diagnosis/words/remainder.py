@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from diagnosis.facts.remainder import Ceiling
+from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.settings import settings_of
 from diagnosis.words.numbers import (
     KINDS,

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from math import degrees
 from typing import Any
 
-from diagnosis.facts.found import BETWEEN_RUNS
 from diagnosis.settings import WordsSettings, settings_of
+from diagnosis.where.described import BETWEEN_RUNS
 from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
 from diagnosis.words.scatter import scattering
 from identification.printing import Document, p_text

@@ -208,9 +208,10 @@ def checkpoint() -> tuple[Any, bytes]:
 @cache
 def answer_document() -> dict[str, Any]:
     """A diagnosis of one cause, as JSON's types."""
-    from diagnosis import result
     from diagnosis.facts import closure
-    from diagnosis.facts.closure import ON_RUNS
+
+    from diagnosis import result
+    from diagnosis.answer.held_out import ON_RUNS
 
     values = {
         "cn_beta": result.Quantity(0.45, 0.01, "1/rad"),

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.answer.next_run import planned_run, separation
+from diagnosis.findings.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.study import Study
 from identification.campaign.belief import expected_belief, information_gain
@@ -88,7 +88,7 @@ def separating(known: Knowledge) -> Action:
     """The run that best distinguishes the two most probable answers per rig time.
 
     It maximises, over the whole menu, half the squared separation of the two fitted models (the expected
-    log-likelihood ratio, nats; see `diagnosis.answer.next_run.separation`) divided by the run's cost. If only one
+    log-likelihood ratio, nats; see `diagnosis.findings.next_run.separation`) divided by the run's cost. If only one
     effect is named, its rival is the nominal model. Without a detected gap, or without a run with wind, the fitted
     models cannot predict other runs, and it is the scripted run.
     """

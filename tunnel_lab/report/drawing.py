@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.facts.closure import Misfit
+from diagnosis.findings.closure import Misfit
 from diagnosis.words.numbers import misfit_of, unit_shown
 from identification.printing import Document
 from tunnel_lab.plotting.style import styled

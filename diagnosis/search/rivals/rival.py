@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis
 
@@ -32,7 +32,7 @@ class Rival:
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
         """The fact stated where it would explain a gap of unknown cause; None: nothing.
 
-        Your own sentence is a `diagnosis.facts.found.as_stated`.
+        Your own sentence is a `diagnosis.model.fact.as_stated`.
 
         Args:
             best: the likeliest of its hypotheses.

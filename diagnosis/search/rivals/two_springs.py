@@ -13,13 +13,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.facts.found import Fact, SpringError
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+
+
+@dataclass(frozen=True)
+class SpringError:
+    """A spring that may not be as stiff as stated.
+
+    Args:
+        stiffness: as stated, N m/rad.
+        error: relative error of the stiffness, a fraction.
+        std: standard deviation of the error, a fraction.
+        probability: among the springs that may be off, a fraction; None for one of several that are all off.
+    """
+
+    stiffness: float
+    error: float
+    std: float
+    probability: float | None = None
+
 
 (ONE_SPRING,) = (kind for kind in ALL_EFFECTS if kind.chosen_spring() is not None)
 

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import comparable_runs, without_short
-from diagnosis.facts.found import Fact
+from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import frequency
 from diagnosis.settings import Settings
 from identification.status import Outcome

@@ -9,7 +9,8 @@ import polars as pl
 import pytest
 
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, RunGap, Where
-from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary
+from diagnosis.answer.held_out import ON_RUNS
+from diagnosis.findings.closure import Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.blocks import (
     Detail,

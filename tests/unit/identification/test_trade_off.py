@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.held_out import one_more
-from diagnosis.answer.trade_off import least_separated, role_in_effect
+from diagnosis.findings.trade_off import least_separated, role_in_effect
 from diagnosis.likelihood.residuals import linear_coefficients
 from identification import identify
 from identification.estimate import Estimate

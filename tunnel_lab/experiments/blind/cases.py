@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from diagnosis.facts.decision import Decision, Predictions, decision
+from diagnosis.findings.decision import Decision, Predictions, decision
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
 from diagnosis.words.scatter import SCATTERS

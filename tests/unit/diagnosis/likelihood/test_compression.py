@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.next_run import planned_run, separation
+from diagnosis.findings.next_run import planned_run, separation
 from diagnosis.likelihood.compression import compressed, in_shorter_blocks, slow
 from diagnosis.likelihood.least_squares import Fit, fit, fit_at
 from diagnosis.likelihood.problem import Problem

@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
-from diagnosis.facts.patch import NativeClosure
 from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import reach, with_law
 from diagnosis.model.similar import similar_campaign
+from diagnosis.patch.written_model import NativeClosure
 from diagnosis.search.investigate import investigate
 from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.engine.joint_model import JointModel

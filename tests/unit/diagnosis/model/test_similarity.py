@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.answer.units import own_next_run
+from diagnosis.findings.units import own_next_run
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,

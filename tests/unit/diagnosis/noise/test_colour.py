@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.fact import Fact
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, zero_wanders

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from diagnosis.facts.found import Fact
+from diagnosis.model.fact import Fact
 from diagnosis.noise.sensor_noise import (
     LEAST_SAMPLES,
     SmoothCurve,

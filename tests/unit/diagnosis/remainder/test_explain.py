@@ -12,8 +12,16 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import diagnose
-from diagnosis.facts.remainder import Ceiling
-from diagnosis.likelihood.ceiling import Evidence, Unexplained, best_ridge, held_out, normal, ratio, total
+from diagnosis.likelihood.ceiling import (
+    Ceiling,
+    Evidence,
+    Unexplained,
+    best_ridge,
+    held_out,
+    normal,
+    ratio,
+    total,
+)
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.paths import paths, ranges
 from diagnosis.likelihood.residuals import linear_coefficients

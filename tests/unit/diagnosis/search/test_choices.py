@@ -8,8 +8,8 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.coefficients import coefficients, possible_answers
-from diagnosis.answer.judgements import spring_choices
+from diagnosis.findings.coefficients import coefficients, possible_answers
+from diagnosis.findings.judgements import spring_choices
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_noise import WhiteNoise

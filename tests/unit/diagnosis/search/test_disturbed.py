@@ -14,8 +14,8 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.by_hand import ByHand
 from diagnosis.diagnosable import choose
-from diagnosis.facts.disturbance import Disturbance
 from diagnosis.search import disturbed as disturbed_runs
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import beyond_the_others, disturbances, undisturbed
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from diagnosis.facts.found import Fact
+from diagnosis.model.fact import Fact
 from diagnosis.search.investigate import investigate
 from diagnosis.search.resolved import unresolved
 from tunnel_sim.effects import effect_class

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.answer.next_run import separation
+from diagnosis.findings.next_run import separation
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.investigate import investigate, nominal_study

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.answer.assemble import localise
-from diagnosis.facts.found import Fact, Nowhere
+from diagnosis.findings.assemble import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
 from diagnosis.model.blocks import without_start
+from diagnosis.model.fact import Fact
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from diagnosis.where.along_motion import amplitude_about_rest, apparent_moment, backbones, drift
+from diagnosis.where.described import Nowhere
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.where.place import (
     _between_runs,

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.facts.decision import Predictions, decision
+from diagnosis.findings.decision import Predictions, decision
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.where.place import locate

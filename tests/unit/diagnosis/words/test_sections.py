@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.facts.decision import decision
+from diagnosis.findings.decision import decision
 from diagnosis.settings import Settings
 from diagnosis.words import sections, tables
 from diagnosis.words.cards import cause_cards, effect_cards, key_figures

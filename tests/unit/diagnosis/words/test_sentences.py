@@ -6,10 +6,14 @@ from typing import Any
 
 import pytest
 
-from diagnosis.facts.closure import Confirmation, NoiseSummary
-from diagnosis.facts.found import Fact, Found, Noted, Nowhere
-from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, Where
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.found import Found
+from diagnosis.model.fact import Fact, Noted
+from diagnosis.result import Diagnosis
 from diagnosis.settings import settings_of
+from diagnosis.where.described import Nowhere, Where
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
 from diagnosis.words.numbers import KINDS
 from diagnosis.words.remainder import closable_words, rest_words

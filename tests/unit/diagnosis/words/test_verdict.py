@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from diagnosis.answer.judgements import immaterial, nearly
-from diagnosis.answer.reported import held_out_totals
-from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Step, Waterfall
-from diagnosis.facts.decision import Predictions, decision
-from diagnosis.facts.found import Nearly
+from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
+from diagnosis.findings.closure import FITTED, GapSummary, Misfit, RunGap
+from diagnosis.findings.decision import Predictions, decision
+from diagnosis.findings.found import Nearly
+from diagnosis.findings.judgements import immaterial, nearly
+from diagnosis.findings.reported import held_out_totals
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.result import GapSummary, RunGap
 from diagnosis.settings import Settings
 from diagnosis.words.cards import key_figures
 from diagnosis.words.causes import said_size

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.facts.found import Fact
+from diagnosis.model.fact import Fact
 from diagnosis.words.cautions import UNPATCHED
 from tests.reference import robot_joints
 from tests.reference.free_decays import Setting, campaign

@@ -7,19 +7,17 @@ from html.parser import HTMLParser
 
 import pytest
 
-from diagnosis.answer.assemble import localise
-from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary, Step, Waterfall
-from diagnosis.facts.friction import FrictionCurve, FrictionPoint
-from diagnosis.facts.remainder import Ceiling, Closable, Curve
+from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
+from diagnosis.findings.assemble import localise
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
+from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.result import (
-    Candidate,
-    Coefficients,
-    Diagnosis,
-    GapSummary,
-    RunGap,
-)
+from diagnosis.remainder.closable import Closable, Curve
+from diagnosis.result import Diagnosis
 from identification.estimate import Quantity
 from tests.support.diagnosis_document import scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied

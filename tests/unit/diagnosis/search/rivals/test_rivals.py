@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from diagnosis import diagnose
-from diagnosis.facts.found import as_stated
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import misfit
+from diagnosis.model.fact import as_stated
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals.rival import Rival

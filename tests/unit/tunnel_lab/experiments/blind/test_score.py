@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from diagnosis.facts import closure
 
 from diagnosis import result
-from diagnosis.facts import closure
-from diagnosis.facts.closure import ON_RUNS
+from diagnosis.answer.held_out import ON_RUNS
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind import page as blind
 from tunnel_lab.experiments.blind.cases import case

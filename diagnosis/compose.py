@@ -1,0 +1,453 @@
+"""From a study to the answer: every finding in the units of the measured campaign, composed once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnosis.answer.held_out import Waterfall, excess_base
+from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
+from diagnosis.diagnosable import Chosen, gain_words
+from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion
+from diagnosis.findings.closing import Closing, confirmed
+from diagnosis.findings.closure import GapSummary, NoiseSummary
+from diagnosis.findings.coefficients import (
+    Answers,
+    Coefficients,
+    as_identified,
+    before_the_causes,
+    coefficients,
+    correlation,
+    in_phase,
+    possible_answers,
+)
+from diagnosis.findings.decision import Decision, Predictions, decision
+from diagnosis.findings.found import Found
+from diagnosis.findings.friction_curve import friction_curve
+from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.input_hold import other_hold
+from diagnosis.findings.judgements import (
+    Remainder,
+    cautions,
+    immaterial,
+    nearly,
+    outside_the_fits,
+    remainder,
+    spring_choices,
+    zeros_apart,
+)
+from diagnosis.findings.next_run import separating_run
+from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
+from diagnosis.findings.parameter_errors import parameter_errors
+from diagnosis.findings.passive import within_bounds
+from diagnosis.findings.repeatability import AnswerWithout, Repeatability, repeatability
+from diagnosis.findings.trade_off import least_separated
+from diagnosis.findings.units import (
+    own_estimates,
+    own_hidden,
+    own_next_run,
+    own_repeatability,
+    sized_coefficients,
+)
+from diagnosis.likelihood.compression import in_shorter_blocks
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.fact import Fact, as_stated
+from diagnosis.noise.gap import noise_noted
+from diagnosis.noise.mains import hum_noted
+from diagnosis.patch.written_model import PatchedModel
+from diagnosis.remainder.closable import Closable
+from diagnosis.remainder.ways import way_for
+from diagnosis.result import Diagnosis
+from diagnosis.search.clock import Progress
+from diagnosis.search.study import Answer, Study
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import AnswerSettings
+from diagnosis.where.described import Nowhere, PlaceFound, Where, described, nowhere
+from diagnosis.where.place import blow_interval
+from diagnosis.where.survey import with_answer
+from identification import identify
+from identification.estimate import Estimate, Quantity
+from identification.status import Remark, left_out_as_asked
+from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from tunnel_sim.engine.joint_model import JointModel
+
+_PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class Question:
+    """The question beside the runs.
+
+    Args:
+        joint: the user's model of a joint, into which causes are written; None: none.
+        remarks: on runs that were left out before the examination.
+        left_out: ids of the runs left out on request.
+        say: told of each step.
+    """
+
+    joint: JointModel | None
+    remarks: tuple[Remark, ...]
+    left_out: Sequence[str]
+    say: Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Confirmed:
+    """A study whose causes the held-out readings confirm.
+
+    Args:
+        repeats: repeatability of the runs, in the units of the similar campaign; None for a single run, or a body
+            without a spring.
+    """
+
+    study: Study
+    closes: Closing
+    repeats: Repeatability | None
+
+    @classmethod
+    def of(cls, study: Study) -> Confirmed:
+        """The study without the causes that do not reduce the held-out residual."""
+        study, closes = confirmed(study)
+        # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
+        fitted = study.chosen if study.causes != UNKNOWN else study.between_runs or study.chosen
+        return cls(study, closes, repeatability(fitted))
+
+
+@dataclass(frozen=True)
+class _Named:
+    """The answer itself: causes, place, probabilities, coefficients.
+
+    Args:
+        immaterial: by coefficient, its relative change by the causes, where they change none materially.
+    """
+
+    causes: tuple[str, ...]
+    where: Where
+    place: PlaceFound | Nowhere | None
+    candidates: tuple[Candidate, ...]
+    decision: Decision
+    coefficients: Coefficients
+    hidden: tuple[Hidden, ...]
+    rest: Remainder | None
+    immaterial: Mapping[str, float]
+    limit_cycles: tuple[Remark, ...] = ()
+
+
+def composed(
+    answered: Confirmed, chosen: Chosen, asked: Question, without_outlier: AnswerWithout | None = None
+) -> Diagnosis:
+    """The answer of a study.
+
+    Args:
+        chosen: the examined campaign, its effects and its model.
+        without_outlier: the answer from the other runs, where one deviates far beyond them; None: not known.
+    """
+    study, closes, repeats = answered.study, answered.closes, answered.repeats
+    patched, unpatched = (None, ()) if asked.joint is None else _patched(study, asked.joint)
+    similarity, fitted, cycling = study.similarity, study.chosen, chosen.limit_cycles
+    begun = time.perf_counter()
+    where, maps, place = localise(study, closes.gap.closed)
+    named = _named(study, chosen, closes, patched, (where, place))
+    seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
+    if cycling:
+        named = _cycling(closes.gap, chosen.remarks, study.settings.answer)
+    closable, of_remainder = (None, ()) if cycling else _closable(study, named, asked.say)
+    remarks = (*left_out_as_asked(asked.left_out), *asked.remarks, *chosen.remarks)
+    withheld = any(remark.withholds for remark in remarks)
+    rivals = _rivals(study)
+    beside = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
+    next_run = separating_run(fitted, beside[0]) if beside and fitted is not study.nominal else None
+    noise, unsure = study.prepared.noise, not named.decision.decided or _unknown(named.candidates)
+    caveats = (
+        *chosen.left_out,
+        *_of_model(study, unpatched),
+        *cautions(
+            study.campaign,
+            noise,
+            closes.gap.runs,
+            closes.confirmation,
+            named=study.named,
+            settings=study.settings,
+        ),
+        *outside_the_fits(study),
+        *of_remainder,
+        *(zeros_apart(study) if unsure and not cycling else ()),
+    )
+    runs = study.nominal.problem.data.runs
+    return Diagnosis(
+        campaign=study.campaign.name,
+        causes=named.causes,
+        gap=closes.gap,
+        where=named.where,
+        candidates=named.candidates,
+        decision=named.decision,
+        ambiguous_with=tuple(
+            sorted({name for answer in rivals for name in answer.effects} - set(study.causes))
+        ),
+        next_run=None if next_run is None else own_next_run(next_run, similarity),
+        coefficients=Coefficients({}, {}) if withheld else named.coefficients,
+        confirmation=closes.confirmation.scaled(similarity.own(1.0, similarity.reading)),
+        noise=_noise(study),
+        hidden=() if withheld else named.hidden,
+        trade_off=None if withheld else least_separated(fitted, study.campaign),
+        blind_spots=() if cycling else study.model.blind_spots(study.nominal.problem.data),
+        seconds=seconds,
+        maps=maps,
+        provenance={
+            "versions": {name: version(name) for name in _PACKAGES},
+            "settings": study.settings.differences(),
+            "left_out": list(asked.left_out),
+        },
+        disturbed=study.disturbed,
+        remarks=remarks,
+        inclusion={} if cycling else inclusion(named.candidates, study.beside, study.settings.gap),
+        waterfall=closes.steps,
+        rest=named.rest,
+        repeatability=repeats
+        and replace(own_repeatability(repeats, similarity), without_outlier=without_outlier),
+        model=patched,
+        closable=closable,
+        sizes=cause_sizes(study) if study.named else (),
+        found=Found(
+            place=named.place if isinstance(named.place, PlaceFound) else None,
+            nowhere=named.place if isinstance(named.place, Nowhere) else None,
+            both_winds=len({run.wind_on for run in runs}) > 1,
+            robot=study.model.of_robot and not any(run.wind_on for run in runs),
+            driven=all(run.drive is not None for run in runs),
+            nearly=nearly(study),
+            immaterial=named.immaterial,
+            choices=spring_choices(study),
+            hold=other_hold(study),
+            rivals=_from_outside(study) if unsure and not cycling else (),
+            second_modes=_second_modes(study, chosen) if _unknown(named.candidates) and not cycling else (),
+            limit_cycles=named.limit_cycles,
+            noise=noise.reason,
+            cautions=caveats,
+            noted=(
+                *noise_noted(noise, study.prepared.trend, study.gap.test, named=study.named),
+                *hum_noted(study.campaign, study.prepared.hum, similarity),
+            ),
+        ),
+        data=chosen.examined,
+    )
+
+
+def _unknown(weighed: Sequence[Candidate]) -> bool:
+    """Whether no effect is the likeliest answer: below one half a set of effects may come first nevertheless."""
+    odds = {candidate.effect: candidate.probability for candidate in weighed}
+    return max(odds, key=odds.__getitem__, default="") in UNKNOWN
+
+
+def localise(study: Study, explained: float = 0.0) -> tuple[Where, dict[str, Any], PlaceFound | Nowhere]:
+    """Locate the departure of the nominal model from the runs: the place, the data of its figures, the reason.
+
+    The place follows from the residuals alone. The causes only have to agree with it.
+
+    Args:
+        explained: share of the gap that they explain on held-out readings.
+    """
+    place, chosen = study.gap.place or study.prepared.place(), study.settings.where
+    survey = place.survey
+    answer = None if study.chosen is study.nominal else study.chosen
+    maps, friction = survey.maps, None
+    if answer is not None:
+        both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
+        friction = friction_curve(answer, study.similarity) if study.causes else None
+        maps = with_answer(survey, study.campaign, *both)
+    drawn = maps.to_json_dict() | {"friction": as_json(friction)}
+    if not study.causes:
+        return Where(None, None), drawn, nowhere(survey, within_step=study.gap.test.within_step)
+    compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
+    where = Where(
+        channel=place.channel.value,
+        condition=place.condition.value,
+        runs=place.runs,
+        time_s=blow_interval(survey, chosen.interval_share, chosen)
+        or survey.maps.time.interval(chosen.interval_share),
+        amplitude_rad=survey.maps.amplitude.interval(chosen.interval_share),
+        frequency_hz=survey.frequency_interval,
+    )
+    kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)
+    said = described(where, place, kinds, study.settings, scattering=scattering, explained=explained)
+    return where, drawn, said
+
+
+def _named(
+    study: Study,
+    chosen: Chosen,
+    closes: Closing,
+    patched: PatchedModel | None,
+    located: tuple[Where, PlaceFound | Nowhere],
+) -> _Named:
+    """The causes with their probabilities and coefficients, and whether the answer is decided."""
+    similarity, rig, settings = study.similarity, study.campaign.rig, study.settings
+    where, place = located
+    weighed = candidates(study, excess_base(study), parameter_errors(study, closes))
+    answers = possible_answers(study, chosen.kinds)
+    after = within_bounds(coefficients(answers, study.campaign), study)
+    identified = _identified(study, chosen)
+    if identified is not None:
+        after = as_identified(after, identified, study.campaign, similarity)
+    phase, covariance = in_phase(study.stated)
+    before = before_the_causes(study.nominal, {**after, **phase}) if study.causes else after
+    by_field = {"before": before, "after": after, "in_phase": phase}
+    sized = {name: sized_coefficients(given, rig) for name, given in by_field.items()}
+    rest = _remains(study, sized["after"], answers, closes.steps)
+    material = not study.named or rest.material
+    return _Named(
+        causes=study.causes,
+        where=where,
+        place=place,
+        candidates=weighed,
+        decision=decision(
+            [(one.effect, one.probability) for one in weighed],
+            settings.answer,
+            _predictions(closes.gap, patched, place, settings.answer),
+        ),
+        coefficients=Coefficients(
+            own_estimates(sized["before"], similarity),
+            own_estimates(sized["after"], similarity),
+            own_estimates(sized["in_phase"], similarity),
+            covariance,
+            correlation=correlation(answers, after),
+        ),
+        hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
+        rest=rest,
+        immaterial={} if material else immaterial(before, after, settings.words),
+    )
+
+
+def _cycling(gap: GapSummary, remarks: Sequence[Remark], chosen: AnswerSettings) -> _Named:
+    """The answer ``unknown`` without coefficients, where every run is in a limit cycle."""
+    return _Named(
+        causes=UNKNOWN,
+        where=Where(None, None, tuple(run.id for run in gap.runs)),
+        place=None,
+        candidates=(Candidate("unknown", 1.0, gap.excess_before, 0.0),),
+        decision=decision([("unknown", 1.0)], chosen),
+        coefficients=Coefficients({}, {}),
+        hidden=(),
+        rest=None,
+        immaterial={},
+        limit_cycles=recognised_limit_cycles(remarks),
+    )
+
+
+def _predictions(
+    gap: GapSummary, patched: PatchedModel | None, place: PlaceFound | Nowhere, chosen: AnswerSettings
+) -> Predictions:
+    """The success of the answer's predictions."""
+    return Predictions(
+        held_out=gap.closed,
+        ahead=gap.closed_ahead,
+        patched=None if patched is None else patched.judged(chosen),
+        left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
+        elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
+    )
+
+
+def _identified(study: Study, chosen: Chosen) -> Estimate | None:
+    """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
+    scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
+    own_model = study.model.of_robot or type(study.model) is not type(nominal_model(chosen.campaign, None))
+    if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
+        return None
+    try:
+        return identify(chosen.campaign, throw=False)
+    except TunnelError:  # the examination refuses what the diagnosis may still compare
+        return None
+
+
+def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[Fact, ...]]:
+    """The model with the causes written into it; None with a caveat where that fails."""
+    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
+
+    try:
+        return patched_model(study, model), ()
+    except TunnelError as error:
+        return None, (Fact("unpatched", {"reason": error.what}),)
+
+
+def _of_model(study: Study, unpatched: tuple[Fact, ...]) -> tuple[Fact, ...]:
+    """Caveats on the view of the search, the model and the patch, and a gap beyond every effect."""
+    return (
+        *((Fact(study.caution),) if study.caution else ()),
+        *map(as_stated, gain_words(study.campaign, study.chosen)),
+        *unpatched,
+        *map(as_stated, study.model.lead_words(study.similarity)),
+        *(() if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)),
+    )
+
+
+def _remains(study: Study, after: Mapping[str, Quantity], answers: Answers, steps: Waterfall) -> Remainder:
+    """The residual gap of the answer, and its possible influence on the coefficients.
+
+    Args:
+        after: the coefficients with the causes, times the sizes that the rig does not state.
+    """
+    similarity, chosen = study.similarity, study.chosen
+    stated = own_estimates(after, similarity)
+    moved = {
+        name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        for (name, given), coefficient in zip(after.items(), coefficients_of(chosen), strict=False)
+    }
+    return remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)
+
+
+def _rivals(study: Study) -> list[Answer]:
+    """The probable answers beside the first that do not contain it; none where nothing is named."""
+    return [
+        answer
+        for answer in study.answers[1:]
+        if study.named
+        and answer.probability >= study.settings.answer.rivals_from
+        and answer.effects != UNKNOWN
+        and not set(study.fitted) <= set(answer.effects)
+    ]
+
+
+def _noise(study: Study) -> NoiseSummary:
+    """The reference noise, in the unit of the measured readings."""
+    noise, similarity = study.prepared.noise, study.similarity
+    stated = None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance))
+    return NoiseSummary(
+        similarity.own(noise.std, similarity.reading),
+        None if stated is None else similarity.own(stated, similarity.reading),
+        noise.source,
+    )
+
+
+def _closable(study: Study, named: _Named, say: Progress) -> tuple[Closable | None, tuple[Fact, ...]]:
+    """The explainable part of the remainder, and a caveat where it is not sought or not found."""
+    decided, way = named.decision.decided, way_for(study)
+    say("remainder")
+    # in an undecided diagnosis the whole gap remains
+    significant = not decided or (named.rest is not None and named.rest.significant)
+    try:
+        with np.errstate(over="raise"):  # a fitted model that runs away
+            left = way.closable(study, significant=significant, decided=decided)
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without it
+        return None, (Fact("remainder not solved"),)
+    return left, (Fact(way.caution),) if way.caution else ()
+
+
+def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
+    """Second modes of single runs, where a set with one was weighed: only then its share of the gap is known."""
+    modes = {kind.name for kind in known_effects() if kind.line == "ringing"}
+    tried = any(modes.intersection(answer.effects) for answer in study.answers)
+    return second_modes(chosen.campaign, study.settings.words) if tried else ()
+
+
+def _from_outside(study: Study) -> tuple[Fact, ...]:
+    """The facts about rivals from outside the vocabulary that would explain the gap."""
+    said = (one.fact(study.nominal, study.similarity) for one in study.rivals)
+    return tuple(fact for fact in said if fact is not None)

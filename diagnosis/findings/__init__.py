@@ -1,0 +1,1 @@
+"""Findings: what a diagnosis states, each with its numbers, words, tables and figure."""

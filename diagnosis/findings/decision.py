@@ -1,0 +1,144 @@
+"""Whether an answer is decided, by probability and by prediction, and the common part of the likely answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from diagnosis.settings import AnswerSettings
+from tunnel_sim.effects import known_effects
+from tunnel_sim.files.from_json import from_json_fields
+from tunnel_sim.files.writing import as_json
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A prediction by which a probable answer fails.
+
+    Args:
+        kind: ``held out``, ``ahead``, ``patched``, ``left`` or ``elsewhere``, as in `Predictions`.
+        share: that was found, a fraction; None where the place is in doubt.
+    """
+
+    kind: str
+    share: float | None
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """The success of the answer's predictions, beside its probability; None: not known, or nothing to predict.
+
+    Args:
+        held_out: share of the gap that it explains on held-out readings.
+        ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
+        patched: share of the gap that the user's model explains, with the answer written into it.
+        left: root mean square residual over that of the readings about their mean, a ratio.
+        elsewhere: whether the residuals show a place at which none of its causes acts.
+    """
+
+    held_out: float | None = None
+    ahead: float | None = None
+    patched: float | None = None
+    left: float | None = None
+    elsewhere: bool = False
+
+    def doubts(self, chosen: AnswerSettings) -> tuple[Doubt, ...]:
+        """The reasons not to decide on the answer, the most basic first."""
+        shares = {"held out": self.held_out, "ahead": self.ahead, "patched": self.patched}
+        found = [
+            Doubt(kind, share)
+            for kind, share in shares.items()
+            if share is not None and share < chosen.predicted_from
+        ]
+        if self.left is not None and self.left > chosen.left_of_swing:
+            found.append(Doubt("left", self.left))
+        if self.elsewhere:
+            found.append(Doubt("elsewhere", None))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The decision that the probabilities of the answers allow.
+
+    Args:
+        decided: whether the answer is probable enough, and its predictions leave no doubt.
+        credible: the fewest answers that together are credible, with their probabilities, most probable first.
+        effects: effects common to the likely answers, with their probabilities.
+        channels: channels on which all likely answers act, with their probabilities.
+        unpredictive: the answer, where it is probable enough but its predictions leave a doubt; else empty.
+        doubts: the reasons for that.
+    """
+
+    decided: bool
+    credible: tuple[tuple[str, float], ...]
+    effects: Mapping[str, float]
+    channels: Mapping[str, float]
+    unpredictive: str = ""
+    doubts: tuple[Doubt, ...] = ()
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields ``decided``, ``unpredictive``, ``doubts``, ``credible`` and ``common`` of a document."""
+        return {
+            "decided": self.decided,
+            "unpredictive": self.unpredictive,
+            "doubts": as_json(self.doubts),
+            "credible": [{"effect": effect, "probability": value} for effect, value in self.credible],
+            "common": {"effects": dict(self.effects), "channels": dict(self.channels)},
+        }
+
+    @from_json_fields
+    @staticmethod
+    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The fields, from a whole document."""
+        kept = {name: data[name] for name in ("decided", "unpredictive", "doubts") if name in data}
+        likely = [(one["effect"], one["probability"]) for one in data["credible"]]
+        return {**kept, "credible": likely, **data["common"]}
+
+
+def decision(
+    answers: Sequence[tuple[str, float]], chosen: AnswerSettings, predictions: Predictions = Predictions()
+) -> Decision:
+    """Judge the answers by their probabilities, and the first of them by its predictions and its place.
+
+    Args:
+        answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
+            first.
+        predictions: of the first answer; they count where it names effects.
+    """
+    credible, together = [], 0.0
+    for answer in sorted(answers, key=lambda given: -given[1]):
+        credible.append(answer)
+        together += answer[1]
+        if together >= chosen.credible_from:
+            break
+    channel_of = {kind.name: kind.channel for kind in known_effects()}
+    proper = {
+        kind.name for kind in known_effects() if not kind.scatters
+    }  # runs differ by chance beside any of them
+    causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
+    first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
+    names_effects = first not in ("none", "unknown")
+    doubts = predictions.doubts(chosen) if probable and names_effects else ()
+    return Decision(
+        decided=probable and not doubts,
+        unpredictive=first if doubts else "",
+        doubts=doubts,
+        credible=tuple(credible),
+        effects=_common(causes, chosen.in_common),
+        channels=_common(
+            [({channel_of[name] for name in names & proper}, value) for names, value in causes],
+            chosen.in_common,
+        ),
+    )
+
+
+def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
+    """Elements common to answers of ``least`` of the probability, with that probability, most probable first."""
+    found: dict[str, float] = {}
+    for names, value in held:
+        for name in sorted(names):
+            found[name] = min(found.get(name, 0.0) + value, 1.0)
+    ranked = sorted(found.items(), key=lambda item: -item[1])
+    return {name: value for name, value in ranked if value >= least}

@@ -1,0 +1,312 @@
+"""Upper limits on undetected effects: the largest size of every effect that the runs do not exclude.
+
+An effect too small to be named still changes the coefficients, since the fit absorbs a part of it. The change at
+the largest size stands beside the coefficients and is not part of their intervals: Cnr without a named lag is the
+derivative in phase with the rate (decision 0004), to which a lag contributes, and an effect that the runs do not
+show is as likely to be absent.
+
+Linear theory proposes a size. A refit with the effect held at it confirms the limit or corrects it: a lag shows by
+its second order alone, and chance differences between the runs absorb a part of it that linear theory ignores.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.answer.linear_theory import (
+    Starts,
+    coefficients_of,
+    influences,
+    size_range,
+)
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.starting_points import (
+    StartingPoint,
+    absorbed,
+    change_to,
+    project_out,
+    second_order_starts,
+)
+from diagnosis.model.parameters import Point
+from diagnosis.search.hypothesis import own_gain
+from identification.estimate import Quantity
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An effect that is not named, at the largest size that the runs do not exclude.
+
+    Args:
+        effect: its name.
+        parameter: name of its severity.
+        size: that parameter, of the sign that allows more, with its unit.
+        moves: by coefficient, the size of its change by the effect, with its unit.
+        significance: standard deviations by which its likeliest size differs from zero, a ratio.
+    """
+
+    effect: str
+    parameter: str
+    size: Quantity
+    moves: Mapping[str, Quantity]
+    significance: float = 0.0
+
+
+def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
+    """Upper limits on effects beside those of a fit, two standard deviations from the likeliest size.
+
+    The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
+    where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
+    that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
+    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains. Refits confirm the size (`_confirmed`).
+
+    Args:
+        fit: with or without effects.
+        starts: the effects that may act beside those of the fit.
+        left: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of its
+            own; each of shape (n,).
+
+    Returns:
+        In the given order, without effects that the runs cannot limit.
+    """
+    chosen = fit.settings.answer
+    total = fit.total if left is None else sum(float(r @ r) for r in left)
+    beyond = max(total - fit.count - chosen.dispersion_stds * np.sqrt(2.0 * fit.count), 0.0)
+    reach = chosen.hidden_stds**2 * (1.0 + beyond / chosen.misfit_degrees)
+    names, influence = coefficients_of(fit), influences(fit)
+    hidden, units = [], fit.problem.data.model.coefficient_units
+    for kind, points in starts:
+        sizes: list[tuple[_Size, StartingPoint]] = []
+        with suppress(np.linalg.LinAlgError):
+            for start in second_order_starts(fit, kind) or points[: kind.tries]:
+                one = _largest(fit, start, influence, reach)
+                sizes += [] if one is None else [(one, start)]
+        sizes.sort(key=lambda one: -float(np.max(np.abs(one[0].moves))))
+        tried = (_confirmed(fit, start, one, reach) for one, start in sizes)
+        largest = next((one for one in tried if one is not None), None)
+        if largest is not None:
+            severity = kind.parameters()[0]
+            size = Quantity(largest.size, None, severity.unit)
+            moves = {
+                name: Quantity(float(abs(move)), None, units[name])
+                for name, move in zip(names, largest.moves, strict=True)
+            }
+            stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one, _ in sizes) / reach))
+            hidden.append(Hidden(kind.name, severity.name, size, moves, stds))
+    return tuple(hidden)
+
+
+def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
+    """The size at which a refit is ``reach`` above the least −2 ln L, with its changes of the coefficients.
+
+    A refit within a quarter of the distance confirms a size. Elsewhere the size follows from the rise, which grows
+    with the square of the unabsorbed change, and from the sizes already refitted. An effect with a phase or an
+    instant in every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
+
+    Returns:
+        None where no refit confirms a size, or the runs exclude no size at all.
+    """
+    assert start.scaled is not None
+    if start.point.release.shape[1] > fit.point.release.shape[1]:
+        return found
+    limit = fit.unlikelihood - found.lowered
+    least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
+    size = float(
+        np.clip(found.size, least, greatest)
+    )  # a multiple of a trial may be rounded beyond its bound
+    inside = outside = 0.0  # sizes below and above the limit
+    along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
+    for _ in range(_REFITS):
+        again = _held(fit, start, size, fit.point.common + along * size)
+        if again is None:
+            return None
+        rise = again.unlikelihood - limit
+        if abs(rise - reach) <= _CONFIRMED * reach:
+            return replace(
+                found,
+                size=size,
+                moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
+            )
+        if rise < reach:
+            inside, along = size, (again.point.common[: along.size] - fit.point.common) / size
+        else:
+            outside = size
+        power = 0.25 if start.second_order else 0.5
+        further = size * float(np.clip((reach / max(rise, 1e-3 * reach)) ** power, 1.0 / _WIDEST, _WIDEST))
+        if inside and outside and not abs(inside) < abs(further) < abs(outside):
+            further = float(np.sign(size) * np.sqrt(inside * outside))
+        further = float(np.clip(further, least, greatest))
+        if further == size:  # the whole range is allowed
+            return None
+        size = further
+    return None
+
+
+def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | None:
+    """The fit with an effect held at a size, its other parameters free; None where it fails.
+
+    Args:
+        common: parameters of the given fit at which it starts, shape (common,).
+    """
+    assert start.scaled is not None
+    name, problem = start.problem.names[start.scaled], start.problem
+    problem = replace(problem, fixed=(*problem.fixed, (name, size)), scatter=fit.problem.scatter)
+    own = np.delete(start.point.common, start.scaled)[common.size :]
+    point = Point(np.concatenate([common, own]), fit.point.release.copy())
+    return try_fit(problem, point, base=fit, max_iterations=_STEPS)
+
+
+def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
+    """Changes of the coefficients from a fit to a refit, shape (coefficients,).
+
+    Args:
+        there: common parameters of the refit, with the size of the effect, shape (common,).
+    """
+    model, changes = fit.problem.data.model, []
+    for name in coefficients_of(fit):
+        before = model.coefficient(fit.problem.names, fit.point.common, name)
+        after = model.coefficient(start.problem.names, there, name)
+        changes.append(0.0 if before is None or after is None else after - before)
+    return np.array(changes, np.float64)
+
+
+_REFITS = 10
+_STEPS = 10  # of a refit, which starts at the fit
+_CONFIRMED = (
+    0.1  # greatest distance of a refit from the limit, as a share of that of the limit from the least
+)
+_WIDEST = 10.0  # greatest factor between two sizes that are refitted
+
+
+@dataclass(frozen=True, eq=False)
+class _Size:
+    """The largest size of an effect that is not excluded."""
+
+    size: float
+    moves: Array  # of the coefficients there, shape (coefficients,)
+    drop: float  # of χ² at the likeliest size, less the chance gain of parameters per run
+    lowered: float  # drop of χ² at the likeliest size
+
+
+def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
+    """The largest size of an effect within ``reach`` of the least χ², and the moves of the coefficients there.
+
+    Higher orders spoil the first order of a polynomial that is fitted far from the size. Where the first order is
+    absorbed, it is therefore fitted again at the size found.
+    """
+    if start.scaled is None:
+        return None
+    found, least = None, fit.settings.answer.hidden_absorbed
+    for number in range(_ROUNDS if start.second_order else 1):
+        size = float(start.point.common[start.scaled])
+        # at a trial's size, a small share means that the runs cannot show the effect; later the size is small
+        found = _within(fit, start, influence, reach, least if number == 0 else 0.0)
+        if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
+            break
+        common = start.point.common.copy()
+        common[start.scaled] = found.size
+        start = replace(start, point=replace(start.point, common=common))
+    return found
+
+
+def _within(
+    fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float, least_share: float
+) -> _Size | None:
+    """As `_largest`, by a polynomial fitted at the size of the starting point and at half of it."""
+    assert start.scaled is not None
+    size = float(start.point.common[start.scaled])
+    least, greatest = size_range(start)
+    if start.second_order:  # with the opposite sign the effect follows another law
+        least = 0.0
+    parts = [1.0, 0.5] if start.second_order else [1.0]
+    seen = [_profiled(fit, start, part, influence, least_share) for part in parts]
+    if any(one is None for one in seen):
+        return None
+    lefts, moves = zip(*(one for one in seen if one is not None), strict=True)
+    # left(k) = k u + k² w in multiples k of the size, and the moves alike
+    powers = np.array([[part, part**2][: len(parts)] for part in parts])
+    terms = np.linalg.solve(powers, np.array(lefts))
+    slopes = np.linalg.solve(powers, np.array(moves))
+    along, gram = terms @ np.concatenate(fit.residuals), terms @ terms.T
+    rise: Array = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
+    for i in range(len(terms)):
+        rise[3 - i] -= 2.0 * along[i]
+        for j in range(len(terms)):
+            rise[2 - i - j] += gram[i, j]
+    turns = [k for k in _real_roots(np.asarray(np.polyder(rise), np.float64)) if least <= k <= greatest]
+    lowest = min(np.polyval(rise, [0.0, *turns]))
+    ends = _real_roots(rise - np.array([0.0, 0.0, 0.0, 0.0, lowest + reach]))
+    if not ends:
+        return None
+    outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
+    moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
+    by_chance = own_gain(start.problem) - own_gain(fit.problem)
+    return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0), max(-float(lowest), 0.0))
+
+
+def _real_roots(polynomial: Array) -> list[float]:
+    return [float(k.real) for k in np.roots(polynomial) if abs(k.imag) <= _REAL * abs(k)]
+
+
+_ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
+_LEAST_PART = 1e-3  # least step towards a trial, as a share of it
+_REAL = 1e-6  # share of a root that its imaginary part may be
+
+
+def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
+    """Change of a fit's coefficients with an effect beside it, shape (coefficients,).
+
+    Args:
+        there: the common parameters of the start's problem, shape (common,). Where a trial of gravity is so large
+            that nothing would swing, a part of that step is evaluated.
+    """
+    assert start.scaled is not None
+    model, names = fit.problem.data.model, start.problem.names
+    here = np.concatenate([fit.point.common, there[fit.point.common.size :]])
+    here[start.scaled] = 0.0
+    part = 1.0
+    while part > _LEAST_PART and model.coefficient(names, here + part * (there - here), "omega_n") == 0.0:
+        part *= 0.5
+    changes = []
+    for name in coefficients_of(fit):
+        before = model.coefficient(fit.problem.names, fit.point.common, name)
+        after = model.coefficient(names, here + part * (there - here), name)
+        changes.append(0.0 if before is None or after is None else (after - before) / part)
+    return np.array(changes, np.float64)
+
+
+def _profiled(
+    fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
+) -> tuple[Array, Array] | None:
+    """The change of all readings by a part of an effect's size that the fit cannot absorb, and its moves.
+
+    The other parameters are moved first. Linear theory alone would absorb to first order what they absorb exactly,
+    as Cnβ and Cnr absorb an offset of the only wind speed.
+
+    Returns:
+        The change, scaled, shape (n,), and the moves of the coefficients, shape (coefficients,); None where the
+        unabsorbed share of the change is at most ``least_share``.
+    """
+    assert start.scaled is not None
+    common = start.point.common.copy()
+    common[: fit.point.common.size] = fit.point.common
+    common[start.scaled] = part * start.point.common[start.scaled]
+    effect, release = common[fit.point.common.size :], start.point.release.copy()
+    release[:, : fit.point.release.shape[1]] = fit.point.release
+    change = change_to(fit, start.problem, Point(common, release))
+    whole = float(np.linalg.norm(np.concatenate(change)))
+    if not np.isfinite(whole):
+        return None
+    there = absorbed(fit, change)
+    moved = _moved(fit, start, np.concatenate([there.common, effect]))
+    own = np.column_stack([there.release, release[:, there.release.shape[1] :]])
+    change = change_to(fit, start.problem, Point(np.concatenate([there.common, effect]), own))
+    if not all(np.all(np.isfinite(one)) for one in change):
+        return None
+    moved = moved - sum((c @ i for c, i in zip(change, influence, strict=True)), np.zeros_like(moved))
+    left = np.concatenate(project_out(fit, change))
+    return None if float(np.linalg.norm(left)) <= least_share * whole else (left, moved)

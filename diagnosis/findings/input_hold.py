@@ -1,0 +1,75 @@
+"""A delay of the input that a wrong hold between samples would explain too: one cause with two readings.
+
+An input held between samples acts as one that is linear between them and half a sample late, except for terms of
+second order in the sample interval. A fit with the other hold and without a delay shows whether the records
+distinguish them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import try_fit
+from diagnosis.model.parameters import Point
+from diagnosis.search.study import Study
+from tunnel_sim.effects.registry import the_effect
+from tunnel_sim.vocabulary.drive import Hold
+
+
+@dataclass(frozen=True)
+class OtherHold:
+    """A delay of the input that another hold between its samples explains as well.
+
+    Args:
+        delay_s, half_sample_s: s.
+        taken: the hold of the fits.
+        stated: whether the campaign states it for all driven runs.
+        better: whether the other hold explains the records better than chance would.
+    """
+
+    delay_s: float
+    half_sample_s: float
+    taken: Hold
+    stated: bool
+    better: bool
+
+
+DELAY = the_effect(delays=True)
+
+
+def other_hold(study: Study) -> OtherHold | None:
+    """The delay of an answer that another hold explains as well; None where there is none."""
+    from scipy.special import chdtri  # only here: slow to load
+
+    fit, problem = study.chosen, study.chosen.problem
+    inputs = {run.drive.held for run in problem.data.runs if run.drive is not None}
+    if DELAY.name not in study.causes or DELAY not in problem.effects or len(inputs) != 1:
+        return None
+    (held,) = inputs
+    runs = tuple(
+        run if run.drive is None else replace(run, drive=replace(run.drive, held=not held))
+        for run in problem.data.runs
+    )
+    effects = tuple(kind for kind in problem.effects if kind is not DELAY)
+    tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
+    whole = dict(zip(problem.names, fit.point.common.tolist(), strict=True))
+    start = Point(np.array([whole[name] for name in tried.names]), fit.point.release)
+    fitted = try_fit(tried, start)
+    if fitted is None:
+        return None
+    # without a delay the fit has one parameter less, so its χ² is larger even where it is right
+    chance = chdtri(1.0, study.settings.words.hold_rate) * (1.0 + max(fit.excess, 0.0))
+    if fitted.unlikelihood - fit.unlikelihood > chance:
+        return None
+    delay, own = f"{DELAY.name}.{DELAY.parameters()[0].name}", study.similarity.own
+    driven = (run for run in study.campaign.runs if run.drive is not None)
+    half = 0.5 * float(np.median([run.record.sample_interval for run in driven]))
+    return OtherHold(
+        delay_s=own(fit.value(delay), "s"),
+        half_sample_s=own(half, "s"),
+        taken="zero" if held else "linear",
+        stated=all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
+        better=bool(fit.unlikelihood - fitted.unlikelihood > chance),
+    )

@@ -1,0 +1,240 @@
+"""Judgements on an answer: caveats, near explanations of the gap, springs that may be off, and the remainder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from diagnosis.findings.closure import Confirmation, RunGap
+from diagnosis.findings.found import Nearly
+from diagnosis.findings.hidden import Hidden
+from diagnosis.likelihood.residuals import CHANNELS, misfit
+from diagnosis.model.fact import Fact
+from diagnosis.noise.gap import gap_test
+from diagnosis.noise.kinds import Noise
+from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
+from diagnosis.search.study import Study
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings, WordsSettings
+from identification.estimate import Quantity
+from tunnel_sim.vocabulary.campaign import Campaign
+
+
+@dataclass(frozen=True)
+class Move:
+    """Move of a coefficient by the remainder.
+
+    Args:
+        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
+        relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
+        std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
+        material: whether the remainder is significant and moves the coefficient by more than its standard
+            deviation or by 1 %.
+    """
+
+    value: float
+    relative: float | None
+    std: float | None
+    unit: str
+    material: bool = False
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The gap that remains after the named causes; the whole gap where none is named.
+
+    Args:
+        significant: whether it is beyond chance, by the tests of the gap.
+        excess: on held-out readings, in noise variances of a sample.
+        p_value: of the strongest test, corrected for the number of tests.
+        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
+        words: the remainder in sentences; empty until they are written.
+        further: a significant effect beside the causes that is too small to be named; empty where there is none.
+    """
+
+    significant: bool
+    excess: float
+    p_value: float
+    material: bool
+    moves: Mapping[str, Move]
+    words: str = ""
+    further: str = ""
+
+
+Estimates = Mapping[str, Quantity]
+
+
+def cautions(
+    campaign: Campaign,
+    noise: Noise,
+    runs: Sequence[RunGap],
+    confirmation: Confirmation,
+    *,
+    named: bool,
+    settings: Settings,
+) -> tuple[Fact, ...]:
+    """The caveats of an answer.
+
+    Args:
+        runs: the gap by run, with whether the run could be held out of the fit.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model.
+        named: whether the answer names effects; only then are runs held out of a fit.
+    """
+    facts, chosen = [], settings.words
+    if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
+        facts.append(Fact("one spring assumed"))
+    facts += noise.cautions(chosen.noise_contradicted)
+    if confirmation.failure:
+        facts.append(Fact("not followed", {"failure": confirmation.failure}))
+    elif not confirmation.agrees:
+        figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
+        beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
+        facts.append(Fact("not confirmed", figures | beside))
+    windy = any(run.wind_on for run in campaign.runs)
+    if len(campaign.runs) < chosen.runs_without_caution:
+        kind = {"driven": campaign.driven, "windy": windy}
+        facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
+    fitted = [run.id for run in runs if not run.held_out]
+    if named and len(fitted) == len(runs):
+        facts.append(Fact("none held out", {"windy": windy}))
+    elif named and fitted:
+        facts.append(Fact("some not held out", {"runs": fitted}))
+    return tuple(facts)
+
+
+def outside_the_fits(study: Study) -> tuple[Fact, ...]:
+    """The parts of the records that no fit uses, and the effects that the runs do not confirm."""
+    refused = list(study.refused.values())
+    alone = {name: run for name, run in study.single.items() if name in study.fitted}
+    single = {
+        run: tuple(name for name in alone if alone[name] == run) for run in dict.fromkeys(alone.values())
+    }
+    return (
+        *((Fact("cut"),) if study.prepared.cut else ()),
+        *one_amplitude(study),
+        *((Fact("needless", {"effects": study.needless}),) if study.needless else ()),
+        *(Fact("only one run", {"effects": names, "run": run}) for run, names in single.items()),
+        *(fact for place, fact in enumerate(refused) if fact not in refused[:place]),
+        *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
+    )
+
+
+def one_amplitude(study: Study) -> tuple[Fact, ...]:
+    """The fact that all runs have one release amplitude, for free forms; empty without these or with several."""
+    problem = study.chosen.problem
+    runs, names = problem.data.runs, problem.free_forms
+    if problem.data.driven or not names or not study.named:
+        return ()
+    conditions = {(run.spring_stiffness, run.wind_speed) for run in runs}
+    releases = [float(np.max(np.abs(run.reading - np.median(run.reading)))) for run in runs]
+    if len(conditions) > 1 or max(releases) > study.settings.words.same_release * min(releases):
+        return ()
+    return (Fact("one amplitude", {"parameters": names}),)
+
+
+def zeros_apart(study: Study) -> tuple[Fact, ...]:
+    """The fact that a zero per run would explain most of an unexplained gap; empty where it would not."""
+    nominal, chosen = study.nominal, study.settings.words
+    if nominal.problem.data.model.own_zeros or study.campaign.sensor.zero == "common":
+        return ()
+    # a zero of its own removes exactly the mean of a run
+    means = np.array([float(left.sum()) ** 2 / left.size for left in nominal.residuals])
+    whole = float(sum(left @ left - left.size for left in nominal.residuals))
+    by_chance = float(chdtrc(means.size, means.sum()))
+    share = float(means.sum() - means.size) / whole if whole > 0.0 else 0.0
+    if len(means) < 2 or by_chance >= chosen.zeros_rate or share < chosen.zeros_close:
+        return ()
+    return (Fact("zeros apart", {"share": min(share, 1.0)}),)
+
+
+def nearly(study: Study) -> Nearly | None:
+    """The effects that explain most of a gap without being named; None where there are none."""
+    chosen = study.settings.words
+    sets = [answer for answer in study.answers if answer.effects not in ((), UNKNOWN)]
+    first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
+        return None
+    found = Nearly(first.effects, 1.0 - first.share, first.probability)
+    if study.gap.test.noisy and first.probability == 0.0:
+        return replace(found, noisy=True)
+    alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
+    rival = max(alike, key=lambda answer: answer.probability, default=None)
+    if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
+        return replace(found, rival=rival.effects, rival_probability=rival.probability)
+    fitted = first.hypothesis
+    if fitted is None:
+        return found
+    chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
+    left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]
+    return replace(found, misfit=tuple(left))
+
+
+def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> dict[str, float]:
+    """By coefficient, the relative change by the causes; empty where any change is material."""
+    known = {name: given for name, given in after.items() if given.std and given.value and name in before}
+    moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
+    limits = {
+        name: min(chosen.immaterial * abs(given.value), given.std or 0.0) for name, given in known.items()
+    }
+    if any(moves[name] > limit for name, limit in limits.items()):
+        return {}
+    return {name: moves[name] / abs(given.value) for name, given in known.items()}
+
+
+def spring_choices(study: Study) -> tuple[SpringError, ...]:
+    """The springs of which one may be off, where the runs cannot tell which."""
+    return tuple(
+        replace(
+            spring_error(one.hypothesis.fit, ONE_SPRING.name, study.similarity), probability=one.probability
+        )
+        for one in (study.answer.choices if study.answer else ())
+    )
+
+
+def remainder(
+    study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
+) -> Remainder:
+    """Judge the residual gap of the answer; a remainder within chance is never material.
+
+    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
+
+    Args:
+        stated: the coefficients of the answer's fit with their standard deviations.
+        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
+        excess: on held-out readings, in noise variances of a sample.
+        hidden: the effects that could hide beside the answer.
+    """
+    random, chosen = study.random, study.settings.answer
+    if random is not None:  # its runs have innovations
+        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
+        still = [residual for run, residual in runs if run.id not in random.process.runs]
+        both = np.concatenate([*random.process.innovations, *still])
+        p_value = float(chdtrc(both.size, both @ both))
+    elif study.chosen is study.nominal:
+        p_value = study.gap.test.p_value
+    else:  # no cause changes the tests of the noise itself: those of the residuals count
+        noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
+        p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
+    further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
+    by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
+    shown = further is not None and by_effect < chosen.remains_rate <= p_value
+    p_value = min(p_value, by_effect)
+    beyond_chance = p_value < chosen.remains_rate
+    moves = {}
+    for name, given in stated.items():
+        relative = moved[name] / abs(given.value) if given.value else None
+        # by its standard deviation, or by a share, where the runs determine it
+        least = chosen.material_share
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
+        moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
+    return Remainder(
+        significant=beyond_chance,
+        excess=excess,
+        p_value=p_value,
+        material=any(move.material for move in moves.values()),
+        moves=moves,
+        further=further.effect if shown and further is not None else "",
+    )

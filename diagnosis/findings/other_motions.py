@@ -1,0 +1,133 @@
+"""Motions beyond effects of one degree of freedom: a second mode, and a limit cycle in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from diagnosis.settings import WordsSettings
+from identification.examination.self_excited import in_limit_cycle
+from identification.signal.frequency import starting_frequency, thinned_reading
+from identification.status import Remark
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, evenly_spaced
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A decaying oscillation.
+
+    Args:
+        amplitude_rad: at the start, rad.
+        frequency_hz: Hz.
+        decay_per_s: rate of its decay, 1/s.
+    """
+
+    amplitude_rad: float
+    frequency_hz: float
+    decay_per_s: float
+
+
+@dataclass(frozen=True)
+class TwoModes:
+    """Two modes in a run, where a rig has one.
+
+    Args:
+        run: id of the run.
+        main: the mode that one free decay fits.
+        second: the mode beside it.
+        closes: share of the residual of one free decay that the second mode explains, a fraction.
+    """
+
+    run: str
+    main: Mode
+    second: Mode
+    closes: float
+
+
+_MOST = 1024  # thinned readings used: fifty cycles
+_LEAST = 64
+_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a quickly decaying mode is lost in the whole
+_ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
+
+
+@dataclass(frozen=True, eq=False)
+class _Modes:
+    """Decaying oscillations whose sum is fitted to a reading."""
+
+    frequency: Array  # Hz, shape (m,)
+    rate: Array  # of decay, 1/s, shape (m,)
+    amplitude: Array  # at the first reading, rad, shape (m,)
+    left: float  # sum of squared residuals, rad²
+
+
+def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, ...]:
+    """Find a second mode in each run that shows one.
+
+    Returns:
+        One for each run in which two decaying oscillations leave far less than one does, and are farther apart
+        than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first
+        half or its first quarter. A motion that shows fewer than three cycles is not a mode. Driven runs are left
+        out.
+    """
+    modes = []
+    for run in campaign.runs:
+        frequency = starting_frequency(run.record) if run.drive is None else None
+        if frequency is None:
+            continue
+        reading = thinned_reading(evenly_spaced(run.record), frequency)
+        interval = float(reading.time[-1]) / (reading.time.size - 1)
+        parts = [reading.yaw[: int(part * min(reading.yaw.size, _MOST))] for part in _PARTS]
+        for values in (part for part in parts if part.size >= _LEAST):
+            hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
+            vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
+            one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
+            if one is None or two is None or two.left > chosen.second_mode_left * one.left:
+                continue
+            if two.rate.min() < 0.0:
+                continue
+            order = np.argsort(np.abs(two.frequency - one.frequency[0]))
+            resolution = float(two.rate.sum()) / np.pi
+            lifetime = np.minimum(1.0 / np.maximum(two.rate, 1e-300), interval * values.size)
+            if np.any(two.frequency * lifetime < chosen.second_mode_cycles):
+                continue  # an impulse or a drift, and no oscillation
+            turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
+            if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
+                continue  # not resolved, or a harmonic of the motion
+            main, second = (
+                Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
+            )
+            modes.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
+            break
+    return tuple(modes)
+
+
+def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
+    """A sum of ``count`` decaying oscillations by the poles of a Hankel matrix with these left singular vectors."""
+    left = vectors[:, : 2 * count]
+    poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
+    exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
+    upper = exponents[exponents.imag > 0.0]
+    if upper.size != count:
+        return None
+    waves = np.exp(np.outer(np.arange(values.size) * interval, upper))
+    columns = np.column_stack((waves.real, waves.imag, np.ones(values.size)))
+    weights = np.linalg.lstsq(columns, values, rcond=None)[0]
+    residual = values - columns @ weights
+    amplitude = np.hypot(weights[:count], weights[count : 2 * count])
+    return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
+
+
+def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
+    """The error for runs in a limit cycle to which not even the nominal model can be fitted."""
+    what = ". ".join(f"{remark.runs[0]}: {remark.what}" for remark in recognised_limit_cycles(remarks))
+    return TunnelError(f"no run is a free decay: {what}", remedy="add decays at a lower wind speed")
+
+
+def recognised_limit_cycles(remarks: Sequence[Remark]) -> tuple[Remark, ...]:
+    """The remarks on runs in a limit cycle."""
+    return tuple(remark for remark in remarks if in_limit_cycle(remark.figures))

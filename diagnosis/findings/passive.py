@@ -1,0 +1,114 @@
+"""Damping of a passive rig within its physical bounds: not negative, and at most the whole rate of the motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from scipy.special import ndtr, ndtri
+
+from diagnosis.findings.candidates import damping_ratio
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.search.study import Study
+from identification.estimate import Quantity
+
+_WIDE = 30.0  # standard deviations over the allowed range from which the distribution in it is uniform
+_FAR = 6.0  # standard deviations within which the whole distribution lies
+
+
+@dataclass(frozen=True)
+class Truncated:
+    """A normal distribution within bounds.
+
+    Args:
+        mean, std: of the distribution within them, in the quantity's unit.
+        interval: its central interval of 0.95, in the unit.
+    """
+
+    mean: float
+    std: float
+    interval: tuple[float, float]
+
+
+def truncated(value: float, std: float, lower: float, upper: float, probability: float = 0.95) -> Truncated:
+    """A normal distribution within bounds, in the unit of all four.
+
+    Args:
+        value: its mean without bounds, within them.
+        std: without bounds, above 0.
+        lower: least value.
+        upper: greatest value, above ``lower``.
+        probability: of the interval.
+    """
+    tail = 0.5 * (1.0 - probability)
+    if std > _WIDE * (upper - lower):
+        low, high = ((1.0 - t) * lower + t * upper for t in (tail, 1.0 - tail))
+        return Truncated(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), (low, high))
+    a, b = (lower - value) / std, (upper - value) / std
+    inside = float(ndtr(b) - ndtr(a))
+    at_a, at_b = (math.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi) for x in (a, b))
+    moved = (at_a - at_b) / inside
+    spread = math.sqrt(1.0 + (a * at_a - b * at_b) / inside - moved**2)
+    low, high = (value + std * float(ndtri(ndtr(a) + t * inside)) for t in (tail, 1.0 - tail))
+    return Truncated(value + std * moved, std * spread, (max(low, lower), min(high, upper)))
+
+
+def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quantity]:
+    """Coefficients with the damping of a passive rig within its bounds.
+
+    Args:
+        given: the coefficients of the answer, by name.
+
+    Returns:
+        The same. Where the deviation of ``zeta`` or ``mechanical_damping`` exceeds the bounds, the interval is that
+        of the distribution within them, and the standard deviation its root mean square distance from the value.
+        The damping is not negative. Beside named causes in free decays without wind it is at most the whole rate
+        of the fitted motion, since no such cause feeds the motion.
+    """
+    found, chosen = dict(given), study.settings.answer
+    if not study.named:
+        return found
+    for name in ("zeta", "mechanical_damping"):
+        estimate = given.get(name)
+        if estimate is None or estimate.bound is not None or estimate.std == 0.0:
+            continue
+        std = math.inf if estimate.std is None else estimate.std
+        upper = _greatest(study, name)
+        if upper is None:
+            if estimate.std is None or estimate.value - _FAR * std >= 0.0:
+                continue
+            upper = max(estimate.value, 0.0) + _FAR * std
+        if not (estimate.value - 2.0 * std < 0.0 or estimate.value + 2.0 * std > upper) or upper <= 0.0:
+            continue
+        value = min(max(estimate.value, 0.0), upper)
+        own = truncated(value, min(std, 1e6 * upper), 0.0, upper, chosen.coefficient_interval)
+        apart = math.hypot(own.std, own.mean - value)
+        found[name] = replace(
+            estimate, value=value, std=min(std, apart), interval=own.interval, determined=True
+        )
+    return found
+
+
+def _greatest(study: Study, name: str) -> float | None:
+    """The whole rate of the fitted motion as a damping ratio or damping, with its uncertainty; None: not known."""
+    fit, data = study.chosen, study.chosen.problem.data
+    if data.driven or data.wind_on or not data.model.restored or study.chosen is study.nominal:
+        return None
+    ratio = damping_ratio(fit)
+    if ratio is None:
+        return None
+    inertia, _, stiffness = linear_coefficients(fit, 0)
+    if stiffness <= 0.0:
+        return None
+    critical = 2.0 * math.sqrt(inertia * stiffness)
+    # the whole rate is known as well as the damping of the nominal model, in noise as large as the misfit
+    reach = 2.0 * _std(study.nominal) * math.sqrt(1.0 + max(fit.excess, 0.0)) / critical
+    whole = ratio + reach
+    return whole if name == "zeta" else whole * critical
+
+
+def _std(nominal: Fit) -> float:
+    name = "mechanical_damping"
+    return nominal.std(name) if name in nominal.problem.names and nominal.bound(name) is None else 0.0

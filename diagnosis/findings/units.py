@@ -1,0 +1,169 @@
+"""The answer in the units of the measured campaign, and the influence of unstated sizes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.repeatability import Repeatability
+from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similarity import Similarity
+from identification.estimate import Quantity
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
+
+
+def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
+    """The unit of an effect's parameter as identified.
+
+    Returns:
+        The parameter's own unit, divided by that of Izz where the nominal model is per unit inertia, and
+        multiplied by those of the frontal area, the reference length and the air density where these are not
+        stated.
+    """
+    effect, _, parameter = name.partition(".")
+    info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
+    rig = campaign.rig
+    if info.per_pressure:
+        dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+        factors = {
+            "kg/m3": not dense,
+            "m2": rig.frontal_area is None,
+            "m": rig.reference_length is None,
+            "1/(kg m2)": model.per_inertia,
+        }
+        within = [dimension(unit) for unit, missing in factors.items() if missing]
+        return in_si(functools.reduce(product, within, NUMBER))
+    if info.unit == "l/V" and rig.reference_length is None:
+        return "m"  # a·l, which over V is the time
+    return model.identified_unit(info.unit)
+
+
+#: By whether area and length are unstated: name and unit of the product identified in place of a coefficient.
+_PRODUCTS = {
+    (True, False): {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")},
+    (False, True): {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")},
+    (True, True): {"cn_beta": ("cn_beta_area_length", "m3/rad"), "cn_r": ("cn_r_area_length2", "m4/rad")},
+}
+
+
+def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dict[str, Quantity]:
+    """Coefficients under the names of the identified quantities.
+
+    Args:
+        found: ``cn_beta`` and ``cn_r``, with 1 in place of every unstated size; or other coefficients.
+
+    Returns:
+        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, given in their names:
+        ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
+    """
+    products = _PRODUCTS.get((rig.frontal_area is None, rig.reference_length is None), {})
+    sized = {}
+    for name, value in found.items():
+        identified, unit = products.get(name, (name, value.unit))
+        sized[identified] = replace(value, unit=unit)
+    return sized
+
+
+_NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
+_STEPS = {
+    "spring_stiffness": 0.01,
+    "wind_speed": 0.1,
+    "release_angle": 0.01,
+    "duration": 1.0,
+}  # N m/rad, m/s, rad, s
+
+
+def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dict[str, Quantity]:
+    """Estimates by name, in the measured campaign's units."""
+    return {name: own_estimate(value, similarity) for name, value in values.items()}
+
+
+def own_repeatability(given: Repeatability, similarity: Similarity) -> Repeatability:
+    """The runs' repeatability with frequencies of the measured rig; all else is relative."""
+    runs = (replace(one, frequency_hz=similarity.own(one.frequency_hz, "Hz")) for one in given.runs)
+    return replace(given, runs=tuple(runs))
+
+
+def own_parameters(
+    given: Mapping[str, Quantity], campaign: Campaign, similarity: Similarity, model: NominalModel
+) -> dict[str, Quantity]:
+    """Parameters of effects in the measured campaign's units.
+
+    Args:
+        given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
+
+    Returns:
+        The same quantities, in the units of `parameter_unit`. The coefficient of a power of the rate that differs
+        from the textbook's scales with that power of time.
+    """
+    found = {}
+    for name, value in given.items():
+        effect, _, parameter = name.partition(".")
+        infos = {info.name: info for info in effect_class(effect).parameters()}
+        exponent = infos[parameter].rate_exponent
+        free = given.get(f"{effect}.{exponent}")
+        beyond = 0.0 if free is None else free.value - infos[exponent].default
+        own = own_estimate(value, similarity)
+        factor = similarity.time**-beyond
+        std = None if own.std is None else own.std * factor
+        # An unstated size, density or inertia is 1 in own units: only the name of the unit changes.
+        unit = parameter_unit(name, campaign, model)
+        found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
+    return found
+
+
+def own_hidden(
+    given: Sequence[Hidden],
+    coefficients: Mapping[str, Quantity],
+    campaign: Campaign,
+    similarity: Similarity,
+    model: NominalModel,
+) -> tuple[Hidden, ...]:
+    """The effects that could hide, in the measured campaign's units, by their influence on a coefficient.
+
+    Args:
+        coefficients: estimates of the similar campaign, whose standard deviations are the reference of the moves.
+    """
+
+    def greatest(one: Hidden) -> float:
+        stds = {name: known.std for name, known in coefficients.items() if known.std}
+        return max((move.value / stds[name] for name, move in one.moves.items() if name in stds), default=0.0)
+
+    found = []
+    for one in sorted(given, key=lambda one: -greatest(one)):
+        name = f"{one.effect}.{one.parameter}"
+        size = own_parameters({name: one.size}, campaign, similarity, model)[name]
+        moves = sized_coefficients(one.moves, campaign.rig)
+        own = {coefficient: own_estimate(move, similarity) for coefficient, move in moves.items()}
+        found.append(replace(one, size=size, moves=own))
+    return tuple(found)
+
+
+def own_estimate(estimate: Quantity, similarity: Similarity) -> Quantity:
+    """An estimate in the measured campaign's units, its value and standard deviation scaled alike."""
+
+    def own(value: float) -> float:
+        return similarity.own(value, estimate.unit)
+
+    std, ends = estimate.std, estimate.interval
+    return replace(
+        estimate,
+        value=own(estimate.value),
+        std=None if std is None else own(std),
+        interval=None if ends is None else (own(ends[0]), own(ends[1])),
+    )
+
+
+def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
+    """A proposed run (`separating_run`) in the measured campaign's units, rounded to adjustable values."""
+    own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
+    for name, step in _STEPS.items():
+        if name in own:  # a whole number of steps, or two digits where it is only a few steps
+            few = abs(own[name]) < 10.0 * step
+            own[name] = float(f"{own[name]:.2g}") if few else round(round(own[name] / step) * step, 6)
+    return own

@@ -1,0 +1,139 @@
+"""The findings of a diagnosis, and their JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Annotated, Any, Self, cast
+
+from pydantic import TypeAdapter
+
+from diagnosis.answer.held_out import Waterfall
+from diagnosis.findings.candidates import Candidate, CauseSize
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.decision import Decision
+from diagnosis.findings.found import Found
+from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.judgements import Remainder
+from diagnosis.findings.repeatability import Repeatability
+from diagnosis.patch.written_model import PatchedModel
+from diagnosis.remainder.closable import Closable
+from diagnosis.search.disturbance import Disturbance
+from diagnosis.where.described import Where
+from identification.status import Remark
+from identification.trade_off import TradeOff
+from tunnel_sim.files.from_json import UNWRITTEN
+from tunnel_sim.files.reading import as_described, check_shape
+from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.campaign import Campaign
+
+SCHEMA_VERSION = 1
+_LAST = (
+    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
+    "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
+    "maps", "provenance",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All findings of a diagnosis, as values with units: the one type that is written, shown and read back.
+
+    Its text fields are empty until `in_words` writes them: ``verdict``, ``cautions`` and ``note``, ``reason``,
+    ``words`` and ``notes`` of its parts.
+
+    Args:
+        causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary explains.
+        candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
+        ambiguous_with: effects that these runs cannot distinguish from the causes.
+        next_run: the run expected to distinguish them; None where not needed.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is computed.
+        hidden: the effects that could hide, ordered by their move of a coefficient against its standard deviation.
+        trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
+        blind_spots: what these runs cannot show, in sentences.
+        seconds: wall time by step, s.
+        maps: data of the figures, in JSON's types.
+        disturbed: disturbed runs; the answer excludes them from the disturbance on.
+        remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
+        inclusion: by effect of the vocabulary, the probability that it is among the causes.
+        rest: the remaining gap.
+        repeatability: of the runs; None for a single run, or a body without a spring.
+        model: the given model, with the causes written into it; None where none was given.
+        closable: the explainable share of the rest, and its law; None where the rest is within chance.
+        sizes: effect of each fitted cause on a swing.
+        found: facts for the words, beside the numbers.
+        data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
+    """
+
+    campaign: str
+    causes: tuple[str, ...]
+    gap: GapSummary
+    where: Where
+    candidates: tuple[Candidate, ...]
+    ambiguous_with: tuple[str, ...]
+    next_run: Mapping[str, Any] | None
+    coefficients: Coefficients
+    confirmation: Confirmation
+    noise: NoiseSummary
+    decision: Decision
+    verdict: str = ""
+    hidden: tuple[Hidden, ...] = ()
+    trade_off: TradeOff | None = None
+    blind_spots: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    cautions: tuple[str, ...] = ()
+    maps: Mapping[str, Any] | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    disturbed: tuple[Disturbance, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+    inclusion: Mapping[str, float] = field(default_factory=dict)
+    waterfall: Waterfall = field(default_factory=Waterfall)
+    rest: Remainder | None = None
+    repeatability: Repeatability | None = None
+    model: PatchedModel | None = None
+    closable: Closable | None = None
+    sizes: tuple[CauseSize, ...] = ()
+    found: Found = field(default_factory=Found)
+    data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The answer in JSON's types, by the published schema."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "campaign": self.campaign,
+            "causes": list(self.causes),
+            **self.decision.to_json_dict(),
+            "verdict": self.verdict,
+            "gap": as_json(self.gap),
+            "where": as_json(self.where),
+            "candidates": as_json(self.candidates),
+            "inclusion": dict(self.inclusion),
+            **self.waterfall.to_json_dict(),
+            **{name: as_json(getattr(self, name)) for name in _LAST},
+        }
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Self:
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: the document; further keys are ignored.
+
+        Raises:
+            TunnelError: when it is not a diagnosis: a key is missing, or a value has the wrong type.
+        """
+        where, remedy = "the diagnosis as JSON", "write it again with tunnel diagnose --json"
+        check_shape(data, where, remedy)
+        with as_described("is not a diagnosis", where, remedy):
+            found = _adapter(cast(Any, cls)).validate_json(
+                json.dumps({**data, "waterfall": data, "decision": data}), strict=True
+            )
+        return cast(Self, found)
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)

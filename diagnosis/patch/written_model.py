@@ -1,0 +1,214 @@
+"""The user's model with the causes written into it, and the share of the gap that it explains by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from diagnosis.model.fact import Fact
+from diagnosis.settings import AnswerSettings
+from tunnel_sim.files.from_json import UNWRITTEN
+from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tunnel_sim.engine.joint_model import JointModel
+    from tunnel_sim.engine.joint_patch import Written
+
+
+@dataclass(frozen=True)
+class NativeClosure:
+    """The explained share of the gap on held-out readings.
+
+    Args:
+        before: mean squared residual of the nominal model, in units of a block mean's noise variance.
+        fit: of the fits' own integrator with the causes, in the same unit.
+        native: of the patched model, simulated by the engine, in the same unit.
+        p_value: of the residual of the nominal model, a probability.
+    """
+
+    before: float
+    fit: float
+    native: float
+    on: str
+    p_value: float = 0.0
+
+    @property
+    def fit_closed(self) -> float:
+        """Share of the gap that the fit explains."""
+        return self._closed(self.fit)
+
+    @property
+    def native_closed(self) -> float:
+        """Share of the gap that the patched model explains."""
+        return self._closed(self.native)
+
+    def _closed(self, after: float) -> float:
+        return min(max(1.0 - max(after - 1.0, 0.0) / max(self.before - 1.0, 1e-9), 0.0), 1.0)
+
+
+_OMISSIONS = frozenset({"rod", "friction against load", "friction against rate", "presliding", "air"})
+
+
+@dataclass(frozen=True, eq=False)
+class EngineModel:
+    """A patched model in the engine.
+
+    Args:
+        given: the user's model.
+        spec: with the causes written into it.
+        closure: by simulations with it.
+    """
+
+    given: JointModel
+    spec: mujoco.MjSpec
+    closure: NativeClosure
+
+    def write(self, path: Path | str) -> Path:
+        """Write the model to an MJCF file, which it replaces, completely or not at all.
+
+        Raises:
+            TunnelError: when it cannot be written.
+        """
+        from tunnel_sim.engine.joint_patch import patched_xml
+        from tunnel_sim.files.writing import write_whole
+
+        target = Path(path)
+        return write_whole(target, patched_xml(self.spec, self.given, target.parent).encode())
+
+
+@dataclass(frozen=True)
+class WrittenAttribute:
+    """An attribute that the patch changed, in SI units.
+
+    Args:
+        name: its element and name.
+        before: values in the given model, in ``unit``.
+        after: values in the patched one, in ``unit``.
+    """
+
+    name: str
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class NativeForm:
+    """The nearest model of MuJoCo's own elements.
+
+    Args:
+        written: attributes that changed.
+        closed: share of the gap on held-out readings that it explains, simulated by the engine.
+        engine: the model itself, which is not part of the JSON; None for one that was read from a file.
+    """
+
+    written: tuple[WrittenAttribute, ...]
+    closed: float
+    engine: Annotated[EngineModel | None, UNWRITTEN] = field(default=None, compare=False, repr=False)
+
+    def write(self, path: Path | str) -> Path:
+        """As `PatchedModel.write`."""
+        return _written(self.engine, path)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields but the engine's."""
+        return {"written": as_json(self.written), "closed": self.closed}
+
+
+@dataclass(frozen=True)
+class PatchedModel:
+    """The model with the causes written into it.
+
+    Args:
+        file: name of the given model's file.
+        joint: that was recorded.
+        free: parameters of the nominal model that were fitted.
+        rest_rad: position of the joint about which the law is stated, rad.
+        zero_rad: the reading less the joint's position, rad; the median of the runs.
+        written: attributes that changed.
+        differences: where the native element follows another law, and causes left out.
+        closed: share of the gap on held-out readings that the model explains, simulated by the engine.
+        closed_by_fit: share that the fit explains.
+        closed_on: the held-out readings.
+        notes: the differences in sentences; empty until they are written.
+        native: the nearest model of MuJoCo's own elements; None where this one has no others.
+        engine: the model itself, which is not part of the JSON; None for one that was read from a file.
+    """
+
+    file: str
+    joint: str
+    free: tuple[str, ...]
+    rest_rad: float
+    zero_rad: float
+    written: tuple[WrittenAttribute, ...]
+    notes: tuple[str, ...]
+    differences: tuple[Fact, ...]
+    closed: float
+    closed_by_fit: float
+    closed_on: str
+    native: NativeForm | None = None
+    engine: Annotated[EngineModel | None, UNWRITTEN] = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def of(
+        cls, engine: EngineModel, written: Sequence[Written], differences: tuple[Fact, ...], zero: float
+    ) -> PatchedModel:
+        """The patched model with its closure.
+
+        Args:
+            zero: the reading less the joint's position, rad.
+        """
+        given, closure = engine.given, engine.closure
+        return cls(
+            file=given.path.name,
+            joint=given.joint,
+            free=tuple(given.law.free),
+            rest_rad=given.law.rest,
+            zero_rad=zero,
+            written=tuple(WrittenAttribute(one.name, one.before, one.after, one.unit) for one in written),
+            notes=(),
+            differences=differences,
+            closed=closure.native_closed,
+            closed_by_fit=closure.fit_closed,
+            closed_on=closure.on,
+            engine=engine,
+        )
+
+    def judged(self, chosen: AnswerSettings) -> float | None:
+        """Share of the gap that the patched model explains, as a judgement on the causes.
+
+        Returns:
+            None where its runs do not show the gap; or where a part of the causes cannot be written into the
+            model, and the fit, which has that part, leaves next to nothing of the gap.
+        """
+        omits = any(fact.kind in _OMISSIONS for fact in self.differences)
+        excused = omits and 1.0 - self.closed_by_fit < chosen.patch_excused
+        shown = self.engine is not None and self.engine.closure.p_value < chosen.remains_rate
+        return self.closed if shown and not excused else None
+
+    def write(self, path: Path | str) -> Path:
+        """Write the patched model to an MJCF file, which it replaces, completely or not at all.
+
+        MuJoCo reads a model with the plugin, which has a ``native`` one beside it, after `tunnel_sim.load_plugin`.
+
+        Raises:
+            TunnelError: when it cannot be written, or the answer was read from a file.
+        """
+        return _written(self.engine, path)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields but the engine's."""
+        return {name: as_json(value) for name, value in vars(self).items() if name != "engine"}
+
+
+def _written(engine: EngineModel | None, path: Path | str) -> Path:
+    if engine is None:
+        raise TunnelError(
+            "an answer from a file does not hold its model", remedy="diagnose the campaign again"
+        )
+    return engine.write(path)

@@ -1,0 +1,185 @@
+"""Upper limits on undetected effects, against refits at those sizes, and intervals that do not depend on them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis import diagnose
+from diagnosis.answer.linear_theory import starts_beside
+from diagnosis.findings.coefficients import Answers, Possible, coefficients, possible_answers
+from diagnosis.findings.hidden import hidden_effects
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
+from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.words.lines import hidden_line
+from diagnosis.words.sections import printed
+from diagnosis.words.tables import hidden_table
+from tests.reference.free_decays import damped_cosine
+from tests.support.diagnosis_document import document
+from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal, studied
+from tests.unit.diagnosis.noise.test_colour import colour, with_zero
+from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from, known_effects
+from tunnel_sim.vocabulary.record import Record
+
+
+def found_beside(data, *names):
+    base = nominal(data)
+    kinds = [effect_class(name) for name in names]
+    return base, {one.effect: one for one in hidden_effects(base, starts_beside(base, kinds))}
+
+
+def refitted(base, one):
+    """The fit with an effect held at its largest size."""
+    kind = effect_class(one.effect)
+    severity = f"{kind.name}.{one.parameter}"
+    problem = Problem(base.problem.data, (kind,), ((severity, one.size.value),))
+    return fit(problem, Point(base.point.common.copy(), base.point.release.copy()))
+
+
+@pytest.mark.parametrize(
+    "name", ["unsteady_aero_lag", "cubic_stiffness", "quadratic_damping", "wind_speed_offset"]
+)
+def test_a_refit_at_the_largest_size_is_four_units_above_the_least(name):
+    """χ² falls to its least by as much as the likeliest size gains, so the refit lies up to four above the fit."""
+    base, found = found_beside(campaign(), name)
+    again = refitted(base, found[name])
+    free = fit(
+        Problem(base.problem.data, (effect_class(name),)),
+        Point(np.append(base.point.common, 0.5 * found[name].size.value), base.point.release),
+    )
+    likeliest = free.value(f"{name}.{found[name].parameter}")
+    least = (
+        free.total if likeliest * found[name].size.value > 0.0 else base.total
+    )  # of the sizes of that sign
+    assert again.total - least == pytest.approx(4.0, abs=1.0)
+    for coefficient, move in found[name].moves.items():
+        assert abs(again.value(coefficient) - base.value(coefficient)) == pytest.approx(
+            move.value, rel=0.1, abs=0.02 * base.std(coefficient)
+        )
+
+
+def test_a_rod_and_gravity_hide_no_frequency_of_small_swings():
+    """Beside a spring that is not stated, both change what that spring seems to be, and not what the runs show."""
+    (still, *_) = (run for run in campaign().runs if run.wind_speed == 0.0)
+    data = replace(campaign(), runs=(replace(still, spring_stiffness=None),))
+    base = nominal_study(data, known_effects()).prepared.nominal
+    kinds = [effect_class(name) for name in ("rod_flexibility", "gravity_stiffness")]
+    found = hidden_effects(base, starts_beside(base, kinds))
+    assert "gravity_stiffness" in [one.effect for one in found]
+    for one in found:
+        # the spring's own frequency would move by 0.2 % and 0.3 %
+        assert one.moves["omega_n"].value < 1e-4 * base.value("stiffness") ** 0.5, one.effect
+        assert one.moves["zeta"].value < 1e-4, one.effect
+
+
+def test_an_offset_of_the_only_wind_speed_is_not_listed():
+    """Cnβ and Cnr absorb it: no run of this campaign could limit it."""
+    data = campaign()
+    one_speed = replace(data, runs=tuple(run for run in data.runs if run.wind_speed != 15.0))
+    _, found = found_beside(one_speed, "wind_speed_offset", "unsteady_aero_lag")
+    assert set(found) == {"unsteady_aero_lag"}
+
+
+@pytest.mark.parametrize("lag", [0.01, -0.01])
+def test_cn_r_without_a_named_lag_is_the_derivative_in_phase_with_the_rate(lag):
+    """The lag is no error of Cnr, and its upper limit does not widen the interval."""
+    data = campaign(effect_from("unsteady_aero_lag", {"lag": lag}))
+    base = nominal(data)
+    study = studied(data, base)
+    without = coefficients(Answers((Possible(1.0, base),), 0.0, base), data)["cn_r"]
+    given = coefficients(possible_answers(study, ALL_EFFECTS), data)["cn_r"]
+    assert given.std == pytest.approx(without.std)
+    assert abs(given.value - (CN_R - lag * CN_BETA)) < 3.0 * given.std
+    assert abs(given.value - CN_R) > 5.0 * given.std
+    assert "hidden effects" not in given.shares
+
+
+def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
+    """Chance differences absorb the second order of a small lag; linear theory alone allows ten times as much."""
+    kind = effect_class("unsteady_aero_lag")
+    chosen = investigate(scattered(), [effect_class(name) for name in (*SCATTERED, kind.name)]).stated
+    assert chosen.problem.scatter
+    (lag,) = hidden_effects(chosen, starts_beside(chosen, [kind]))
+    assert lag.size.value > 0.0
+    rises = []
+    for factor in (1.0, 2.0):
+        problem = replace(
+            chosen.problem,
+            effects=(*chosen.problem.effects, kind),
+            fixed=(("unsteady_aero_lag.lag", factor * lag.size.value),),
+        )
+        start = chosen.point.common.copy()
+        start[chosen.problem.names.index("cn_r")] += factor * lag.size.value * CN_BETA
+        rises.append(
+            fit(problem, Point(start, chosen.point.release.copy())).unlikelihood - chosen.unlikelihood
+        )
+    assert 1.0 <= rises[0] + lag.significance**2 <= 7.0
+    assert rises[1] > 16.0
+
+
+SCATTERED = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter")
+
+
+def scattered(seed=5):
+    """Twelve runs in closed form, with scatter of 0.3 % in speed, 0.05 % in stiffness and 1 % in damping."""
+    rng, time, runs = np.random.default_rng(seed), np.arange(0.0, 10.0, 0.01), []
+    base = campaign(duration=0.1)
+    for number in range(12):
+        like = base.runs[number % len(base.runs)]
+        spring = like.spring_stiffness * (1.0 + 5e-4 * rng.standard_normal())
+        speed = like.wind_speed * (1.0 + 3e-3 * rng.standard_normal())
+        damper = DAMPING * (1.0 + 1e-2 * rng.standard_normal())
+        area = 0.5 * 1.2 * 0.036 * 0.625
+        stiffness = spring - area * speed**2 * CN_BETA
+        rate = damper - area * 0.625 * speed * CN_R
+        swing = damped_cosine(time, rate / INERTIA, stiffness / INERTIA, 0.35, 0.0)
+        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        runs.append(replace(like, id=f"r{number}", record=record))
+    return replace(base, runs=tuple(runs), sensor=replace(base.sensor, sample_rate=100.0))
+
+
+def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
+    lag = {
+        "effect": "unsteady_aero_lag",
+        "parameter": "lag",
+        "size": {"value": -0.0111, "std": None, "unit": "l/V"},
+        "moves": {
+            "cn_beta": {"value": 7.9e-6, "std": None, "unit": "1/rad"},
+            "cn_r": {"value": 0.0061, "std": None, "unit": "1/rad"},
+        },
+    }
+    given = document() | {"hidden": [lag]}
+    for name, std in (("cn_beta", 1e-3), ("cn_r", 3e-3)):
+        given["coefficients"]["after"][name] = {"value": -0.17, "std": std, "unit": "1/rad"}
+    line = hidden_line(given)
+    assert "due to the rate alone differs by up to 0.0061 1/rad if a lag of 0.011 l/V" in line
+    assert "Cnβ" not in line  # it moves far less than its standard deviation
+    drift = {**lag, "effect": "wind_speed_drift", "size": {"value": 2e-4, "std": None, "unit": "1"}}
+    both = hidden_line(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]})
+    assert both.endswith(
+        "Wind speed drift of up to 0.00020 is not excluded and would change Cnr by 0.0061 1/rad."
+    )
+    (row,) = hidden_table(given).rows
+    assert row[0] == "unsteady aero lag"
+    assert "0.0061" in row[-1]
+    assert any(line in str(block) for block in printed(given))
+    assert hidden_line(given | {"hidden": []}) == ""
+
+
+def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
+    """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""
+    shedding = effect_from("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.12})
+
+    def zero(count, rng):
+        return 2.0 * NOISE * colour("ar2", count, rng) + 1.5e-3 * np.arange(count) / count
+
+    kinds = [effect_class(name) for name in ("vortex_shedding", "sensor_drift", "coulomb_friction")]
+    found = diagnose(with_zero(campaign(shedding), zero), kinds=kinds)
+    assert found.causes == ("vortex_shedding",)
+    assert found.rest.significant
+    assert "Sensor drift is significant, but too small to be named." in found.verdict
+    (drift,) = (one for one in found.hidden if one.effect == "sensor_drift")
+    assert drift.significance > 5.0
+    assert abs(drift.size.value) > 1.5e-3

@@ -1,0 +1,76 @@
+"""Damping within the bounds of a passive rig: against SciPy's truncated normal, and on decays of known loss."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import truncnorm
+
+from diagnosis.answer.held_out import one_more
+from diagnosis.findings.candidates import damping_ratio
+from diagnosis.findings.passive import truncated, within_bounds
+from diagnosis.search.investigate import nominal_study
+from identification.estimate import Quantity
+from tests.reference.free_decays import Setting, campaign
+from tests.support.gap_campaigns import answer
+from tunnel_sim.effects import effect_class
+
+FRICTION = effect_class("coulomb_friction")
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "upper"),
+    [(0.0, 0.1, 0.0055), (0.01, 0.002, 0.0101), (0.5, 1.0, 1.0), (0.002, 0.0005, 10.0)],
+)
+def test_the_distribution_within_bounds_is_that_of_scipy(value, std, upper):
+    found = truncated(value, std, 0.0, upper)
+    truth = truncnorm(-value / std, (upper - value) / std, value, std)
+    assert found.mean == pytest.approx(truth.mean(), rel=1e-6)
+    assert found.std == pytest.approx(truth.std(), rel=1e-4)
+    assert found.interval == pytest.approx(truth.interval(0.95), rel=1e-6)
+
+
+def test_an_unknown_value_is_uniform_within_its_bounds():
+    found = truncated(0.0, 1e9, 0.0, 12.0)
+    assert (found.mean, found.std) == pytest.approx((6.0, np.sqrt(12.0)))
+    assert found.interval == pytest.approx((0.3, 11.7))
+
+
+@pytest.fixture(scope="module")
+def study():
+    """A decay without a stated spring, ζ = 0.0055 in all, whose answer has an idle dry friction."""
+    settings = (Setting(16.12, 0.0), Setting(16.12, 0.0))
+    data = campaign(settings, rng=np.random.default_rng(3), noise=5e-4, duration=6.0, rate=100.0)
+    bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
+    found = nominal_study(bare, [FRICTION])
+    best = one_more(found.nominal, FRICTION)
+    return replace(found, answers=(answer((FRICTION.name,), 0.0, 1.0, best),))
+
+
+def test_the_deviation_of_the_damping_is_within_the_whole_rate(study):
+    whole = damping_ratio(study.chosen)
+    nominal = study.nominal.problem.data.model
+    assert whole == pytest.approx(
+        nominal.coefficient(study.nominal.problem.names, study.nominal.point.common, "zeta"), rel=0.1
+    )
+    given = {"zeta": Quantity(0.0, 0.1, "1"), "omega_n": Quantity(10.0, 1e-3, "rad/s")}
+    found = within_bounds(given, study)
+    assert found["omega_n"] is given["omega_n"]
+    zeta = found["zeta"]
+    assert zeta.value == 0.0
+    assert zeta.std < 0.7 * whole
+    assert 0.0 <= zeta.interval[0] < zeta.interval[1] < 1.1 * whole
+    unknown = {"zeta": Quantity(0.3 * whole, None, "1", determined=False)}
+    assert within_bounds(unknown, study)["zeta"].determined
+
+
+def test_what_the_bounds_allow_is_unchanged(study):
+    whole = damping_ratio(study.chosen)
+    for given in (
+        {"zeta": Quantity(0.5 * whole, 0.05 * whole, "1")},
+        {"zeta": Quantity(0.0, None, "1", bound="lower")},
+        {"cn_r": Quantity(-0.2, 5.0, "1/rad")},
+    ):
+        assert within_bounds(given, study) == given
+    nothing = {"zeta": Quantity(0.0, 0.1, "1")}
+    assert within_bounds(nothing, replace(study, answers=())) == nothing
