@@ -26,7 +26,7 @@ from tests.reference.effect_oracle import (
     reading,
     under_moment,
 )
-from tunnel_reference.conditions import Conditions
+from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
@@ -166,7 +166,7 @@ OWN = 1.4995 / RUN.duration
 def by_the_reference_simulator() -> dict[str, np.ndarray]:
     """The textbook's forms: their severity parameters are the effects', and so are the names of the others."""
     run = RUN
-    conditions = Conditions(
+    conditions = TrueConditions(
         np.array([run.spring]), np.array([run.speed]), np.array([run.release]), np.array([run.release]),
         oracle.DENSITY, run.duration, oracle.INERTIA, oracle.DAMPING, oracle.CN_BETA, oracle.CN_R,
         noise_std=0.0, resolution=1e-12,

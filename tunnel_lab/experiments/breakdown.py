@@ -26,7 +26,7 @@ from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_note
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import figure, styled
-from tunnel_reference.conditions import Conditions
+from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.in_phase import in_phase
@@ -94,7 +94,7 @@ class BiasCase:
     truth: dict[str, float]
 
 
-def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
+def conditions_of(seed: int, *, duration: float = 10.0) -> TrueConditions:
     """The campaign to which the effects are added.
 
     Args:
@@ -104,7 +104,7 @@ def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
     springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
     release = np.round(np.radians(degrees), 4)
     start = release * (1.0 + 0.03 * np.random.default_rng(seed).standard_normal(release.size))
-    return Conditions(
+    return TrueConditions(
         spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
         air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2),
         yaw_inertia=TRUTH["yaw_inertia"], mechanical_damping=TRUTH["mechanical_damping"],
@@ -169,7 +169,7 @@ def make_cases(
     return cases
 
 
-def draw_effect(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+def draw_effect(conditions: TrueConditions, name: str, severity: float, seed: int) -> CampaignDraw:
     """A campaign with one effect in its textbook form.
 
     Args:
