@@ -139,7 +139,7 @@ class MeasuredRuns:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class ScatterFit:
     """Scatter between runs, and the common parameters of greatest likelihood under it.
 
     Args:
@@ -247,7 +247,7 @@ def scatter_between(
     measured: MeasuredRuns,
     start: Array,
     repeatability: Repeatability | None,
-) -> Scatter | None:
+) -> ScatterFit | None:
     """The scatter between runs; None where none is stated and the runs show none beyond their noise.
 
     Args:
@@ -281,7 +281,7 @@ def scatter_between(
     found = marginal(runs, widths)
     moves = [move[:, used] * widths for move in measured.moves]
     gains, noise = _gains(measured, moves, found)
-    return Scatter(
+    return ScatterFit(
         tuple(names[place] for place in kept),
         widths,
         _uncertainty(runs, widths, prior),

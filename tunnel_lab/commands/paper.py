@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary import limits
@@ -73,7 +73,7 @@ def show_springs(springs: SpringTable, source: str) -> None:
         numbers = (f"{stiffness:g}", f"{frequency:g}", f"{square:.2f}", f"{residual:+.1f}")
         rows.append((name, *numbers, "off the line" if flag else ""))
     heads = ("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", "remark")
-    show([Table(f"Springs of {source}", heads, tuple(rows), heads[1:-1])])
+    show([TextTable(f"Springs of {source}", heads, tuple(rows), heads[1:-1])])
     if fit.inertia.value <= 0.0:
         problem = "stiffness does not rise with frequency, so this table gives no inertia: check it"
         say(problem, stderr=True)
@@ -204,5 +204,5 @@ def paper(
     with bar("paper") as progress:
         page, sections = write_paper(out, known, list(dict.fromkeys(only or known)), progress=progress)
     rows = tuple((part.title, part.theirs, part.ours, part.outcome) for part in sections.values())
-    show([Table("The paper, ours beside theirs", ("item", "paper", "here", "outcome"), rows)])
+    show([TextTable("The paper, ours beside theirs", ("item", "paper", "here", "outcome"), rows)])
     say_written(page)

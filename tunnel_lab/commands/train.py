@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tunnel_lab.terminal.inputs import SchedulerOption, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_lab.terminal.progress import bar
@@ -144,7 +144,7 @@ def train(
         for name, network in record["networks"].items()
         for number, start in enumerate(network["starts"], 1)
     )  # fmt: skip
-    show([Table(f"Trained with seed {record['seed']}", ("network", "start", *headings), rows, headings)])
+    show([TextTable(f"Trained with seed {record['seed']}", ("network", "start", *headings), rows, headings)])
     errors = record["errors"]
     say(
         f"On {record['data']['test_count']} test responses: errors of ζ up to {errors['zeta']:.1e} "

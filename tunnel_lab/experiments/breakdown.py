@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Paragraph, TextTable
 from identification.printing import significant
 from identification.scoring import score
 from tunnel_lab.experiments.answers import counted_failures, not_given
@@ -280,7 +280,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     )
 
 
-def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
+def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[TextTable]:
     """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
     mine = frame.filter(pl.col("quantity") == quantity)
     estimators = mine["estimator"].unique(maintain_order=True).to_list()
@@ -299,7 +299,7 @@ def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
             for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows()
         )
         title = f"Bias of {NAMES[quantity]} [%]"
-        tables.append(Table(title, ("effect", "×", *some), rows, right=("×", *some), names=("effect",)))
+        tables.append(TextTable(title, ("effect", "×", *some), rows, right=("×", *some), names=("effect",)))
     return tables
 
 

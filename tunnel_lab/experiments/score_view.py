@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Paragraph, TextTable
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing import concise, significant
@@ -164,7 +164,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def summary_tables(results: Results) -> list[Table]:
+def summary_tables(results: Results) -> list[TextTable]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     heads = ("RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]")
 
@@ -185,7 +185,7 @@ def _table(
     heads: tuple[str, ...],
     cells: Sequence[int],
     figures: Callable[[str, Sequence[int], str], tuple[str, ...]],
-) -> Table:
+) -> TextTable:
     """Each estimator's name and time in the first column, which has no heading, and a row for each quantity."""
     rows: list[tuple[str, ...]] = []
     groups: list[str] = []
@@ -197,7 +197,7 @@ def _table(
         rows += [(text, *[""] * len(heads)) for text in (name, time)]
         rows += [(f"  {NAMES[quantity]}", *figures(name, cells, quantity)) for quantity in given]
         groups += [name] * (2 + len(given))
-    return Table(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
+    return TextTable(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
 
 
 def score_view(results: Results, *, cells: bool = False) -> View:
@@ -253,7 +253,7 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
     )
 
 
-def cell_tables(results: Results) -> list[Table]:
+def cell_tables(results: Results) -> list[TextTable]:
     """One table for each cell: a section for each estimator, a row for each quantity."""
     heads = ("RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
 
@@ -279,7 +279,7 @@ def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
-def _worse_table(verdict: Verdict) -> Table:
+def _worse_table(verdict: Verdict) -> TextTable:
     """The findings that are worse, the most significant first."""
     rows = []
     for finding in verdict.worse[:_SHOWN_WORSE]:
@@ -291,7 +291,9 @@ def _worse_table(verdict: Verdict) -> Table:
         cells = (finding.estimator, NAMES[finding.quantity], change.aspect, before, now)
         rows.append((*cells, f"{change.p_value:.1g}", finding.where))
     right = ("before", "now", "p")
-    return Table("Worse than the baseline", ("estimator", "", "aspect", *right, "where"), tuple(rows), right)
+    return TextTable(
+        "Worse than the baseline", ("estimator", "", "aspect", *right, "where"), tuple(rows), right
+    )
 
 
 def verdict_blocks(verdict: Verdict) -> list[Block]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Paragraph, TextTable
 from identification.printing import concise, significant, unit
 from identification.scoring import Score, score
 from tunnel_lab.experiments.answers import NOT_ASKED, not_given
@@ -247,7 +247,7 @@ def _label(line: Line) -> str:
     return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
 
 
-def overall_table(lines: Iterable[Line]) -> Table:
+def overall_table(lines: Iterable[Line]) -> TextTable:
     """Bias, RMSE, coverage and failures of each estimator and quantity over the cases of `_repeating`.
 
     The title names these cases.
@@ -269,7 +269,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
         )
         for line in kept
     )
-    return Table(
+    return TextTable(
         f"All cases {pooled}{repeating}",
         ("estimator", "quantity", "trials", *heads),
         rows,
@@ -278,7 +278,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
     )
 
 
-def axis_table(lines: Sequence[Line]) -> Table:
+def axis_table(lines: Sequence[Line]) -> TextTable:
     """RMSE along one axis, a column for each quantity that has a panel in the figures."""
     label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
@@ -290,7 +290,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
         (significant(at), name, *(_figure(cells.get((at, name, quantity))) for quantity in quantities))
         for at, name in pairs
     )
-    return Table(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
+    return TextTable(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
 
 
 def _figure(quantity: Quantity | None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.examination.slips.angle_unit import AngleInDegrees
-from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
+from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
 from identification.examination.slips.between_runs import (
     InertiaOffTheSprings,
     LabelsExchanged,
@@ -77,7 +77,7 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     return campaign, remarks
 
 
-def found_in(seen: Seen) -> tuple[Remark, ...]:
+def found_in(seen: SlipEvidence) -> tuple[Remark, ...]:
     """Remarks on the statements that the measured oscillations contradict; only the refusal where there is one."""
     remarks: tuple[Remark, ...] = ()
     with np.errstate(all="ignore"):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.blocks import Block, Figure, Heading, Paragraph, Table, as_markdown
+from identification.blocks import Block, Figure, Heading, Paragraph, TextTable, as_markdown
 from tunnel_lab.experiments.view import View
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
@@ -45,7 +45,7 @@ _DARK = 0.55  # share of the colour above which white text is legible
 
 
 @dataclass(frozen=True)
-class ScoreSection(Table):
+class ScoreSection(TextTable):
     """A table with a line below it.
 
     Args:
@@ -307,7 +307,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         Heading("Confusion matrix"),
         Paragraph("True causes in rows, answers in columns; `two or more` counts any set of effects."),
         *([Figure(figures[1], "Answers in columns by true causes in rows")] if figures[1] else []),
-        Table("", ("truth", "", *numbers.values()), cells, ("", *numbers.values())),
+        TextTable("", ("truth", "", *numbers.values()), cells, ("", *numbers.values())),
         Paragraph(f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}."),
     ]
     return "\n".join(head) + "\n\n" + as_markdown(blocks)
