@@ -109,7 +109,7 @@ class AnswerWithout:
 
 
 @dataclass(frozen=True)
-class Repeatability:
+class RunScatter:
     """Repeatability of the runs under the answer.
 
     Args:

@@ -16,7 +16,7 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
@@ -36,7 +36,7 @@ TIME = np.arange(0.0, 10.0, 1.0 / RATE)
 
 
 @dataclass(frozen=True)
-class Hardening(Rig):
+class Hardening(SpringModel):
     """Springs of a stated characteristic."""
 
     further: float = HARDENING

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from tests.marks import slow
 from tests.reference.robot_joints import GEAR, robot, robot_campaign
 from tests.support.robots import TRUE, own_model
@@ -254,9 +254,9 @@ def test_a_campaign_tries_them_where_a_moment_moves_the_body() -> None:
         driven, runs=tuple(replace(run, drive=replace(run.drive, column="base_rad")) for run in driven.runs)
     )
     own = {effect_class(name) for name in NULL}
-    assert own <= set(kinds_for(driven, ALL_EFFECTS, Rig())[0])
+    assert own <= set(kinds_for(driven, ALL_EFFECTS, SpringModel())[0])
     for other in (free, by_root):
-        assert not own & set(kinds_for(other, ALL_EFFECTS, Rig())[0])
+        assert not own & set(kinds_for(other, ALL_EFFECTS, SpringModel())[0])
 
 
 def test_a_plan_whose_drive_moves_the_root_refuses_them_in_one_line() -> None:
