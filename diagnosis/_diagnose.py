@@ -19,7 +19,7 @@ from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosab
 from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
-from diagnosis.facts.repeatability import AnswerWithout, RunScatter
+from diagnosis.facts.repeatability import AnswerWithout, RunRepeatability
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
@@ -120,7 +120,7 @@ def _answered(study: Study, chosen: Chosen, joint: JointModel | None, say: Progr
 
 
 def _without_outlier(
-    study: Study, runs: RunScatter, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
+    study: Study, runs: RunRepeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
 ) -> Study | None:
     """The study without the run that deviates far beyond the others; None where these cannot be diagnosed."""
     p_value = next(one.p_value for one in runs.runs if one.id == runs.outlier)

@@ -21,7 +21,7 @@ from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.reading import UNWRITTEN, from_json_fields
 from diagnosis.facts.remainder import Closable, Remainder
-from diagnosis.facts.repeatability import RunScatter
+from diagnosis.facts.repeatability import RunRepeatability
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
@@ -279,7 +279,7 @@ class Diagnosis:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Remainder | None = None
-    repeatability: RunScatter | None = None
+    repeatability: RunRepeatability | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()

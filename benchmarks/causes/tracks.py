@@ -109,7 +109,7 @@ _ALL = {name: track for edition in EDITIONS.values() for name, track in edition.
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class TrackDraw:
     """One campaign to simulate.
 
     Args:
@@ -123,7 +123,7 @@ class Drawn:
     draw: CampaignDraw
 
 
-def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
+def draw_all(seed: int, counts: Mapping[str, int]) -> list[TrackDraw]:
     """Draw the simulated campaigns.
 
     Args:
@@ -136,7 +136,7 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
     drawn = [(track, draw) for track, count in counts.items() for draw in _track(seed, track, count)]
     of = next(edition.tracks for edition in EDITIONS.values() if set(counts) <= set(edition.tracks))
     order = np.random.default_rng([seed, len(of)]).permutation(len(drawn))
-    return [Drawn(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
+    return [TrackDraw(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
 
 
 def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:

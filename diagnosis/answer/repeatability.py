@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
 
-from diagnosis.facts.repeatability import RunRepeat, RunScatter, ScatterLimits, Spread, Trend
+from diagnosis.facts.repeatability import RunRepeat, RunRepeatability, ScatterLimits, Spread, Trend
 from diagnosis.likelihood.between_runs import ScatterColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
@@ -36,7 +36,7 @@ _PATTERN = 0.05  # relative range of a condition that makes a pattern
 _OF_TREND = 2  # numbers of a straight line
 
 
-def repeatability(fitted: Fit) -> RunScatter | None:
+def repeatability(fitted: Fit) -> RunRepeatability | None:
     """Repeatability of the runs.
 
     Args:
@@ -52,7 +52,7 @@ def repeatability(fitted: Fit) -> RunScatter | None:
     rate = fitted.settings.scatter.outlier_rate
     outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
     outlier = outliers[0].id if outliers else ""
-    return RunScatter(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
+    return RunRepeatability(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
 
 
 @dataclass(frozen=True, eq=False)

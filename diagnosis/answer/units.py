@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from diagnosis.facts.repeatability import RunScatter
+from diagnosis.facts.repeatability import RunRepeatability
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis, Hidden
@@ -108,7 +108,7 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
     )
 
 
-def own_repeatability(given: RunScatter, similarity: Similarity) -> RunScatter:
+def own_repeatability(given: RunRepeatability, similarity: Similarity) -> RunRepeatability:
     """The runs' repeatability with frequencies of the measured rig; all else is relative."""
     runs = (replace(one, frequency_hz=similarity.own(one.frequency_hz, "Hz")) for one in given.runs)
     return replace(given, runs=tuple(runs))

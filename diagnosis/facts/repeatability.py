@@ -109,7 +109,7 @@ class AnswerWithout:
 
 
 @dataclass(frozen=True)
-class RunScatter:
+class RunRepeatability:
     """Repeatability of the runs under the answer.
 
     Args:

@@ -22,7 +22,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect, known_effects
-from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -365,7 +365,7 @@ def effect_of(table: dict[str, Any]) -> type[Effect]:
     given = dict(table)
     name = str(given.pop("name"))
     parameters = {
-        own: Quantity(**{**values, "meaning": f"parameter {own}"})
+        own: ExpressionParameter(**{**values, "meaning": f"parameter {own}"})
         for own, values in given.pop("parameters").items()
     }
     return expression_effect(name, parameters=parameters, **given)

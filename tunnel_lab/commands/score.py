@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tunnel_lab.experiments.answers import Failed
     from tunnel_lab.experiments.runner import Workers
     from tunnel_lab.experiments.score import Results
-    from tunnel_lab.experiments.view import View
+    from tunnel_lab.experiments.view import ExperimentView
 
 PACKAGED = "packaged"
 """Name of the installed baseline."""
@@ -159,7 +159,7 @@ def score(
             raise typer.Exit(1)
 
 
-def _present(view: View, out: Path | None, failed: Iterable[Failed]) -> None:
+def _present(view: ExperimentView, out: Path | None, failed: Iterable[Failed]) -> None:
     """Write and print what was found."""
     written = "" if out is None else view.write(out)
     if out is not None:

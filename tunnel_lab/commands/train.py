@@ -156,7 +156,7 @@ def train(
 
 def _train_posterior(out: Path, seed: int, shards: int, steps: int, workers: Workers, restart: bool) -> None:
     """Train and write both networks of `neural_posterior`, with a record beside them."""
-    from tunnel_lab.experiments.training import TrainingSpec, train
+    from tunnel_lab.experiments.training import ShardedTraining, train
     from tunnel_sim.files.writing import write_json, write_whole
 
     refuse_unwritable_files(out, out.with_suffix(".json"))
@@ -165,7 +165,7 @@ def _train_posterior(out: Path, seed: int, shards: int, steps: int, workers: Wor
         shutil.rmtree(folder)
     with bar("training", 1) as progress:
         weights, record = train(
-            TrainingSpec(seed, shards, steps),
+            ShardedTraining(seed, shards, steps),
             folder,
             workers,
             progress=lambda what, done, all_of_it: progress(done, all_of_it, what),

@@ -19,7 +19,7 @@ from tunnel_lab.envs.menu import PRESETS, WHERE, Costs, Preset, make_menu, prese
 from tunnel_lab.envs.session import (
     LARGE,
     CampaignSession,
-    Conditions,
+    EpisodeConditions,
     Knowledge,
     answers,
     diagnostic_information,
@@ -125,7 +125,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
                 base.max_runs if max_runs is None else max_runs, "max_runs", WHERE
             )
         )
-        self.conditions = Conditions(
+        self.conditions = EpisodeConditions(
             rig=loaded,
             sensor=preset_sensor(base, noise_std, sample_rate),
             menu=make_menu(

@@ -24,7 +24,7 @@ from tunnel_lab.experiments.answers import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
-from tunnel_lab.experiments.view import View
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.plotting.style import figure, styled
 from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
@@ -263,7 +263,7 @@ def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def breakdown_view(results: pl.DataFrame) -> View:
+def breakdown_view(results: pl.DataFrame) -> ExperimentView:
     """The view of a breakdown.
 
     Args:
@@ -272,7 +272,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     frame = breakdown_frame(results)
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
     tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
-    return View(
+    return ExperimentView(
         "Bias caused by each unmodelled effect",
         [*tables, Paragraph(ABOUT), *not_given_notes(not_given(results))],
         {f"breakdown-{one.replace('_', '-')}": partial(breakdown_figure, frame, one) for one in given},

@@ -63,7 +63,7 @@ Key = tuple[str, int, str]
 
 
 @dataclass(frozen=True)
-class Unit:
+class TrialBatch:
     """Trials of one cell, from the first up to but excluding the last; trials and cells are numbered from 0."""
 
     cell: int
@@ -71,12 +71,12 @@ class Unit:
     stop: int
 
 
-def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[Unit]:
+def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[TrialBatch]:
     """Some estimators on every trial of a grid, ordered across cells, to estimate the remaining time early."""
     return Experiment(
         "score",
         [
-            Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+            TrialBatch(cell, first, min(first + UNIT_TRIALS, grid.trials))
             for first in range(0, grid.trials, UNIT_TRIALS)
             for cell in range(len(grid.cells))
         ],
@@ -90,7 +90,7 @@ def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[Unit]:
     )
 
 
-def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> Done:
+def score_unit(grid: Grid, estimators: Sequence[str], unit: TrialBatch) -> Done:
     """Every estimator on the unit's trials."""
     from tunnel_lab.experiments.score_grid import draw_trial
 

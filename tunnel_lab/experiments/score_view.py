@@ -28,7 +28,7 @@ from identification.statistics import Proportion
 from tunnel_lab.experiments.experiment import parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text
 from tunnel_lab.experiments.score import Results, groups_of
-from tunnel_lab.experiments.view import View
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 ABOUT = (
@@ -42,7 +42,7 @@ _FEW = 20
 
 
 @dataclass(frozen=True)
-class Finding:
+class AspectComparison:
     """One aspect of one estimator in the baseline and now, and whether it is significantly worse."""
 
     estimator: str
@@ -53,7 +53,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ScoreVerdict:
     """The result of a check.
 
     Args:
@@ -62,13 +62,13 @@ class Verdict:
         added: unchecked estimators, which are not in the baseline.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[AspectComparison, ...]
     false_alarm_rate: float
     identical: bool
     added: tuple[str, ...] = ()
 
     @property
-    def worse(self) -> tuple[Finding, ...]:
+    def worse(self) -> tuple[AspectComparison, ...]:
         """The worse findings, the most significant first."""
         worse = [finding for finding in self.findings if finding.worse]
         return tuple(sorted(worse, key=lambda finding: finding.change.p_value))
@@ -79,7 +79,7 @@ class Verdict:
         return not self.worse
 
 
-def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> Verdict:
+def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> ScoreVerdict:
     """Compare a score with its baseline, cell by cell and over all cells of a kind together.
 
     Args:
@@ -113,8 +113,8 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
                     every = f"all {len(cells)} {group}"
                     tested += [(name, every, quantity, change) for change in changes(old, new)]
     verdicts = holm([change.p_value for *_, change in tested], rate)
-    return Verdict(
-        findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
+    return ScoreVerdict(
+        findings=tuple(AspectComparison(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
         false_alarm_rate=rate,
         identical=_estimates(baseline, estimators).equals(_estimates(now, estimators)),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
@@ -200,7 +200,7 @@ def _table(
     return TextTable(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
 
 
-def score_view(results: Results, *, cells: bool = False) -> View:
+def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
     """The view of a score.
 
     Args:
@@ -208,7 +208,7 @@ def score_view(results: Results, *, cells: bool = False) -> View:
     """
     from tunnel_lab.experiments.score_drawing import score_figure
 
-    return View(
+    return ExperimentView(
         f"Score on the grid {results.grid.name}",
         [*summary_tables(results), *(cell_tables(results) if cells else ()), *notes_below(results)],
         {"score": partial(score_figure, results)},
@@ -279,7 +279,7 @@ def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
-def _worse_table(verdict: Verdict) -> TextTable:
+def _worse_table(verdict: ScoreVerdict) -> TextTable:
     """The findings that are worse, the most significant first."""
     rows = []
     for finding in verdict.worse[:_SHOWN_WORSE]:
@@ -296,7 +296,7 @@ def _worse_table(verdict: Verdict) -> TextTable:
     )
 
 
-def verdict_blocks(verdict: Verdict) -> list[Block]:
+def verdict_blocks(verdict: ScoreVerdict) -> list[Block]:
     """The result of a check: the worse findings, and the verdict in words."""
     rate = f"{100 * verdict.false_alarm_rate:g} %"
     tests = f"{counted(len(verdict.findings), 'test')}, false-alarm rate {rate} of all together"

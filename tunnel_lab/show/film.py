@@ -342,7 +342,7 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class DrawnAxes:
     """Two drawings of the same axes, and the positions of the samples.
 
     Args:
@@ -375,7 +375,7 @@ class Trace:
         return picture
 
 
-def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
+def draw_trace(record: Record, width: int, height: int, title: str) -> DrawnAxes:
     """Draw a record's axes once; width and height in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -396,7 +396,7 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     full = _pixels(canvas)
     places = axes.transData.transform(np.column_stack((time, angle)))
     box = axes.get_window_extent()
-    return Trace(
+    return DrawnAxes(
         faint,
         full,
         time,

@@ -302,9 +302,9 @@ def test_each_cause_in_mjcf_is_its_equation(small):
     """Moments of the compiled model at one state, against the equations of docs/reference/effects.md."""
     import mujoco
 
-    from benchmarks.causes.mjcf import _XML, BOUNDS, NOMINAL, Rig
+    from benchmarks.causes.mjcf import _XML, BOUNDS, NOMINAL, ToolboxRig
 
-    c0001 = Rig(small / CAMPAIGNS / "c0001")
+    c0001 = ToolboxRig(small / CAMPAIGNS / "c0001")
     trial = next(t for t in c0001.trials if t.speed)
     angle, rate, share = 0.2, -1.5, 0.25
     swing, inertia, omega = c0001.swing, c0001.inertia, c0001.omega
@@ -353,11 +353,11 @@ def test_each_cause_in_mjcf_is_its_equation(small):
 
 def test_the_toolbox_fits_the_nominal_model_within_the_noise(small):
     from benchmarks.causes.methods.mujoco_sysid import coefficients
-    from benchmarks.causes.mjcf import NOMINAL, Rig
+    from benchmarks.causes.mjcf import NOMINAL, ToolboxRig
 
     truths = check(small)["truths"]
     name = next(n for n, t in truths.items() if t["track"] == "none")
-    found = Rig(small / CAMPAIGNS / name)
+    found = ToolboxRig(small / CAMPAIGNS / name)
     fit = found.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(found.trials)))
     assert fit.chi2 / fit.left.size < 1.15
     for which, given in coefficients(found, fit).items():

@@ -10,7 +10,7 @@ import pytest
 from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.units import own_repeatability
-from diagnosis.facts.repeatability import RunScatter, ScatterLimits
+from diagnosis.facts.repeatability import RunRepeatability, ScatterLimits
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered
 from diagnosis.words.cautions import CAUTIONS, said
@@ -34,7 +34,7 @@ def with_speeds(errors: np.ndarray) -> Campaign:
     return replace(campaign(duration=1.0), runs=tuple(runs))
 
 
-def found(errors: np.ndarray) -> RunScatter:
+def found(errors: np.ndarray) -> RunRepeatability:
     base = nominal(with_speeds(errors))
     layered = scattered(base, ALL_EFFECTS)
     assert layered is not None

@@ -49,7 +49,10 @@ def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
     lines += ["9.0 s: predicting held-out runs"]
     assert diagnosis.progress_of(lines).tried == ""
     assert diagnosis.progress_of(lines).reached == Reached("explained share", 9.0)
-    assert diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"]) == diagnosis.Progress()
+    assert (
+        diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"])
+        == diagnosis.DiagnosisProgress()
+    )
 
 
 @pytest.mark.parametrize(("every", "sets"), [(None, 0), (0.0, 3), (1e6, 0)])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tunnel_lab.paper import page, rig
-from tunnel_lab.paper.page import Picture, Section, signed
+from tunnel_lab.paper.page import PaperSection, Picture, signed
 from tunnel_lab.paper.rig import Oscillation, eq7, eq8, known_run, printed_transfer_function
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -63,9 +63,9 @@ def test_numbers_with_signs(value: float, text: str) -> None:
     assert signed(value, 3) == text
 
 
-def section(title: str, *files: str) -> Section:
+def section(title: str, *files: str) -> PaperSection:
     pictures = tuple(Picture(file=file, caption="<b>") for file in files)
-    return Section(
+    return PaperSection(
         title=title, about="a", theirs="<1>", ours="2", outcome="reproduced", words=(), pictures=pictures
     )
 
@@ -77,16 +77,16 @@ class Parts(dict[str, page.Part]):
         super().__init__(one=self._one, two=self._two, three=self._three)
         self.called: list[str] = []
 
-    def _one(self, _: Path) -> Section:
+    def _one(self, _: Path) -> PaperSection:
         self.called.append("one")
         return section("One")
 
-    def _two(self, folder: Path) -> Section:
+    def _two(self, folder: Path) -> PaperSection:
         (folder / "b.png").write_bytes(b"x")
         self.called.append("two")
         return section("Two", "b.png")
 
-    def _three(self, _: Path) -> Section:
+    def _three(self, _: Path) -> PaperSection:
         self.called.append("three")
         if self.called.count("three") == 1:
             raise KeyboardInterrupt

@@ -14,7 +14,7 @@ from diagnosis.facts.closure import ON_RUNS
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind import page as blind
 from tunnel_lab.experiments.blind.cases import case
-from tunnel_lab.experiments.blind.score import Score, calibration
+from tunnel_lab.experiments.blind.score import BlindScore, calibration
 
 
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
@@ -51,7 +51,7 @@ def score():
         case(f"c{i}", {**TRUTH, "effects": truth}, document(said, probability=p))
         for i, (truth, said, p) in enumerate(SAID)
     )
-    return Score(cases, (), "k", "a", {}, True)
+    return BlindScore(cases, (), "k", "a", {}, True)
 
 
 def test_counts_are_those_made_by_hand(score):
@@ -106,7 +106,7 @@ def test_errors_of_coefficients_are_in_standard_deviations():
     beta, rate = one.error("cn_beta", "after"), one.error("cn_r", "before")
     assert (beta.stds, beta.share) == pytest.approx((2.5, 0.0025 / 0.45))
     assert (rate.stds, rate.share) == pytest.approx((-4.0, -0.004 / 0.12))
-    found = {(e.group, e.name, e.when): e for e in Score((one,), (), "", "", {}, False).coefficients()}
+    found = {(e.group, e.name, e.when): e for e in BlindScore((one,), (), "", "", {}, False).coefficients()}
     assert found["named rightly", "cn_beta", "after"].covered == Proportion(0, 1)
     assert found["named rightly", "cn_beta", "after"].spread == pytest.approx(2.5)
     said["coefficients"]["after"]["cn_beta"]["interval"] = [0.4499, 0.46]
@@ -156,7 +156,7 @@ def test_times_are_on_the_page_where_they_are_known(score):
     timed = tuple(
         case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
     )
-    (found,) = [s for s in blind.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
+    (found,) = [s for s in blind.sections(BlindScore(timed, (), "", "", {}, False)) if s.title == title]
     assert found.rows == (("6.0", "10.0", "11.0"),)
 
 
