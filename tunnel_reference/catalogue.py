@@ -8,9 +8,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from tunnel_reference.conditions import REFERENCE_LENGTH, Array, TrueConditions, TwistingRod
 from tunnel_reference.integrator import BoundLaw, Law, Phase
 from tunnel_reference.readings import Order, ReadingLaw, ReadingTerm
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, Array, TrueConditions, TwistingRod
 
 Extra = Mapping[str, float]
 Draw = Callable[[np.random.Generator, TrueConditions], dict[str, float]]

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.conditions import Array, TrueConditions
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 _BEYOND = 16.0  # Hz as simulated: a hum is drawn only where it appears beyond the motion's third harmonic
 _INSIDE = 2.0  # Hz below half the sample rate

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bind, Bound, Extra, Form, Group
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.integrator import BoundLaw, Params, Phase, Rows, RungeKuttaStage
 from tunnel_reference.readings import Order, ReadingTerm, SensorSignal
 from tunnel_reference.severity import size_effects
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 DISTURBANCE = "disturbance"
 """Family of the forms below."""

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tunnel_reference.between_runs import MIXED, ScatterDraw, draw_scatter
 from tunnel_reference.catalogue import Form, Group
-from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.departures import draw_departures
+from tunnel_reference.driven_inputs import draw_inputs
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
 from tunnel_reference.forms_actuators import ACTUATORS
-from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
+from tunnel_reference.scatter_draws import MIXED, ScatterDraw, draw_scatter
+from tunnel_reference.true_conditions import TrueConditions
 
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0
@@ -152,7 +152,7 @@ class Mixture:
         departures: probability that an assumption is broken, each.
         driven: whether all runs are driven, or some.
         scatter: probability that the runs differ from each other.
-        level: of these differences, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        level: of these differences, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
         normal: probability that they are normally distributed; ``rare`` is the probability of a rare other form.
     """

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.catalogue import Extra, Form, Group, calibration
-from tunnel_reference.conditions import Actuation, TrueConditions
+from tunnel_reference.true_conditions import Actuation, TrueConditions
 
 
 def _with(c: TrueConditions, **changed: Any) -> TrueConditions:

@@ -16,9 +16,9 @@ from tunnel_reference.catalogue import (
     moving,
     speed_offset,
 )
-from tunnel_reference.conditions import WIDTH, Array, TrueConditions
 from tunnel_reference.integrator import Phase
 from tunnel_reference.moments import turbulence, wandering_vortex
+from tunnel_reference.true_conditions import WIDTH, Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bind, Bound, Extra, Form, Group, calibration
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.readings import Order, Params, ReadingTerm, SensorSignal
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 _BOTH = (-1, 1)
 _LONGEST = 0.25  # s: longest lost time, for which the motion continues beyond the record

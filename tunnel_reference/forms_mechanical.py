@@ -6,8 +6,8 @@ import numpy as np
 
 from tunnel_reference import moments as m
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, calibration, flexible_rod, moving, one_spring
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.integrator import Phase
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -6,9 +6,9 @@ import numpy as np
 
 from tunnel_reference import readings as r
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, ParamMaker, reading
-from tunnel_reference.conditions import Array, TrueConditions
-from tunnel_reference.inputs import oscillator_response
+from tunnel_reference.driven_inputs import oscillator_response
 from tunnel_reference.readings import Order, Params, SensorSignal
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_reference import moments
-from tunnel_reference.conditions import REFERENCE_LENGTH, Array
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import BoundLaw
 from tunnel_reference.severity import bind_effects
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, Array
 
 Response = NDArray[np.complex128]
 

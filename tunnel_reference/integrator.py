@@ -17,8 +17,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import Array, TrueConditions
-from tunnel_reference.inputs import Inputs
+from tunnel_reference.driven_inputs import Inputs
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 Params = Mapping[str, Array]
 Places = NDArray[np.intp]

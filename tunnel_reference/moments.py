@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunnel_reference.conditions import WIDTH, Array, TrueConditions
 from tunnel_reference.integrator import Params, Rows, RungeKuttaStage
+from tunnel_reference.true_conditions import WIDTH, Array, TrueConditions
 
 # ---- friction: a law only gives the level; the integrator handles its sign and sticking
 

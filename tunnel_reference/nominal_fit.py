@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, TrueConditions
-from tunnel_reference.inputs import linear_response
+from tunnel_reference.driven_inputs import linear_response
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, TrueConditions
 
 _ITERATIONS = 12
 _TOLERANCE = 1e-6

@@ -10,10 +10,10 @@ import numpy as np
 
 from tunnel_reference import moments as m
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, moving, reading
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.integrator import Params, Phase, Rows, RungeKuttaStage
 from tunnel_reference.readings import Order, SensorSignal
 from tunnel_reference.readings import Params as ReadingParams
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 
 def stop(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:

@@ -12,8 +12,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.integrator import RodMotion
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 
 class Order(IntEnum):

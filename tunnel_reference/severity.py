@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bound
-from tunnel_reference.conditions import Array, TrueConditions
 from tunnel_reference.draw import CampaignDraw, redraw, with_defaults
 from tunnel_reference.integrator import BoundLaw, RodMotion, integrate
 from tunnel_reference.nominal_fit import fit_driven, fit_nominal
 from tunnel_reference.readings import ReadingTerm, SensorSignal, read_motion
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 PASSES = 6
 TOLERANCE = 0.1

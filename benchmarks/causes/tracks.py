@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.causes.entry import NAMES
-from tunnel_reference.between_runs import MIXED
 from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
 from tunnel_reference.make import plan_kinds
+from tunnel_reference.scatter_draws import MIXED
 
 REAL = "real"
 _ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
@@ -29,7 +29,7 @@ class Track:
         first: families that act in turn, one in every campaign; empty: all.
         about: description in a few words.
         scatter: whether the runs differ by chance.
-        level: of the scatter, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        level: of the scatter, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: share of campaigns that state their scatter.
         normal: share of campaigns with normal scatter; the others have another distribution.
     """

@@ -9,13 +9,13 @@ import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
 
 from diagnosis.facts.repeatability import RunRepeat, RunRepeatability, ScatterLimits, Spread, Trend
-from diagnosis.likelihood.between_runs import ScatterColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Scatter
 from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
-from identification.campaign.between_runs import (
+from identification.campaign.random_effects import (
     RunProducts,
     WidthPrior,
     likeliest_widths,

@@ -14,7 +14,7 @@ from diagnosis.result import Diagnosis, Hidden
 from identification.estimate import Quantity
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
-from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
+from tunnel_sim.vocabulary.dimensions import NUMBER, dimension, in_si, product
 
 
 def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:

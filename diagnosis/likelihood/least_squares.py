@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.likelihood.between_runs import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.normal_equations import Products, damped_step, normal_equations
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings

@@ -14,9 +14,9 @@ from diagnosis.model.starts import Shown, decay_squares
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.dimensions import dimension, in_si, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import dimension, in_si, product
 
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData

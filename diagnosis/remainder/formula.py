@@ -25,9 +25,9 @@ from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.dimensions import Dimension, dimension, dimension_text, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import Dimension, dimension, dimension_text, product
 
 _NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
 _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}

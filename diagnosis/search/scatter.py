@@ -13,15 +13,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from diagnosis.likelihood.between_runs import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.settings import ScatterSettings
-from identification.campaign.between_runs import WidthPrior
+from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits

@@ -33,7 +33,7 @@ from identification.printing import (
     with_std,
 )
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 _IN_BRACKETS = "root mean square (in brackets: mean square over the noise variance)"
 

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from identification.campaign.derivatives import build_design, combine, has_size, loads, wind_off
-from identification.campaign.repeatability import (
+from identification.campaign.run_scatter import (
     MeasuredRuns,
     ScatterFit,
     scatter_between,

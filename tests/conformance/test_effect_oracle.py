@@ -26,12 +26,12 @@ from tests.reference.effect_oracle import (
     reading,
     under_moment,
 )
-from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import Effect, EffectChain, effect_class, effect_from, the_effect
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model

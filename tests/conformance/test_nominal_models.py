@@ -24,11 +24,11 @@ from diagnosis.search.prepared import fit_nominal
 from tests.reference.linear_rig import response_of_a_loose_body
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
-from tunnel_sim.vocabulary.units import dimension
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.05, 3e-4, 200.0
 WEIGHT, HARDENING = 12.0, 0.8

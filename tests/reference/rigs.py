@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.conditions import TrueConditions
+from tunnel_reference.true_conditions import TrueConditions
 
 
 def rig(

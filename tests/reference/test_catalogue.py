@@ -10,13 +10,13 @@ import pytest
 from tests.reference.effect_cases import BETWEEN_RUNS, ON_DRIVEN_RUNS, VOCABULARY
 from tests.reference.rigs import rig
 from tunnel_reference.catalogue import Group
-from tunnel_reference.conditions import DrivenInput
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
 from tunnel_reference.moments import shaking, turbulence
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
+from tunnel_reference.true_conditions import DrivenInput
 
 ALL_FORMS = (*FORMS, *OUTSIDE_FORMS, *LAW_FORMS)
 

@@ -10,13 +10,13 @@ import pytest
 from tests.reference.free_decays import damped_cosine
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH
 from tunnel_reference.departures import DEPARTURES, draw_departures
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign, draw_conditions
 from tunnel_reference.forms import forms_of
 from tunnel_reference.integrator import RodMotion
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH
 
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35, 0.2, 0.35, 0.14), duration=4.0)
 

@@ -13,14 +13,14 @@ from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference import moments as m
-from tunnel_reference.conditions import DrivenInput
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
+from tunnel_reference.driven_inputs import linear_response
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, FORMS
 from tunnel_reference.forms_actuators import ACTUATORS
-from tunnel_reference.inputs import linear_response
 from tunnel_reference.integrator import BoundLaw, Phase, integrate
 from tunnel_reference.nominal_fit import fit_driven
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.true_conditions import DrivenInput
 
 PLAIN = replace(rig(duration=0.5, sample_rate=100.0), start_rate=np.array([0.4, -0.2]))
 

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from tests.reference.rigs import rig
 from tunnel_reference import moments as m
-from tunnel_reference.conditions import REFERENCE_LENGTH, TwistingRod
 from tunnel_reference.integrator import BoundLaw, Phase, integrate
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, TwistingRod
 
 
 def closed_form(c, run):

@@ -17,8 +17,8 @@ from identification.estimators import make_estimator
 from identification.estimators.output_error import OutputError
 from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.moments import turbulence
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects.random_moments import Buffeting
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -35,8 +35,8 @@ from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure

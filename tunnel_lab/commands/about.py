@@ -18,8 +18,8 @@ import typer
 from typer import Argument, Option
 
 from identification.blocks import TextTable
+from tunnel_lab.terminal.arguments import output_file
 from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import output_file
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 

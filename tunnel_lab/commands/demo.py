@@ -20,7 +20,7 @@ from identification.blocks import TextTable
 from identification.printing import Document
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity
@@ -93,7 +93,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     from identification import identify
     from tunnel_lab.bench.workspace import Session
     from tunnel_lab.report import write_report
-    from tunnel_lab.terminal.inputs import file_hashes
+    from tunnel_lab.terminal.arguments import file_hashes
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json, write_whole

@@ -14,9 +14,8 @@ from typer import Argument, Option
 
 from identification.blocks import TextTable
 from identification.printing import Document, coefficient_label, estimated, in_stds, unit_mark, with_std
-from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     LeaveOutOption,
     file_hashes,
@@ -25,10 +24,11 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
-from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis

@@ -13,7 +13,7 @@ from typer import Argument
 
 from identification.blocks import TextTable
 from identification.printing import unit_mark
-from tunnel_lab.terminal.inputs import EffectsFileOption, output_file, refuse_unwritable_files
+from tunnel_lab.terminal.arguments import EffectsFileOption, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError
 

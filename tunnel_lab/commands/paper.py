@@ -184,15 +184,15 @@ def paper(
     [bold]Exit status[/bold]
       0 written, 2 bad input, 130 interrupted (finished parts are kept).
     """
-    from tunnel_lab.paper import networks, rig
-    from tunnel_lab.paper.page import write_paper
+    from tunnel_lab.paper import networks, rig_tables
+    from tunnel_lab.paper.paper_page import write_paper
 
     known = {
-        "table-1": rig.table_1,
-        "table-2": rig.table_2,
-        "equations": rig.equations,
-        "figure-1": rig.figure_1,
-        "figure-2": rig.figure_2,
+        "table-1": rig_tables.table_1,
+        "table-2": rig_tables.table_2,
+        "equations": rig_tables.equations,
+        "figure-1": rig_tables.figure_1,
+        "figure-2": rig_tables.figure_2,
         "figure-3": networks.figure_3,
         "table-3": networks.table_3,
         "table-4": networks.table_4,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from identification.blocks import TextTable
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     ending,
     output_file,

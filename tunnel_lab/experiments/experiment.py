@@ -27,7 +27,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import polars as pl
 
 from identification.estimators import Own, own_estimators
-from tunnel_lab.experiments.answers import Failed, counted_failures
+from tunnel_lab.experiments.estimate_rows import Failed, counted_failures
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole

@@ -18,7 +18,7 @@ import polars as pl
 
 from identification.estimate import UNITS
 from identification.scoring import Trials
-from tunnel_lab.experiments.answers import (
+from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
     RAISED,
     Failed,
@@ -33,7 +33,7 @@ from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import trials_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_grid import Grid
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.kept_process import read_apart
 from tunnel_sim.files.reading import (
     as_described,

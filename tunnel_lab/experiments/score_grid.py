@@ -20,7 +20,7 @@ from pydantic import Field, TypeAdapter
 
 from identification.estimators import free_decay_estimators
 from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound, in_phase
-from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
+from tunnel_lab.terminal.arguments import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice

@@ -17,13 +17,13 @@ from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.rivals import Features, campaign_features, record_features
 from tunnel_lab.experiments.experiment import Done, Experiment, parquet
 from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
-from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS
 from tunnel_reference.integrator import BoundLaw, RodMotion, integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects, read_and_fit
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_lab.plotting.style import with_breaks
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.console import Console
 
 from identification.blocks import Block, TextTable, brief, lines
-from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
-from tunnel_lab.terminal.tables import in_columns, is_too_wide, rendered, stacked
+from tunnel_lab.terminal.arguments import TableFormat, chosen, quiet
+from tunnel_lab.terminal.table_layout import in_columns, is_too_wide, rendered, stacked
 
 
 class _Console(Console):

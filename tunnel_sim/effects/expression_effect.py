@@ -16,9 +16,9 @@ from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, pa
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.dimensions import dimension, in_si
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import dimension, in_si
 
 if TYPE_CHECKING:
     pass
@@ -40,7 +40,7 @@ class ExpressionParameter:
     """A parameter of an effect by expression.
 
     Args:
-        unit: as `tunnel_sim.vocabulary.units.dimension` reads it.
+        unit: as `tunnel_sim.vocabulary.dimensions.dimension` reads it.
         scale, lower, upper, default: a typical value, its bounds, and the value where none is given, in the unit.
     """
 

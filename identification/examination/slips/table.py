@@ -6,13 +6,6 @@ import numpy as np
 
 from identification.examination.slips.angle_unit import AngleInDegrees
 from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
-from identification.examination.slips.between_runs import (
-    InertiaOffTheSprings,
-    LabelsExchanged,
-    MotionGrows,
-    SpringOffTheLine,
-    SpringsRenumbered,
-)
 from identification.examination.slips.clock import DriftingClock
 from identification.examination.slips.coupling import CoupledSensor
 from identification.examination.slips.equal_statements import EqualStatementsDiffer
@@ -20,6 +13,13 @@ from identification.examination.slips.factors import WrongFactor
 from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
 from identification.examination.slips.odd_noise import OddNoise
 from identification.examination.slips.resolution import ResolutionTooCoarse
+from identification.examination.slips.run_comparisons import (
+    InertiaOffTheSprings,
+    LabelsExchanged,
+    MotionGrows,
+    SpringOffTheLine,
+    SpringsRenumbered,
+)
 from identification.examination.slips.run_labels import WrongLabel, WrongLabels
 from identification.examination.slips.spoilt import ClockJumps, StandingForMissing
 from identification.examination.slips.still_air import WindExchanged, WindNotSeen

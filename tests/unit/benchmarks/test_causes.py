@@ -16,10 +16,10 @@ import pytest
 from benchmarks.causes import make as making
 from benchmarks.causes.__main__ import main
 from benchmarks.causes.entry import NAMES, About, answer_all, answer_of, schema
+from benchmarks.causes.entry_score import figures, likely_sets, read_answers, score
 from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
 from benchmarks.causes.methods import METHODS
 from benchmarks.causes.page import page_text
-from benchmarks.causes.score import figures, likely_sets, read_answers, score
 from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
 from tests.reference.rigs import rig
@@ -226,7 +226,7 @@ def test_independent_causes_make_sets():
 
 
 def test_coefficients_count_within_two_standard_deviations(small):
-    from benchmarks.causes.score import as_case
+    from benchmarks.causes.entry_score import as_case
 
     truth = next(t for t in check(small)["truths"].values() if not t["effects"])
     near = {"value": truth["cn_beta"] * 1.01, "std": truth["cn_beta"] * 0.006}

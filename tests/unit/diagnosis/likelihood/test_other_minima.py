@@ -16,12 +16,12 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference.rigs import rig
-from tunnel_reference.conditions import DrivenInput, TrueConditions, TwistingRod
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import Simulated
+from tunnel_reference.true_conditions import DrivenInput, TrueConditions, TwistingRod
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.physics.run_settings import RodTwist
 

@@ -25,8 +25,8 @@ from diagnosis.settings import Settings
 from identification import identify
 from tests.support.gap_campaigns import campaign, nominal, whole_runs
 from tunnel_reference import moments
-from tunnel_reference.conditions import TrueConditions
 from tunnel_reference.integrator import BoundLaw, Phase, integrate
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -38,7 +38,7 @@ from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.units import dimension, dimension_text
+from tunnel_sim.vocabulary.dimensions import dimension, dimension_text
 
 RUNS = rig(
     stiffness=(21.02, 21.02, 45.0, 45.0, 21.02, 45.0),

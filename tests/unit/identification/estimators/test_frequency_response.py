@@ -22,10 +22,10 @@ from identification.signal.free_decay import Decay
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.conditions import DrivenInput
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import integrate
 from tunnel_reference.severity import Simulated
+from tunnel_reference.true_conditions import DrivenInput
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 

@@ -122,9 +122,9 @@ def test_the_flexible_rod_moves_as_the_reference_integrator_says():
     from dataclasses import replace
 
     from tunnel_lab.experiments.training_samples import flexible_motion
-    from tunnel_reference.conditions import TwistingRod
     from tunnel_reference.draw import draw_conditions, with_defaults
     from tunnel_reference.integrator import integrate
+    from tunnel_reference.true_conditions import TwistingRod
 
     stated = with_defaults(replace(draw_conditions(np.random.default_rng(1)), duration=0.3))
     for held in (True, False):

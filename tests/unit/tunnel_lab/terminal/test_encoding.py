@@ -13,8 +13,8 @@ import pytest
 
 from identification.blocks import TextTable
 from tunnel_lab.cli import main
-from tunnel_lab.terminal.inputs import TableFormat
-from tunnel_lab.terminal.tables import rendered
+from tunnel_lab.terminal.arguments import TableFormat
+from tunnel_lab.terminal.table_layout import rendered
 
 ROOT = Path(__file__).parents[4]
 ENCODINGS = {

@@ -14,7 +14,7 @@ from rich.console import Console
 from identification.blocks import TextTable
 from tests.support.command import Tunnel
 from tunnel_lab.terminal import progress
-from tunnel_lab.terminal.tables import is_too_wide, stacked
+from tunnel_lab.terminal.table_layout import is_too_wide, stacked
 from tunnel_sim.files.reading import inside, nearest
 
 

@@ -17,8 +17,8 @@ from tests.marks import slow
 from tests.reference.robot_joints import GEAR, robot, robot_campaign
 from tests.support.robots import TRUE, own_model
 from tests.unit.diagnosis.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, RATE, SPRING, campaign
-from tunnel_reference.conditions import Actuation as Reference
-from tunnel_reference.inputs import exerted, finer
+from tunnel_reference.driven_inputs import exerted, finer
+from tunnel_reference.true_conditions import Actuation as Reference
 from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_class, effect_from
 from tunnel_sim.engine.effect_laws import DRIVE, INTEGRATION_TOLERANCE, WIND_ON
 from tunnel_sim.engine.model import build_model

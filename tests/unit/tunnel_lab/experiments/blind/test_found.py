@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from identification.statistics import Proportion
-from tests.unit.tunnel_lab.experiments.blind.test_score import document
-from tunnel_lab.experiments.blind import page as blind
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
-from tunnel_lab.experiments.blind.page import calibration_figure, confusion_figure
-from tunnel_lab.experiments.blind.score import BlindScore, smooth_calibration
+from tunnel_lab.experiments.blind.score_page import calibration_figure, confusion_figure
+from tunnel_lab.experiments.blind.set_score import BlindScore, smooth_calibration
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.catalogue import Group
-from tunnel_reference.conditions import Array, TrueConditions
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 USUAL: Mapping[str, float] = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
 """Usual standard deviations between runs, relative."""

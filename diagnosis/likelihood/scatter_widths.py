@@ -1,7 +1,7 @@
 """Chance differences between runs in a fit: their widths, their cost and their gain in likelihood.
 
 A run's other parameters, such as its release, are projected out run by run, and the deviations of the runs
-are integrated out (`identification.campaign.between_runs`).
+are integrated out (`identification.campaign.random_effects`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from identification.campaign.between_runs import (
+from identification.campaign.random_effects import (
     Marginal,
     RunProducts,
     UsualWidths,

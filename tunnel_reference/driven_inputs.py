@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import (
+from tunnel_reference.true_conditions import (
     FRONTAL_AREA,
     REFERENCE_LENGTH,
     Actuation,

@@ -8,11 +8,11 @@ import pytest
 
 from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
-from tests.unit.tunnel_lab.experiments.blind.test_score import TRUTH, document
-from tunnel_lab.experiments.blind import page as blind
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import TRUTH, document
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
-from tunnel_lab.experiments.blind.scatter import scatter_score
-from tunnel_lab.experiments.blind.score import BlindScore
+from tunnel_lab.experiments.blind.scatter_score import scatter_score
+from tunnel_lab.experiments.blind.set_score import BlindScore
 
 SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}

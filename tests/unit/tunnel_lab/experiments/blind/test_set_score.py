@@ -12,9 +12,9 @@ from diagnosis import result
 from diagnosis.facts import closure
 from diagnosis.facts.closure import ON_RUNS
 from identification.statistics import Proportion
-from tunnel_lab.experiments.blind import page as blind
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case
-from tunnel_lab.experiments.blind.score import BlindScore, calibration
+from tunnel_lab.experiments.blind.set_score import BlindScore, calibration
 
 
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):

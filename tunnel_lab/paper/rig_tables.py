@@ -16,7 +16,7 @@ from identification.datasets import SpringRow, paper_springs
 from identification.printing import concise, with_std
 from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan
-from tunnel_lab.paper.page import PaperSection, Picture, scaled, signed
+from tunnel_lab.paper.paper_page import PaperSection, Picture, scaled, signed
 from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig

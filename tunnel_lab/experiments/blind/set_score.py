@@ -22,7 +22,7 @@ from tunnel_lab.experiments.blind.cases import (
     inclusions,
     label,
 )
-from tunnel_lab.experiments.blind.scatter import ScatterScore, scatter_score
+from tunnel_lab.experiments.blind.scatter_score import ScatterScore, scatter_score
 from tunnel_lab.experiments.blind.sets import (
     KEY,
     SEAL,

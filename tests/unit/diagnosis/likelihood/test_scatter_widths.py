@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.between_runs import ScatterColumns
-from identification.campaign.between_runs import WidthPrior
+from diagnosis.likelihood.scatter_widths import ScatterColumns
+from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.vocabulary.record import Array
 
 RUNS, SAMPLES, WIDTH = 12, 40, 3e-3
