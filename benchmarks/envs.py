@@ -23,7 +23,7 @@ from rich.table import Table
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from benchmarks.throughput import interleaved, numbers, ratio
 from tunnel_sim.engine.model import build_model
-from tunnel_sim.envs.conditions import FreeDecayConfig, plan_run
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig, plan_run
 from tunnel_sim.files.rig_file import load_rig
 
 NAME = "tunnel_sim/FreeDecay-v0"

@@ -45,8 +45,8 @@ DRAWS = 1000  # samples of each posterior
 BATCH = 100
 
 
-class Seen(NamedTuple):
-    """Features, and the reference values and units of the targets: ζ and ωn in rad/s."""
+class RecordFeatures(NamedTuple):
+    """Features of a record, and the reference values and units of the targets: ζ and ωn in rad/s."""
 
     features: Array
     values: Array
@@ -59,7 +59,7 @@ class Seen(NamedTuple):
         return self.values + self.units * np.sinh(np.clip(samples, -30.0, 30.0))
 
 
-def as_record(record: Record) -> Seen | None:
+def as_record(record: Record) -> RecordFeatures | None:
     """The reading in periods of its spectral peak, over its largest value; zeros after its end."""
     frequency = starting_frequency(record)
     if frequency is None:
@@ -70,10 +70,10 @@ def as_record(record: Record) -> Seen | None:
     counts = np.bincount(place, minlength=PERIODS * BLOCKS)
     means = np.bincount(place, yaw, PERIODS * BLOCKS) / np.maximum(counts, 1)
     omega = 2.0 * np.pi * frequency
-    return Seen(means / np.abs(means).max(), np.array([0.0, omega]), UNIT * np.array([1.0, omega]))
+    return RecordFeatures(means / np.abs(means).max(), np.array([0.0, omega]), UNIT * np.array([1.0, omega]))
 
 
-def as_windows(record: Record) -> Seen | None:
+def as_windows(record: Record) -> RecordFeatures | None:
     """Envelope and phase of each window in standard deviations, its information, and the record's length.
 
     The targets are relative to the nominal fit, in its standard deviations, as for our network.
@@ -86,7 +86,7 @@ def as_windows(record: Record) -> Seen | None:
     table = np.zeros((3, WINDOWS))
     table[:, : root.size] = np.arcsinh(root * run.logarithm), np.arcsinh(root * run.phase), np.log(root)
     length = (np.log(run.omega * run.time[-1]), run.rate * run.time[-1])
-    return Seen(np.concatenate((table.ravel(), length)), found[0].values, found[0].stds)
+    return RecordFeatures(np.concatenate((table.ravel(), length)), found[0].values, found[0].stds)
 
 
 VARIANTS = {"record": as_record, "windows": as_windows}

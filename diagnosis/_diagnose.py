@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from diagnosis.compose import Confirmed, Question, composed
 from diagnosis.diagnosable import Chosen, choose, refuse_undiagnosable, without_short
 from diagnosis.findings.other_motions import refused_limit_cycles
-from diagnosis.findings.repeatability import AnswerWithout, Repeatability
+from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.result import Diagnosis
@@ -93,7 +93,7 @@ def diagnose(
 
 
 def _without_outlier(
-    study: Study, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
+    study: Study, runs: RunRepeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
 ) -> Study | None:
     """The study without the run that deviates far beyond the others; None where these cannot be diagnosed."""
     p_value = next(one.p_value for one in runs.runs if one.id == runs.outlier)

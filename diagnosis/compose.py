@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from diagnosis.findings.coefficients import (
 )
 from diagnosis.findings.decision import Decision, Predictions, decision
 from diagnosis.findings.found import Found
-from diagnosis.findings.friction_curve import friction_curve
+from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import (
@@ -45,7 +45,7 @@ from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
-from diagnosis.findings.repeatability import AnswerWithout, Repeatability, repeatability
+from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability, repeatability
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
@@ -68,6 +68,7 @@ from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import AnswerSettings
 from diagnosis.where.described import Nowhere, PlaceFound, Where, described, nowhere
+from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
 from identification import identify
@@ -111,7 +112,7 @@ class Confirmed:
 
     study: Study
     closes: Closing
-    repeats: Repeatability | None
+    repeats: RunRepeatability | None
 
     @classmethod
     def of(cls, study: Study) -> Confirmed:
@@ -201,7 +202,7 @@ def composed(
         trade_off=None if withheld else least_separated(fitted, study.campaign),
         blind_spots=() if cycling else study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
-        maps=maps,
+        maps=maps.to_json_dict() | {"friction": as_json(_friction(study))},
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},
             "settings": study.settings.differences(),
@@ -247,8 +248,8 @@ def _unknown(weighed: Sequence[Candidate]) -> bool:
     return max(odds, key=odds.__getitem__, default="") in UNKNOWN
 
 
-def localise(study: Study, explained: float = 0.0) -> tuple[Where, dict[str, Any], PlaceFound | Nowhere]:
-    """Locate the departure of the nominal model from the runs: the place, the data of its figures, the reason.
+def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFound | Nowhere]:
+    """Locate the departure of the nominal model from the runs: the place, its maps, the reason.
 
     The place follows from the residuals alone. The causes only have to agree with it.
 
@@ -258,14 +259,13 @@ def localise(study: Study, explained: float = 0.0) -> tuple[Where, dict[str, Any
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     survey = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
-    maps, friction = survey.maps, None
+    maps = survey.maps
     if answer is not None:
-        both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
-        friction = friction_curve(answer, study.similarity) if study.causes else None
-        maps = with_answer(survey, study.campaign, *both)
-    drawn = maps.to_json_dict() | {"friction": as_json(friction)}
+        maps = with_answer(
+            survey, study.campaign, in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
+        )
     if not study.causes:
-        return Where(None, None), drawn, nowhere(survey, within_step=study.gap.test.within_step)
+        return Where(None, None), maps, nowhere(survey, within_step=study.gap.test.within_step)
     compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
     where = Where(
         channel=place.channel.value,
@@ -278,7 +278,13 @@ def localise(study: Study, explained: float = 0.0) -> tuple[Where, dict[str, Any
     )
     kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)
     said = described(where, place, kinds, study.settings, scattering=scattering, explained=explained)
-    return where, drawn, said
+    return where, maps, said
+
+
+def _friction(study: Study) -> FrictionCurve | None:
+    """The friction of the answer against the rate; None without friction."""
+    named = bool(study.causes) and study.chosen is not study.nominal
+    return friction_curve(study.chosen, study.similarity) if named else None
 
 
 def _named(

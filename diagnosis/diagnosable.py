@@ -13,9 +13,9 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.fact import Fact, as_stated
-from diagnosis.model.inputs import untried_by_inputs
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input
+from diagnosis.model.untried_effects import untried_by_inputs
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.settings import SelectionSettings
 from identification.estimate import Status

@@ -71,7 +71,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A table of texts.
 
     Args:
@@ -91,7 +91,7 @@ class Table:
     detail: tuple[str, ...] = ()
     groups: tuple[object, ...] = ()
 
-    def without_detail(self) -> Table:
+    def without_detail(self) -> TextTable:
         """The table without the columns of a page."""
         kept = [heading not in self.detail for heading in self.columns]
 
@@ -121,7 +121,7 @@ class Detail:
     title: str = ""
 
 
-Block = Heading | Paragraph | Listing | Pairs | Figure | Table | Card | Detail
+Block = Heading | Paragraph | Listing | Pairs | Figure | TextTable | Card | Detail
 
 
 @dataclass(frozen=True)
@@ -142,14 +142,14 @@ class Section:
 
 def brief(blocks: Iterable[Block]) -> tuple[Block, ...]:
     """Blocks without figures, details and empty blocks."""
-    shown = (one.without_detail() if isinstance(one, Table) else one for one in blocks)
+    shown = (one.without_detail() if isinstance(one, TextTable) else one for one in blocks)
     return tuple(one for one in shown if not isinstance(one, Figure | Detail | Card) and _filled(one))
 
 
 def _filled(block: Block) -> bool:
     """Whether a block has anything to show."""
     match block:
-        case Table() | Pairs():
+        case TextTable() | Pairs():
             return bool(block.rows)
         case Listing():
             return bool(block.items)
@@ -187,12 +187,12 @@ def lines(block: Block) -> list[str]:
 
 
 def _text(block: Block) -> str:
-    if isinstance(block, Table):
+    if isinstance(block, TextTable):
         return f"\n{_text_table(block)}\n"
     return "\n".join(textwrap.fill(line, WIDTH) for line in lines(block))
 
 
-def _text_table(table: Table) -> str:
+def _text_table(table: TextTable) -> str:
     """A table in columns of a fixed width, with a rule below the headings."""
     widths = [
         max(len(line) for cell in column for line in cell.split("\n"))
@@ -227,7 +227,7 @@ def _markdown(block: Block) -> str:
             return f"## {_unmarked(block.text)}"
         case Figure():
             return f"![{_unmarked(block.caption)}]({block.name})"
-        case Table():
+        case TextTable():
             ends = ["---:" if heading in block.right else "---" for heading in block.columns]
             heads, *rows = ([_cell_text(cell) for cell in row] for row in (block.columns, *block.rows))
             title = f"**{_unmarked(block.title)}**\n\n" if block.title else ""
@@ -301,7 +301,7 @@ def _html(block: Block, drawn: Mapping[str, str], titled: bool) -> str:
             figure = f'<figure data-figure="{escape(block.name)}">{drawn.get(block.name)}'
             caption = f"<figcaption>{_words(block.caption)}</figcaption></figure>"
             return figure + caption if block.name in drawn else ""
-        case Table():
+        case TextTable():
             return _html_table(block)
         case Card():
             return (
@@ -313,7 +313,7 @@ def _html(block: Block, drawn: Mapping[str, str], titled: bool) -> str:
             return fold if block.title else shown
 
 
-def _html_table(table: Table) -> str:
+def _html_table(table: TextTable) -> str:
     """Each cell has its heading, for narrow pages that stack the cells of a row."""
     numeric = [' class="n"' if heading in table.right else "" for heading in table.columns]
     named = [heading in table.names for heading in table.columns]

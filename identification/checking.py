@@ -16,10 +16,10 @@ from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate,
 from identification.estimators import SUMMARIES, Estimator, make_estimator, takes_driven
 from identification.returned import CAMPAIGN_UNITS, RUN_UNITS, checked_return
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, own_traceback, raised_line
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from typing import Any

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Paragraph, TextTable
 from identification.status import SYSTEMATIC, Remark, Status
 from tunnel_sim.vocabulary.errors import counted
 
@@ -365,7 +365,7 @@ def estimate_brief(document: Document) -> str:
     )
 
 
-def coefficients_table(document: Document) -> Table:
+def coefficients_table(document: Document) -> TextTable:
     """The coefficients of the campaign that could be identified; no rows where there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
@@ -374,10 +374,10 @@ def coefficients_table(document: Document) -> Table:
         if document[name] is not None
     )
     title = f"{document['campaign']} by {document['estimator']}"
-    return Table(title, ("quantity", "estimate ± std"), rows)
+    return TextTable(title, ("quantity", "estimate ± std"), rows)
 
 
-def runs_table(document: Document, conditions: Conditions | None = None) -> Table:
+def runs_table(document: Document, conditions: Conditions | None = None) -> TextTable:
     """Natural frequency and damping ratio of the runs: of all, with their conditions, or of `SHOWN_RUNS`."""
     runs = document["runs"][: None if conditions else SHOWN_RUNS]
     stated = ("Kr\n[N m/rad]", "V\n[m/s]") if conditions else ()
@@ -391,7 +391,7 @@ def runs_table(document: Document, conditions: Conditions | None = None) -> Tabl
         )
         for run in runs
     )
-    return Table(
+    return TextTable(
         f"Runs of {document['campaign']}",
         ("run", *stated, "ωn\n[rad/s]", "ζ\n[1]", "status"),
         rows,
@@ -403,7 +403,7 @@ def _stated(spring: float | None, wind: float) -> tuple[str, str]:
     return "not stated" if spring is None else f"{spring:g}", f"{wind:g}"
 
 
-def windows_table(run: Document) -> Table:
+def windows_table(run: Document) -> TextTable:
     """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
     cycles = run["windows"][0]["cycles"] if run["windows"] else 0
     rows = tuple(
@@ -415,7 +415,7 @@ def windows_table(run: Document) -> Table:
         for window in run["windows"]
     )
     heads = ("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]")
-    return Table(f"{run['id']}: windows of {counted(cycles, 'cycle')}", heads, rows, right=heads[:2])
+    return TextTable(f"{run['id']}: windows of {counted(cycles, 'cycle')}", heads, rows, right=heads[:2])
 
 
 def budget_blocks(document: Document) -> tuple[Block, ...]:
@@ -434,7 +434,7 @@ def budget_blocks(document: Document) -> tuple[Block, ...]:
     rows.append(("all together", *(significant(combined[name], 2) for name in names)))
     title = "Uncertainty budget: one standard uncertainty each"
     return (
-        Table(title, ("source", *headings), tuple(rows), right=headings),
+        TextTable(title, ("source", *headings), tuple(rows), right=headings),
         *(Paragraph(_dominant(components, name)) for name in names),
         *(Paragraph(f"{part['name']}: {part['note']}") for part in components if part["note"]),
     )

@@ -8,14 +8,14 @@ from enum import StrEnum
 
 import numpy as np
 
-from tunnel_reference.conditions import REFERENCE_LENGTH, Array, Conditions, Rod
-from tunnel_reference.integrator import Law, Phase, Term
+from tunnel_reference.integrator import BoundLaw, Law, Phase
 from tunnel_reference.readings import Order, ReadingLaw, ReadingTerm
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, Array, TrueConditions, TwistingRod
 
 Extra = Mapping[str, float]
-Draw = Callable[[np.random.Generator, Conditions], dict[str, float]]
-Bound = Term | ReadingTerm
-Bind = Callable[[float, Extra, Conditions], tuple[Conditions, Bound | None]]
+Draw = Callable[[np.random.Generator, TrueConditions], dict[str, float]]
+Bound = BoundLaw | ReadingTerm
+Bind = Callable[[float, Extra, TrueConditions], tuple[TrueConditions, Bound | None]]
 
 
 class Group(StrEnum):
@@ -26,7 +26,7 @@ class Group(StrEnum):
     RARE = "rare"  # not in tuning sets
 
 
-def nothing(_rng: np.random.Generator, _conditions: Conditions) -> dict[str, float]:
+def nothing(_rng: np.random.Generator, _conditions: TrueConditions) -> dict[str, float]:
     """No secondary parameters."""
     return {}
 
@@ -58,15 +58,15 @@ class Form:
     driven: bool = False
 
 
-def spread(value: float | Array, conditions: Conditions) -> Array:
+def spread(value: float | Array, conditions: TrueConditions) -> Array:
     """A parameter as one value per run."""
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (conditions.runs,)).copy()
 
 
-ParamMaker = Callable[[float, Extra, Conditions], dict[str, float | Array]]
+ParamMaker = Callable[[float, Extra, TrueConditions], dict[str, float | Array]]
 
 
-def _spread_all(values: dict[str, float | Array], c: Conditions) -> dict[str, Array]:
+def _spread_all(values: dict[str, float | Array], c: TrueConditions) -> dict[str, Array]:
     """All parameters, with the runs as first axis."""
     return {k: v if isinstance(v, np.ndarray) and v.ndim == 2 else spread(v, c) for k, v in values.items()}
 
@@ -80,11 +80,11 @@ def moving(law: Law, phase: Phase, make: ParamMaker, *, states: int = 0, at_rele
         at_release: whether the states start at the release angle; otherwise at zero.
     """
 
-    def bind(p: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+    def bind(p: float, extra: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
         memory = None
         if states:
             memory = np.tile(c.start_angle, (states, 1)) if at_release else np.zeros((states, c.runs))
-        return c, Term(law, phase, _spread_all(make(p, extra, c), c), memory)
+        return c, BoundLaw(law, phase, _spread_all(make(p, extra, c), c), memory)
 
     return bind
 
@@ -92,41 +92,41 @@ def moving(law: Law, phase: Phase, make: ParamMaker, *, states: int = 0, at_rele
 def reading(law: ReadingLaw, order: Order, make: ParamMaker) -> Bind:
     """Bind a law of the sensor."""
 
-    def bind(p: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+    def bind(p: float, extra: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
         return c, ReadingTerm(law, order, _spread_all(make(p, extra, c), c))
 
     return bind
 
 
-def calibration(change: Callable[[float, Extra, Conditions], Conditions]) -> Bind:
+def calibration(change: Callable[[float, Extra, TrueConditions], TrueConditions]) -> Bind:
     """Bind an effect that only changes the conditions."""
 
-    def bind(p: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+    def bind(p: float, extra: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
         return change(p, extra, c), None
 
     return bind
 
 
-def one_spring(p: float, extra: Extra, c: Conditions) -> Conditions:
+def one_spring(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
     """One spring (1 + x) times as stiff as stated."""
     springs = np.unique(c.spring_stiffness)
     chosen = springs[int(extra["spring"]) % springs.size]
     return replace(c, stiffness_scale=np.where(c.spring_stiffness == chosen, 1.0 + p, 1.0))
 
 
-def speed_offset(p: float, extra: Extra, c: Conditions) -> Conditions:
+def speed_offset(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
     """True speed V + ΔV (20/V)^n where the wind is on."""
     ratio = 20.0 / np.where(c.wind_on, c.wind_speed, 20.0)
     return replace(c, speed_offset=p * ratio ** extra["exponent"])
 
 
-def flexible_rod(p: float, extra: Extra, c: Conditions) -> Conditions:
+def flexible_rod(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
     """A rod of compliance p."""
-    rod = Rod(p, extra["share"], extra["damping_ratio"], extra["hardening"], extra["held_body"] > 0.5)
+    rod = TwistingRod(p, extra["share"], extra["damping_ratio"], extra["hardening"], extra["held_body"] > 0.5)
     return replace(c, rod=rod)
 
 
-def lag_time(p: float, c: Conditions) -> Array:
+def lag_time(p: float, c: TrueConditions) -> Array:
     """τ = p l/V at the true speed; 1 s where the wind is off (Ka is zero there)."""
     return np.where(c.wind_on, p * REFERENCE_LENGTH / np.where(c.wind_on, c.true_speed, 1.0), 1.0)
 

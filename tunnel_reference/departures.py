@@ -12,23 +12,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 _BEYOND = 16.0  # Hz as simulated: a hum is drawn only where it appears beyond the motion's third harmonic
 _INSIDE = 2.0  # Hz below half the sample rate
 _MAINS = (50.0, 60.0)
 
-Change = Callable[[np.random.Generator, Conditions], Conditions]
+Change = Callable[[np.random.Generator, TrueConditions], TrueConditions]
 
 
 def draw_departures(
     rng: np.random.Generator,
-    conditions: Conditions,
+    conditions: TrueConditions,
     *,
     probability: float = 0.0,
     certain: Collection[str] = (),
     mains: bool = False,
-) -> Conditions:
+) -> TrueConditions:
     """Break each assumption with the same probability, independently of the others.
 
     Args:
@@ -50,7 +50,7 @@ def draw_departures(
     return found
 
 
-def _shows_mains(c: Conditions) -> bool:
+def _shows_mains(c: TrueConditions) -> bool:
     """Whether every run shows both mains frequencies apart from its motion."""
     for rate in np.unique(c.sample_rate / c.every):
         for mains in np.array(_MAINS) * c.time_scale:
@@ -67,14 +67,14 @@ def _log_uniform(
     return np.asarray(np.exp(rng.uniform(np.log(low), np.log(high), size)))
 
 
-def _sample_rate(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _sample_rate(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """A rate other than 1000 Hz, which aliases the mains where it is below 120 Hz."""
     if c.drive is not None:  # its input is already sampled
         return c
     return replace(c, sample_rate=float(np.round(_log_uniform(rng, 80.0, 800.0))))
 
 
-def _rates_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _rates_differ(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The logger keeps every sample of one run and one of up to four of another."""
     if c.drive is not None:  # thinning would change the input
         return c
@@ -82,19 +82,19 @@ def _rates_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
     return replace(c, every=rng.integers(1, most + 1, c.runs))
 
 
-def _durations_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _durations_differ(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Between half of the duration and all of it."""
     return replace(c, kept=rng.uniform(0.5, 1.0, c.runs))
 
 
-def _records_are_short(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _records_are_short(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Few cycles: about five to fifteen."""
     if c.drive is not None:  # its input is already drawn for the duration
         return c
     return replace(c, duration=float(np.round(rng.uniform(2.5, 4.0), 2)))
 
 
-def _samples_missing(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _samples_missing(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """One to three gaps of up to a fiftieth of the record, which the time stamps show."""
     if c.drive is not None:  # a gap would change the input
         return c
@@ -102,40 +102,40 @@ def _samples_missing(rng: np.random.Generator, c: Conditions) -> Conditions:
     return replace(c, gaps=np.stack([start, start + rng.uniform(0.002, 0.02, start.size)], axis=1))
 
 
-def _times_start_anywhere(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _times_start_anywhere(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Time stamps count from the logger's start, not from the release."""
     return replace(c, time_start=np.round(rng.uniform(-50.0, 5000.0, c.runs), 3))
 
 
-def _both_sides(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _both_sides(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Released from either side."""
     side = np.where(rng.permutation(c.runs) < c.runs // 2, -1.0, 1.0)
     return replace(c, release_angle=c.release_angle * side, start_angle=c.start_angle * side)
 
 
-def _releases_are_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _releases_are_other(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """From a fifth of the standard releases to twice as far."""
     factor = float(_log_uniform(rng, 0.2, 2.0))
     return replace(c, release_angle=np.round(c.release_angle * factor, 4), start_angle=c.start_angle * factor)
 
 
-def _starts_with_a_rate(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _starts_with_a_rate(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The record starts after the release, with up to a fifth of the rate of a passage through the middle."""
     rate = c.wind_off_omega * np.abs(c.start_angle) * rng.uniform(-0.2, 0.2, c.runs)
     return replace(c, start_rate=rate)
 
 
-def _densities_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _densities_differ(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Runs on different days and at different altitudes: each states its own density."""
     return replace(c, air_density=np.round(rng.uniform(0.95, 1.3, c.runs), 4))
 
 
-def _speeds_unpaired(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _speeds_unpaired(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """No two runs have the same wind speed."""
     return replace(c, wind_speed=np.round(c.wind_speed * rng.uniform(0.8, 1.1, c.runs), 2))
 
 
-def _other_springs(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _other_springs(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Springs outside the table, at least a tenth apart."""
     springs = np.unique(c.spring_stiffness)
     drawn = np.zeros(springs.size)
@@ -144,44 +144,44 @@ def _other_springs(rng: np.random.Generator, c: Conditions) -> Conditions:
     return replace(c, spring_stiffness=drawn[np.searchsorted(springs, c.spring_stiffness)])
 
 
-def _noise_differs(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _noise_differs(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """A run's noise is up to twice or half the campaign's, which is then not stated."""
     return replace(c, noise_scale=_log_uniform(rng, 0.5, 2.0, c.runs), stated_noise=None)
 
 
-def _noise_has_tails(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _noise_has_tails(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Noise of Student's t, not normal."""
     return replace(c, noise_tails=float(rng.integers(5, 13)))
 
 
-def _zeros_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _zeros_differ(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Every run rests at its own zero, which the campaign states."""
     return replace(c, zero_shift=0.004 * rng.standard_normal(c.runs))
 
 
-def _rests_anywhere(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _rests_anywhere(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The reading at rest is any angle of a turn, as from an encoder without an index."""
     return replace(c, offset=float(np.round(rng.uniform(-np.pi, np.pi), 4)))
 
 
-def _sensor_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _sensor_is_other(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """Noise above or below the standard, and steps from a twentieth of it to three times as wide."""
     noise = float(_log_uniform(rng, 3e-5, 2e-3))
     resolution = noise * float(_log_uniform(rng, 0.05, 3.0))
     return replace(c, noise_std=noise, resolution=resolution, stated_noise=None)
 
 
-def _inertia_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _inertia_is_other(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The true inertia is far from the stated one."""
     return replace(c, yaw_inertia=float(rng.uniform(0.06, 0.2)))
 
 
-def _air_restores(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _air_restores(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The air restores the yaw angle (Cnβ < 0), and damps little or feeds a little in."""
     return replace(c, cn_beta=float(-rng.uniform(0.05, 0.5)), cn_r=float(rng.uniform(-0.3, 0.01)))
 
 
-def _damping_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _damping_is_other(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """From a fiftieth of a per cent of the critical damping to two per cent or so."""
     return replace(c, mechanical_damping=float(_log_uniform(rng, 5e-4, 0.06)))
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bind, Bound, Extra, Form, Group
-from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
-from tunnel_reference.integrator import Params, Phase, Rows, Stage, Term
-from tunnel_reference.readings import Order, Reading, ReadingTerm
+from tunnel_reference.integrator import BoundLaw, Params, Phase, Rows, RungeKuttaStage
+from tunnel_reference.readings import Order, ReadingTerm, SensorSignal
 from tunnel_reference.severity import size_effects
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 DISTURBANCE = "disturbance"
 """Family of the forms below."""
@@ -27,17 +27,17 @@ def _half_sine(time: float | Array, at: Array, length: Array) -> Array:
     return np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * np.clip(since, 0.0, 1.0)), 0.0)
 
 
-def pushed(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def pushed(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """M sin(π (t − t0)/d) for t0 < t < t0 + d, in one run."""
     s.top[rows] += p["size"] * _half_sine(s.time, p["at"], p["length"])
 
 
-def bumped(r: Reading, p: Params) -> Array:
+def bumped(r: SensorSignal, p: Params) -> Array:
     """The reading with a half sine added in one run."""
     return r.value + p["size"] * _half_sine(r.conditions.time[: len(r.value), None], p["at"], p["length"])
 
 
-def _in_one_run(size: float, extra: Extra, c: Conditions) -> dict[str, Array]:
+def _in_one_run(size: float, extra: Extra, c: TrueConditions) -> dict[str, Array]:
     hit = np.arange(c.runs) == int(extra["run"])
     return {
         "size": np.where(hit, size, 0.0),
@@ -46,11 +46,11 @@ def _in_one_run(size: float, extra: Extra, c: Conditions) -> dict[str, Array]:
     }
 
 
-def _moment(size: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
-    return c, Term(pushed, Phase.MOMENT, _in_one_run(size, extra, c))
+def _moment(size: float, extra: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
+    return c, BoundLaw(pushed, Phase.MOMENT, _in_one_run(size, extra, c))
 
 
-def _reading(size: float, extra: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+def _reading(size: float, extra: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
     return c, ReadingTerm(bumped, Order.ADDED, _in_one_run(size, extra, c))
 
 
@@ -81,7 +81,7 @@ def with_disturbances(draws: Sequence[CampaignDraw], rng: np.random.Generator) -
     ]
 
 
-def _draw(rng: np.random.Generator, c: Conditions) -> EffectDraw:
+def _draw(rng: np.random.Generator, c: TrueConditions) -> EffectDraw:
     form, length = FORMS[str(rng.choice(np.array(list(FORMS))))]
     target = float(np.exp(rng.uniform(*np.log(_EXCESS))))
     run = int(rng.integers(c.runs))

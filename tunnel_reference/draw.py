@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tunnel_reference.between_runs import MIXED, ScatterDraw, draw_scatter
 from tunnel_reference.catalogue import Form, Group
-from tunnel_reference.conditions import Conditions
 from tunnel_reference.departures import draw_departures
+from tunnel_reference.driven_inputs import draw_inputs
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
 from tunnel_reference.forms_actuators import ACTUATORS
-from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
+from tunnel_reference.scatter_draws import MIXED, ScatterDraw, draw_scatter
+from tunnel_reference.true_conditions import TrueConditions
 
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0
@@ -26,12 +26,12 @@ CIRCUMSTANCES = ("few_runs", "coloured", "uneven_stamps", "scaled")
 
 def draw_circumstances(
     rng: np.random.Generator,
-    conditions: Conditions,
+    conditions: TrueConditions,
     *,
     probability: float,
     mains: bool = False,
     certain: Collection[str] = (),
-) -> Conditions:
+) -> TrueConditions:
     """Change each circumstance with the same probability, independently of the others.
 
     Args:
@@ -73,7 +73,7 @@ def draw_circumstances(
     return replace(found, time_scale=time, moment_scale=moment)
 
 
-def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
+def _few_runs(rng: np.random.Generator, c: TrueConditions) -> TrueConditions:
     """The runs of one or two springs, in still air and at one speed."""
     springs, speeds = np.unique(c.spring_stiffness), np.unique(c.wind_speed[c.wind_on])
     number = min(int(rng.integers(1, 3)), springs.size)
@@ -131,7 +131,7 @@ class CampaignDraw:
     """
 
     kind: str
-    conditions: Conditions
+    conditions: TrueConditions
     effects: tuple[EffectDraw, ...]
     seed: int
     mixture: Mixture = field(default_factory=lambda: Mixture())
@@ -152,7 +152,7 @@ class Mixture:
         departures: probability that an assumption is broken, each.
         driven: whether all runs are driven, or some.
         scatter: probability that the runs differ from each other.
-        level: of these differences, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        level: of these differences, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
         normal: probability that they are normally distributed; ``rare`` is the probability of a rare other form.
     """
@@ -253,7 +253,7 @@ def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> 
 
 
 def _draw_effect(
-    rng: np.random.Generator, form: Form, conditions: Conditions, *, small: bool = False
+    rng: np.random.Generator, form: Form, conditions: TrueConditions, *, small: bool = False
 ) -> EffectDraw:
     """Draws secondary parameters, sign and target excess: 1 to 10, in a fifth of the cases 10 to 100."""
     top = (10.0, 100.0) if rng.random() < _STRONG_SHARE else (1.0, 10.0)
@@ -264,7 +264,7 @@ def _draw_effect(
     return EffectDraw(form, extra, sign, target, form.start, small)
 
 
-def draw_conditions(rng: np.random.Generator) -> Conditions:
+def draw_conditions(rng: np.random.Generator) -> TrueConditions:
     """Draws springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, otherwise another plan."""
     if rng.random() < 0.8:  # three springs at three speeds from 20°, two small releases, one medium release
         low = float(rng.choice([16.12, 21.02]))
@@ -287,7 +287,7 @@ def draw_conditions(rng: np.random.Generator) -> Conditions:
     duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
     noise = float(rng.uniform(3e-4, 6e-4))
     start = release * (1.0 + 0.03 * rng.standard_normal(release.size))
-    return Conditions(
+    return TrueConditions(
         spring_stiffness=stiffness,
         wind_speed=speed,
         release_angle=release,
@@ -304,7 +304,7 @@ def draw_conditions(rng: np.random.Generator) -> Conditions:
     )
 
 
-def with_defaults(conditions: Conditions) -> Conditions:
+def with_defaults(conditions: TrueConditions) -> TrueConditions:
     """The conditions with calibration errors as arrays of shape (runs,)."""
     n = conditions.runs
     return replace(

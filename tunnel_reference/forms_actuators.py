@@ -8,37 +8,37 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.catalogue import Extra, Form, Group, calibration
-from tunnel_reference.conditions import Actuator, Conditions
+from tunnel_reference.true_conditions import Actuation, TrueConditions
 
 
-def _with(c: Conditions, **changed: Any) -> Conditions:
+def _with(c: TrueConditions, **changed: Any) -> TrueConditions:
     """The conditions with an actuator, added to earlier changes of it."""
     assert c.drive is not None
-    return replace(c, drive=replace(c.drive, actuator=replace(c.drive.actuator or Actuator(), **changed)))
+    return replace(c, drive=replace(c.drive, actuator=replace(c.drive.actuator or Actuation(), **changed)))
 
 
-def _lag(p: float, _e: Extra, c: Conditions) -> Conditions:
+def _lag(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
     return _with(c, lags=(p,))
 
 
-def _two_lags(p: float, _e: Extra, c: Conditions) -> Conditions:
+def _two_lags(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
     """Two equal lags in a row: at low frequencies the same delay as one of p."""
     return _with(c, lags=(0.5 * p, 0.5 * p))
 
 
-def _limit(p: float, _e: Extra, c: Conditions) -> Conditions:
+def _limit(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
     """M = (1 − p) times the greatest demanded moment."""
     assert c.drive is not None
     return _with(c, limit=(1.0 - p) * c.drive.greatest)
 
 
-def _soft_limit(p: float, _e: Extra, c: Conditions) -> Conditions:
+def _soft_limit(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
     """The demanded moment m becomes M tanh(m/M), where M is the greatest demand over p."""
     assert c.drive is not None
     return _with(c, limit=c.drive.greatest / p, soft=True)
 
 
-def _rate(p: float, _e: Extra, c: Conditions) -> Conditions:
+def _rate(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
     """R is the root mean square of the demanded moment over p."""
     assert c.drive is not None
     moment = c.drive.gain * c.drive.values[:, c.drive.driven]

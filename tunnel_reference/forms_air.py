@@ -16,9 +16,9 @@ from tunnel_reference.catalogue import (
     moving,
     speed_offset,
 )
-from tunnel_reference.conditions import WIDTH, Array, Conditions
 from tunnel_reference.integrator import Phase
 from tunnel_reference.moments import turbulence, wandering_vortex
+from tunnel_reference.true_conditions import WIDTH, Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)
@@ -45,7 +45,7 @@ _MOMENT = (
 )  # fmt: skip
 
 
-def _wagner(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _wagner(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """Two time constants, p l/V and ``ratio`` times p l/V, with their weights."""
     return {"w1": e["w1"], "w2": 1.0 - e["w1"], "tau1": lag_time(p, c), "tau2": lag_time(p * e["ratio"], c)}
 
@@ -88,7 +88,7 @@ _SPEED = (
 def _turbulent(kind: str) -> ParamMaker:
     """A random moment of one kind of spectrum."""
 
-    def make(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    def make(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
         series = turbulence(kind, c, seed=int(e["seed"]), scale=e["scale"])
         return {"table": p * c.reference_moment[:, None] * series}
 
@@ -100,7 +100,7 @@ def _seeded(low: float, high: float) -> Draw:
     return lambda g, _c: {"seed": float(g.integers(0, 2**31)), "scale": g.uniform(low, high)}
 
 
-def _vortex(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _vortex(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """A line at St V/width, with a phase drawn per run."""
     phase = np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
     return {
@@ -111,7 +111,7 @@ def _vortex(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
     }
 
 
-def _wander(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _wander(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """A line whose phase is a random walk."""
     wave = wandering_vortex(c, seed=int(e["seed"]), strouhal=e["strouhal"], wander=e["wander"])
     return {"table": p * c.reference_moment[:, None] * wave}
@@ -120,7 +120,7 @@ def _wander(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
 def _strouhal(second: bool, wander: bool) -> Draw:
     """Strouhal number, seed, and the parameters of the form."""
 
-    def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
+    def draw(g: np.random.Generator, _c: TrueConditions) -> dict[str, float]:
         return {"seed": float(g.integers(0, 2**31)), "strouhal": float(g.uniform(0.1, 0.22)),
                 "second": float(g.uniform(0.15, 0.4)) if second else 0.0,
                 "wander": float(g.uniform(0.1, 0.8)) if wander else 0.0}  # fmt: skip

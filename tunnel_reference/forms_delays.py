@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bind, Bound, Extra, Form, Group, calibration
-from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.readings import Order, Params, Reading, ReadingTerm
+from tunnel_reference.readings import Order, Params, ReadingTerm, SensorSignal
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 _BOTH = (-1, 1)
 _LONGEST = 0.25  # s: longest lost time, for which the motion continues beyond the record
 
 
-def missing(r: Reading, p: Params) -> Array:
+def missing(r: SensorSignal, p: Params) -> Array:
     """Removes a whole number of samples at every instant and closes the gap; padding at the end is cut later."""
     out = r.value.copy()
     count = np.round(p["lost"] * r.conditions.sample_rate).astype(int)
@@ -30,7 +30,7 @@ def missing(r: Reading, p: Params) -> Array:
 def _lost(instants: int) -> Bind:
     """Lost time, distributed over instants drawn for every run; the input is lost with the reading, or complete."""
 
-    def bind(p: float, e: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
+    def bind(p: float, e: Extra, c: TrueConditions) -> tuple[TrueConditions, Bound | None]:
         shares = np.full((c.runs, instants), e.get("own", 0.0))
         if "seed" in e:
             shares = np.random.default_rng(int(e["seed"])).uniform(0.1, 0.9, (c.runs, instants))
@@ -45,14 +45,14 @@ def _lost(instants: int) -> Bind:
     return bind
 
 
-def _drawn(g: np.random.Generator, c: Conditions) -> dict[str, float]:
+def _drawn(g: np.random.Generator, c: TrueConditions) -> dict[str, float]:
     """A seed, the stated duration, and for driven runs whether the input is lost too."""
     seed = int(g.integers(0, 2**31))
     drawn = {"seed": float(seed), "duration": c.duration}
     return drawn if c.drive is None else {**drawn, "input_lost": float(seed % 2)}
 
 
-def _later(p: float, e: Extra, c: Conditions) -> Conditions:
+def _later(p: float, e: Extra, c: TrueConditions) -> TrueConditions:
     """The input acts later by p, varied from run to run by up to the share ``spread``."""
     assert c.drive is not None
     own = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs)

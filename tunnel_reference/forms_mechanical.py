@@ -6,15 +6,15 @@ import numpy as np
 
 from tunnel_reference import moments as m
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, calibration, flexible_rod, moving, one_spring
-from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.integrator import Phase
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)
 _ELEMENTS = np.geomspace(1.0 / (2 * np.pi * 200.0), 1.0 / (2 * np.pi * 0.05), 12)
 
 
-def _maxwell(p: float, _e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _maxwell(p: float, _e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """Moduli (2ηKr/π) Δln τ, and their elastic part at ωn."""
     modulus = 2.0 * p * c.true_stiffness / np.pi * np.log(_ELEMENTS[1] / _ELEMENTS[0])
     square = (c.wind_off_omega[:, None] * _ELEMENTS) ** 2
@@ -114,7 +114,7 @@ _SPRING = (
 def _rod_draw(low: float, high: float, held: float, damping: float) -> Draw:
     """Inertia share of the upper end, damping of the twist, and the end held until the release."""
 
-    def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
+    def draw(g: np.random.Generator, _c: TrueConditions) -> dict[str, float]:
         return {"share": float(g.uniform(low, high)), "damping_ratio": float(g.uniform(0.2, 1.0)) * damping,
                 "hardening": 0.0, "held_body": held}  # fmt: skip
 

@@ -6,15 +6,15 @@ import numpy as np
 
 from tunnel_reference import readings as r
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, ParamMaker, reading
-from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.inputs import oscillator_response
-from tunnel_reference.readings import Order, Params, Reading
+from tunnel_reference.driven_inputs import oscillator_response
+from tunnel_reference.readings import Order, Params, SensorSignal
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)
 
 
-def ringing(r: Reading, p: Params) -> Array:
+def ringing(r: SensorSignal, p: Params) -> Array:
     """Adds the real part of a e^((i − ζ) ω t + i φ), and the oscillation excited by the input."""
     pole, time = p["frequency"] * (1j - p["damping_ratio"]), r.conditions.time
     wave = p["amplitude"] * np.exp(pole * time[:, None] + 1j * p["phase"])
@@ -40,7 +40,7 @@ def _made(released: float, in_phase: bool) -> ParamMaker:
     release.
     """
 
-    def make(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    def make(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
         driven = np.zeros(c.runs, np.bool_) if c.drive is None or not released else c.drive.driven
         reach = np.max(np.abs(np.where(driven, 0.0, c.start_angle))) or c.reach
         size = np.where(driven, 0.0, p * np.abs(c.start_angle / reach) ** released)
@@ -103,7 +103,7 @@ _STEPS = (
 )  # fmt: skip
 
 
-def _gap(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _gap(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """Half width, and the position in the gap at which each run starts."""
     start = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs) * e["random"]
     return {"half": p, "start": start}
@@ -138,7 +138,7 @@ _DRIFTS = (
 )  # fmt: skip
 
 
-def _hum(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _hum(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """Amplitude, frequency, and phases drawn per run."""
     rng = np.random.default_rng(int(e["seed"]))
     return {"amplitude": p, "frequency": e["frequency"], "phase": rng.uniform(0, 2 * np.pi, c.runs),
@@ -153,7 +153,7 @@ _APART, _STEP_OF_MAINS = 0.02, 0.002  # Hz: of a large grid within minutes, and 
 def _hum_draw(third: float) -> Draw:
     """Seed, frequency within a grid's range about 50 or 60 Hz as written, and up to ``third`` of third harmonic."""
 
-    def draw(g: np.random.Generator, c: Conditions) -> dict[str, float]:
+    def draw(g: np.random.Generator, c: TrueConditions) -> dict[str, float]:
         seed = int(g.integers(0, 2**31))
         mains = 50.0 if np.random.default_rng([seed, 1]).random() < 0.5 else 60.0
         return {"seed": float(seed), "frequency": (mains + g.uniform(-_WANDER, _WANDER)) * c.time_scale,
@@ -175,7 +175,7 @@ _HUM = (
 )  # fmt: skip
 
 
-def _limit(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+def _limit(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     """L = (1 − p) times the largest angle."""
     limit = (1.0 - p) * c.reach
     return {"limit": limit, "lower": e.get("lower", 1.0), "knee": e.get("knee", 0.1)}

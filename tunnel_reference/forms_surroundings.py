@@ -6,8 +6,8 @@ import numpy as np
 
 from tunnel_reference import moments as m
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, ParamMaker, moving
-from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.integrator import Phase
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 
@@ -15,7 +15,7 @@ T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 def _shaken(kind: str) -> ParamMaker:
     """A random moment of one kind of spectrum, of the same size in all runs."""
 
-    def make(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
+    def make(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
         return {"table": p * m.shaking(kind, c, seed=int(e["seed"]), scale=e["scale"], ratio=e["ratio"])}
 
     return make
@@ -24,7 +24,7 @@ def _shaken(kind: str) -> ParamMaker:
 def _seeded(scale: tuple[float, float], ratio: tuple[float, float] = (1.0, 1.0)) -> Draw:
     """A seed, a frequency in Hz and a ratio."""
 
-    def draw(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
+    def draw(g: np.random.Generator, _c: TrueConditions) -> dict[str, float]:
         return {"seed": float(g.integers(0, 2**31)), "scale": g.uniform(*scale), "ratio": g.uniform(*ratio)}
 
     return draw

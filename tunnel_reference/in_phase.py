@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_reference import moments
-from tunnel_reference.conditions import REFERENCE_LENGTH, Array
 from tunnel_reference.draw import CampaignDraw
-from tunnel_reference.integrator import Term
+from tunnel_reference.integrator import BoundLaw
 from tunnel_reference.severity import bind_effects
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, Array
 
 Response = NDArray[np.complex128]
 
@@ -30,7 +30,7 @@ def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
         By ``cn_beta`` and ``cn_r``; None where no lag of the air acts.
     """
     c, bound = bind_effects(draw)
-    laws = [term for term in bound if isinstance(term, Term) and term.law in _RESPONSES]
+    laws = [term for term in bound if isinstance(term, BoundLaw) and term.law in _RESPONSES]
     if not laws or not np.any(c.wind_on):
         return None
     stiffness = np.maximum(c.true_stiffness - c.air_stiffness, 1e-9)

@@ -17,8 +17,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.inputs import Inputs
+from tunnel_reference.driven_inputs import Inputs
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 Params = Mapping[str, Array]
 Places = NDArray[np.intp]
@@ -35,7 +35,7 @@ class Phase(IntEnum):
 
 
 @dataclass(eq=False)
-class Stage:
+class RungeKuttaStage:
     """One RK4 stage of a batch; arrays have shape (rows,). Laws may change the marked arrays.
 
     Args:
@@ -77,12 +77,12 @@ class Stage:
     driven: Array
 
 
-Law = Callable[[Stage, Rows, Params, Array, Array], None]
+Law = Callable[[RungeKuttaStage, Rows, Params, Array, Array], None]
 """law(stage, rows, parameters, states, derivative of the states); states have shape (states, rows)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class BoundLaw:
     """A law bound to the runs of one campaign.
 
     Args:
@@ -97,7 +97,7 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RodMotion:
     """The motion of the rod's upper end in one campaign.
 
     Args:
@@ -122,13 +122,13 @@ class _Group:
 
 
 def _group_terms(
-    terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
+    terms: Sequence[Sequence[BoundLaw]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
     """Merge equal laws of all campaigns into groups, ordered by phase, then by first appearance.
 
     A law that occurs twice in a campaign is in two groups: a law adds to each row of its group once.
     """
-    found: dict[tuple[int, Law, int, int], list[tuple[Term, Places]]] = {}
+    found: dict[tuple[int, Law, int, int], list[tuple[BoundLaw, Places]]] = {}
     for number, campaign_terms in enumerate(terms):
         rows = np.arange(offsets[number], offsets[number] + runs[number])
         before: Counter[tuple[int, Law, int]] = Counter()
@@ -160,7 +160,7 @@ def _group_terms(
 class _Batch:
     """The rows of several campaigns, all with a rigid or all with a flexible rod."""
 
-    def __init__(self, conditions: Sequence[Conditions], terms: Sequence[Sequence[Term]]) -> None:
+    def __init__(self, conditions: Sequence[TrueConditions], terms: Sequence[Sequence[BoundLaw]]) -> None:
         runs = [c.runs for c in conditions]
         self.offsets = np.concatenate([[0], np.cumsum(runs)]).astype(int)
         self.size = int(self.offsets[-1])
@@ -208,7 +208,7 @@ class _Batch:
         self.state = np.concatenate(blocks)
         self.stage = self._new_stage(0.0, self.state)
 
-    def _new_stage(self, time: float, state: Array) -> Stage:
+    def _new_stage(self, time: float, state: Array) -> RungeKuttaStage:
         """A stage to which no law has been applied yet."""
         n = self.size
         beta, rate = state[:n], state[n : 2 * n]
@@ -218,7 +218,7 @@ class _Batch:
         if self.early:
             changed = (self.ones.copy(), beta.copy(), deflection.copy())
         level, hung, driven = np.zeros((3, n))
-        return Stage(
+        return RungeKuttaStage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
             *changed, deflection, self.ones, self.ones, level, hung, driven,
         )  # fmt: skip
@@ -259,7 +259,7 @@ class _Batch:
             top[:n], top[n:] = stage.omega, stage.top / self.top_inertia
         return out
 
-    def _apply(self, stage: Stage, state: Array, out: Array, groups: Sequence[_Group]) -> None:
+    def _apply(self, stage: RungeKuttaStage, state: Array, out: Array, groups: Sequence[_Group]) -> None:
         """Apply the laws of these groups."""
         for group in groups:
             present = change = group.memory
@@ -321,8 +321,8 @@ class _Batch:
 
 
 def integrate(
-    conditions: Sequence[Conditions], terms: Sequence[Sequence[Term]], *, substeps: int = 10
-) -> list[Motion]:
+    conditions: Sequence[TrueConditions], terms: Sequence[Sequence[BoundLaw]], *, substeps: int = 10
+) -> list[RodMotion]:
     """Integrate campaigns together from their start angles and rates.
 
     Args:
@@ -355,5 +355,5 @@ def integrate(
                     batch.step(k * interval + j * h, h)
     spans = [slice(int(a), int(b)) for a, b in zip(batch.offsets[:-1], batch.offsets[1:], strict=True)]
     return [
-        Motion(angle[: c.samples, s], rate[: c.samples, s]) for c, s in zip(conditions, spans, strict=True)
+        RodMotion(angle[: c.samples, s], rate[: c.samples, s]) for c, s in zip(conditions, spans, strict=True)
     ]

@@ -9,15 +9,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from tunnel_reference.between_runs import scattered
-from tunnel_reference.conditions import (
+from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.scatter_draws import scattered
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
+from tunnel_reference.true_conditions import (
     FRONTAL_AREA,
     NOMINAL_INERTIA,
     REFERENCE_LENGTH,
     WIDTH,
 )
-from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
-from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean

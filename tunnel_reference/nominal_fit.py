@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, Conditions
-from tunnel_reference.inputs import linear_response
+from tunnel_reference.driven_inputs import linear_response
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, TrueConditions
 
 _ITERATIONS = 12
 _TOLERANCE = 1e-6
@@ -37,7 +37,7 @@ class NominalFit:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a step to a diverging motion is rejected
-def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
+def fit_nominal(c: TrueConditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 
     Args:
@@ -136,7 +136,7 @@ def _newton(columns: Array, residual: Array, d_sigma: Array, d_omega: Array) -> 
     return np.asarray(answer[:4], dtype=np.float64)
 
 
-def fit_driven(c: Conditions, readings: Array) -> NominalFit:
+def fit_driven(c: TrueConditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero, an unknown gain and the initial state of every run to the readings.
 
     Args:
@@ -200,7 +200,7 @@ def fit_driven(c: Conditions, readings: Array) -> NominalFit:
     return kept
 
 
-def _free_motion(c: Conditions, p: Array, time: Array) -> Array:
+def _free_motion(c: TrueConditions, p: Array, time: Array) -> Array:
     """Orthonormal free motions of every run, shape (runs, samples, 2)."""
     flow = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH
     sigma = (p[1] - flow * REFERENCE_LENGTH * p[3]) / (2.0 * p[0])

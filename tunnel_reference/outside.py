@@ -10,107 +10,107 @@ import numpy as np
 
 from tunnel_reference import moments as m
 from tunnel_reference.catalogue import Draw, Extra, Form, Group, moving, reading
-from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.integrator import Params, Phase, Rows, Stage
-from tunnel_reference.readings import Order, Reading
+from tunnel_reference.integrator import Params, Phase, Rows, RungeKuttaStage
+from tunnel_reference.readings import Order, SensorSignal
 from tunnel_reference.readings import Params as ReadingParams
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 
-def stop(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def stop(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−k max(|θ| − θs, 0) sgn θ: rubber stops on both sides, or (``one_sided``) on the positive side only."""
     t = s.theta[rows]
     lower = np.where(p["one_sided"] > 0.0, 0.0, np.maximum(-t - p["place"], 0.0))
     s.top[rows] -= p["stiffness"] * (np.maximum(t - p["place"], 0.0) - lower)
 
 
-def ripple(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def ripple(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−M sin(nθ): cogging of a motor or a magnetic bearing."""
     s.top[rows] -= p["moment"] * np.sin(p["number"] * s.theta[rows])
 
 
-def dashpot(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def dashpot(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−c exp(−(θ/w)²) θ̇: a damper that acts near the middle only."""
     s.top[rows] -= p["coefficient"] * np.exp(-((s.theta[rows] / p["width"]) ** 2)) * s.omega[rows]
 
 
-def widening_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def widening_damping(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−c (θ/0.1)² θ̇: damping that grows away from the middle, with the wind off too."""
     s.top[rows] -= p["coefficient"] * (s.theta[rows] / 0.1) ** 2 * s.omega[rows]
 
 
-def one_way_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def one_way_damping(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−c max(θ̇, 0): a damper that acts in one direction."""
     s.top[rows] -= p["coefficient"] * np.maximum(s.omega[rows], 0.0)
 
 
-def bouc_wen(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+def bouc_wen(s: RungeKuttaStage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
     """−k z with ż = θ̇ − |θ̇| |z| z/zs²: a hysteresis loop that saturates softly (Wen 1976)."""
     omega = s.omega[rows]
     s.top[rows] -= p["stiffness"] * x[0]
     dx[0] = omega - np.abs(omega) * np.abs(x[0]) * x[0] / p["slide"] ** 2
 
 
-def stall(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def stall(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """−M q/q₂₀ tanh((|β| − βs)/w)₊ sgn β: a yaw moment that breaks away beyond an angle; M per 20 m/s."""
     beta = s.beta[rows]
     beyond = np.maximum(np.tanh((np.abs(beta) - p["place"]) / p["width"]), 0.0)
     s.body[rows] -= p["moment"] * p["pressure"] * beyond * np.sign(beta)
 
 
-def wake(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def wake(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """+M q/q₂₀ (β/w) exp(½ − β²/2w²): the air's moment departs from its line near zero yaw."""
     t = s.beta[rows] / p["width"]
     s.body[rows] += p["moment"] * p["pressure"] * t * np.exp(0.5 - 0.5 * t * t)
 
 
-def slip(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def slip(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """+Kr e θ after t0: a clamp that slips, in every run."""
     s.top[rows] += s.stiffness[rows] * p["share"] * (s.time > p["when"]) * s.theta[rows]
 
 
-def fading_friction(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+def fading_friction(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """Tc exp(−t/τ): a bearing that runs in during every run."""
     s.level[rows] += p["moment"] * np.exp(-s.time / p["time"])
 
 
-def reading_ripple(r: Reading, p: ReadingParams) -> Array:
+def reading_ripple(r: SensorSignal, p: ReadingParams) -> Array:
     """Adds a sin(n y): the windings of a potentiometer."""
     return np.asarray(r.value + p["size"] * np.sin(p["number"] * r.value))
 
 
-def reading_kink(r: Reading, p: ReadingParams) -> Array:
+def reading_kink(r: SensorSignal, p: ReadingParams) -> Array:
     """Adds g |y|: a different gain on one side."""
     return np.asarray(r.value + p["gain"] * np.abs(r.value))
 
 
-def gain_change(r: Reading, p: ReadingParams) -> Array:
+def gain_change(r: SensorSignal, p: ReadingParams) -> Array:
     """Multiplies by 1 + g after t0."""
     return r.value * (1.0 + p["gain"] * (r.conditions.time[:, None] > p["when"]))
 
 
-def zero_step(r: Reading, p: ReadingParams) -> Array:
+def zero_step(r: SensorSignal, p: ReadingParams) -> Array:
     """Adds d after t0, in the runs where d is not zero."""
     return r.value + p["step"] * (r.conditions.time[:, None] > p["when"])
 
 
-def wandering_zero(r: Reading, p: ReadingParams) -> Array:
+def wandering_zero(r: SensorSignal, p: ReadingParams) -> Array:
     """Adds a random walk of the sensor's zero, of standard deviation d over one run."""
     steps = r.rng.standard_normal(r.value.shape) / np.sqrt(r.value.shape[0])
     return np.asarray(r.value + p["size"] * np.cumsum(steps, axis=0))
 
 
-def clock_jitter(r: Reading, p: ReadingParams) -> Array:
+def clock_jitter(r: SensorSignal, p: ReadingParams) -> Array:
     """Samples at random times about the stated ones: y + β̇ ε."""
     return r.value + r.motion.rate * p["jitter"] * r.rng.standard_normal(r.value.shape)
 
 
-def motion_noise(r: Reading, p: ReadingParams) -> Array:
+def motion_noise(r: SensorSignal, p: ReadingParams) -> Array:
     """Noise of standard deviation n |β| (a worn track)."""
     noise = p["level"] * np.abs(r.motion.angle) * r.rng.standard_normal(r.value.shape)
     return np.asarray(r.value + noise)
 
 
-def amplitude_zero(r: Reading, p: ReadingParams) -> Array:
+def amplitude_zero(r: SensorSignal, p: ReadingParams) -> Array:
     """Adds z E/E0, E the running energy of the motion: a zero that follows the amplitude."""
     c = r.conditions
     omega = np.maximum(c.wind_off_omega, 1.0)
@@ -124,7 +124,7 @@ def amplitude_zero(r: Reading, p: ReadingParams) -> Array:
     return np.asarray(r.value + p["shift"] * slow / energy[0].max())
 
 
-def held_samples(r: Reading, p: ReadingParams) -> Array:
+def held_samples(r: SensorSignal, p: ReadingParams) -> Array:
     """At random times the reading is held for ``length`` seconds."""
     n, runs = r.value.shape
     out = r.value.copy()
@@ -136,7 +136,7 @@ def held_samples(r: Reading, p: ReadingParams) -> Array:
     return out
 
 
-def spikes(r: Reading, p: ReadingParams) -> Array:
+def spikes(r: SensorSignal, p: ReadingParams) -> Array:
     """Errors of standard deviation ``size`` in single samples, ``rate`` per second."""
     hit = r.rng.random(r.value.shape) < p["rate"] / r.conditions.sample_rate
     return np.asarray(r.value + hit * p["size"] * r.rng.standard_normal(r.value.shape))
@@ -147,7 +147,7 @@ C, R = Group.COMMON, Group.RARE
 _BOTH = (-1, 1)
 
 
-def _in_run(value: float, e: Extra, c: Conditions, *, windy: bool = False) -> Array:
+def _in_run(value: float, e: Extra, c: TrueConditions, *, windy: bool = False) -> Array:
     """The value in one run, or in one wind-on run; zero in the others."""
     out = np.zeros(c.runs)
     places = np.flatnonzero(c.wind_on) if windy else np.arange(c.runs)
@@ -164,12 +164,12 @@ def _when(low: float, high: float) -> Draw:
     }
 
 
-def _seeded(g: np.random.Generator, _c: Conditions) -> dict[str, float]:
+def _seeded(g: np.random.Generator, _c: TrueConditions) -> dict[str, float]:
     """A seed for the phases of the runs, and a frequency."""
     return {"seed": float(g.integers(0, 2**31)), "frequency": float(g.uniform(0.2, 0.6))}
 
 
-def _phases(e: Extra, c: Conditions) -> Array:
+def _phases(e: Extra, c: TrueConditions) -> Array:
     """One phase per run."""
     return np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
 
@@ -252,7 +252,7 @@ _SENSOR = (
 OUTSIDE_FORMS: tuple[Form, ...] = (*_BLOWS, *_SLOW, *_PLACE, *_SENSOR)
 
 
-def _pressure(c: Conditions) -> np.ndarray:
+def _pressure(c: TrueConditions) -> np.ndarray:
     """Ratio of dynamic pressure to its value at 20 m/s, by run."""
     return np.asarray((c.true_speed / 20.0) ** 2)
 

@@ -12,8 +12,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.integrator import Motion
+from tunnel_reference.integrator import RodMotion
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 
 class Order(IntEnum):
@@ -29,7 +29,7 @@ class Order(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class SensorSignal:
     """The readings of a campaign at some point of the sensor's chain.
 
     Args:
@@ -39,13 +39,13 @@ class Reading:
     """
 
     value: Array
-    motion: Motion
-    conditions: Conditions
+    motion: RodMotion
+    conditions: TrueConditions
     rng: np.random.Generator
 
 
 Params = Mapping[str, Array]
-ReadingLaw = Callable[[Reading, Params], Array]
+ReadingLaw = Callable[[SensorSignal, Params], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class ReadingTerm:
 
 
 def read_motion(
-    conditions: Conditions, motion: Motion, terms: Sequence[ReadingTerm], rng: np.random.Generator
+    conditions: TrueConditions, motion: RodMotion, terms: Sequence[ReadingTerm], rng: np.random.Generator
 ) -> Array:
     """The sensor's reading of a motion.
 
@@ -98,19 +98,19 @@ def read_motion(
         ra, rb = motion.rate * interval, motion.rate[after] * interval
         angle = _hermite(u, a, b, ra, rb)
         angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
-        motion = Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
+        motion = RodMotion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
     value = motion.angle
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
-        value = term.law(Reading(value, motion, conditions, rng), term.params)
+        value = term.law(SensorSignal(value, motion, conditions, rng), term.params)
     value = value + conditions.zero + conditions.zero_shift + conditions.zero_deviation
     value = value + conditions.noise_scale * noise
     for term in (t for t in ordered if Order.NOISE <= t.order < Order.LINE):
-        value = term.law(Reading(value, motion, conditions, rng), term.params)
+        value = term.law(SensorSignal(value, motion, conditions, rng), term.params)
     if not any(t.order is Order.ROUNDING for t in ordered):
         value = np.round(value / conditions.resolution) * conditions.resolution
     for term in (t for t in ordered if t.order is Order.LINE):
-        value = term.law(Reading(value, motion, conditions, rng), term.params)
+        value = term.law(SensorSignal(value, motion, conditions, rng), term.params)
     return value
 
 
@@ -129,7 +129,7 @@ def _hermite(u: Array, a: Array, b: Array, ra: Array, rb: Array) -> Array:
 _PLAY_STEPS = 8
 
 
-def _fine_path(motion: Motion, interval: float) -> Array:
+def _fine_path(motion: RodMotion, interval: float) -> Array:
     """The angle at eight points per sample by cubic Hermite interpolation, shape (8 (n−1) + 1, runs)."""
     u = (np.arange(_PLAY_STEPS) / _PLAY_STEPS)[None, :, None]
     a, b = motion.angle[:-1, None], motion.angle[1:, None]
@@ -149,20 +149,20 @@ def _play(path: Array, half: Array, start: Array) -> Array:
     return out
 
 
-def backlash(r: Reading, p: Params) -> Array:
+def backlash(r: SensorSignal, p: Params) -> Array:
     """Backlash ±w, starting at ``start`` (−1…1) of its gap."""
     path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
     return r.value + (_play(path, p["half"], p["start"]) - path)[::_PLAY_STEPS]
 
 
-def two_plays(r: Reading, p: Params) -> Array:
+def two_plays(r: SensorSignal, p: Params) -> Array:
     """The mean of backlash ±1.5w and ±0.5w: hysteresis with a rounded loop (Prandtl–Ishlinskii)."""
     path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
     wide, narrow = (_play(path, f * p["half"], p["start"]) for f in (1.5, 0.5))
     return r.value + (0.5 * (wide + narrow) - path)[::_PLAY_STEPS]
 
 
-def sliding_linkage(r: Reading, p: Params) -> Array:
+def sliding_linkage(r: SensorSignal, p: Params) -> Array:
     """The reading lags by z with dz = dβ − |dβ| z/w: a linkage that deflects before it slides (Dahl)."""
     path = _fine_path(r.motion, 1.0 / r.conditions.sample_rate)
     z = -p["start"] * p["half"]
@@ -179,24 +179,24 @@ def sliding_linkage(r: Reading, p: Params) -> Array:
 # ---- curve
 
 
-def cubic_curve(r: Reading, p: Params) -> Array:
+def cubic_curve(r: SensorSignal, p: Params) -> Array:
     """Adds s y³."""
     return r.value + p["s"] * r.value**3
 
 
-def sine_curve(r: Reading, p: Params) -> Array:
+def sine_curve(r: SensorSignal, p: Params) -> Array:
     """sin(ky)/k for s < 0, sinh(ky)/k for s > 0, k = √(6|s|)."""
     k = np.sqrt(6.0 * np.abs(p["s"]))
     return np.where(p["s"] < 0.0, np.sin(k * r.value), np.sinh(k * r.value)) / k
 
 
-def tangent_curve(r: Reading, p: Params) -> Array:
+def tangent_curve(r: SensorSignal, p: Params) -> Array:
     """tan(ky)/k for s > 0, arctan(ky)/k for s < 0, k = √(3|s|)."""
     k = np.sqrt(3.0 * np.abs(p["s"]))
     return np.where(p["s"] < 0.0, np.arctan(k * r.value), np.tan(k * r.value)) / k
 
 
-def loaded_potentiometer(r: Reading, p: Params) -> Array:
+def loaded_potentiometer(r: SensorSignal, p: Params) -> Array:
     """A loaded potentiometer of span 2π/3: u/(1 + ρ u (1 − u)) at u = ½ + y/span; unit slope, zero at 0."""
     span = 2.0 * np.pi / 3.0
     rho, u = p["s"], 0.5 + r.value / span
@@ -208,19 +208,19 @@ def loaded_potentiometer(r: Reading, p: Params) -> Array:
 # ---- added
 
 
-def drift(r: Reading, p: Params) -> Array:
+def drift(r: SensorSignal, p: Params) -> Array:
     """Adds d (t/T)^n."""
     t = r.conditions.time / r.conditions.duration
     return r.value + p["drift"] * t[:, None] ** p["exponent"]
 
 
-def settling_drift(r: Reading, p: Params) -> Array:
+def settling_drift(r: SensorSignal, p: Params) -> Array:
     """Adds d (1 − e^(−t/τ))/(1 − e^(−T/τ)): warming up."""
     t = r.conditions.time[:, None]
     return r.value + p["drift"] * np.expm1(-t / p["time"]) / np.expm1(-r.conditions.duration / p["time"])
 
 
-def hum(r: Reading, p: Params) -> Array:
+def hum(r: SensorSignal, p: Params) -> Array:
     """Adds a (sin(2πft + φ) + h sin(6πft + φ3))."""
     arg = 2.0 * np.pi * p["frequency"] * r.conditions.time[:, None]
     return r.value + p["amplitude"] * (
@@ -228,7 +228,7 @@ def hum(r: Reading, p: Params) -> Array:
     )
 
 
-def hum_harmonic(r: Reading, p: Params) -> Array:
+def hum_harmonic(r: SensorSignal, p: Params) -> Array:
     """Adds a sin(4πft + φ): hum from a rectifier or a lamp."""
     return r.value + p["amplitude"] * np.sin(
         4.0 * np.pi * p["frequency"] * r.conditions.time[:, None] + p["phase"]
@@ -238,7 +238,7 @@ def hum_harmonic(r: Reading, p: Params) -> Array:
 _WANDERS_EACH = 0.5  # s, between two steps of the mains' frequency
 
 
-def hum_wandering(r: Reading, p: Params) -> Array:
+def hum_wandering(r: SensorSignal, p: Params) -> Array:
     """Hum whose frequency differs by run and wanders within it, and whose amplitude differs by run.
 
     The frequency is the run's own plus a random walk with steps of ``step`` (Hz) twice a second.
@@ -258,7 +258,7 @@ def hum_wandering(r: Reading, p: Params) -> Array:
     return out
 
 
-def hum_bursts(r: Reading, p: Params) -> Array:
+def hum_bursts(r: SensorSignal, p: Params) -> Array:
     """Hum with a slowly varying amplitude: a (1 + ½ sin(2π f2 t + φ2)) sin(2πft + φ)."""
     t = r.conditions.time[:, None]
     swell = 1.0 + 0.5 * np.sin(2.0 * np.pi * p["slow"] * t + p["third_phase"])
@@ -268,13 +268,13 @@ def hum_bursts(r: Reading, p: Params) -> Array:
 # ---- limit
 
 
-def clipping(r: Reading, p: Params) -> Array:
+def clipping(r: SensorSignal, p: Params) -> Array:
     """−L ≤ y ≤ L; no lower limit where ``lower`` is 0."""
     low = np.where(p["lower"] > 0.0, -p["limit"], -np.inf)
     return np.clip(r.value, low, p["limit"])
 
 
-def soft_clipping(r: Reading, p: Params) -> Array:
+def soft_clipping(r: SensorSignal, p: Params) -> Array:
     """|y| is linear below (1 − k) L and approaches L exponentially above."""
     size = np.abs(r.value)
     knee = (1.0 - p["knee"]) * p["limit"]
@@ -286,17 +286,17 @@ def soft_clipping(r: Reading, p: Params) -> Array:
 # ---- rounding
 
 
-def coarse_rounding(r: Reading, p: Params) -> Array:
+def coarse_rounding(r: SensorSignal, p: Params) -> Array:
     """Rounds to a multiple of a step."""
     return np.round(r.value / p["step"]) * p["step"]
 
 
-def coarse_truncation(r: Reading, p: Params) -> Array:
+def coarse_truncation(r: SensorSignal, p: Params) -> Array:
     """Rounds down to a multiple of a step."""
     return np.floor(r.value / p["step"]) * p["step"]
 
 
-def uneven_rounding(r: Reading, p: Params) -> Array:
+def uneven_rounding(r: SensorSignal, p: Params) -> Array:
     """Rounds to steps of alternating width: even and odd levels are a quarter step off their place."""
     level = np.round(r.value / p["step"])
     return p["step"] * (level + 0.25 * (np.mod(level, 2.0) - 0.5))

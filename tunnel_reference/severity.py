@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tunnel_reference.catalogue import Bound
-from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.draw import CampaignDraw, redraw, with_defaults
-from tunnel_reference.integrator import Motion, Term, integrate
+from tunnel_reference.integrator import BoundLaw, RodMotion, integrate
 from tunnel_reference.nominal_fit import fit_driven, fit_nominal
-from tunnel_reference.readings import Reading, ReadingTerm, read_motion
+from tunnel_reference.readings import ReadingTerm, SensorSignal, read_motion
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 PASSES = 6
 TOLERANCE = 0.1
@@ -50,7 +50,7 @@ class Simulated:
     residual: Array
 
 
-def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
+def bind_effects(draw: CampaignDraw) -> tuple[TrueConditions, list[Bound]]:
     """Conditions and terms of a campaign with all effects; calibration comes first because others depend on it."""
     conditions, terms = with_defaults(draw.conditions), []
     for effect in draw.effects:
@@ -62,14 +62,14 @@ def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
     return conditions, terms
 
 
-def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> list[Motion]:
+def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> list[RodMotion]:
     """Integrate campaigns in as few batches as possible.
 
     Args:
         fine: 10 steps per sample (20 with a flexible rod); otherwise 1 (10), for scaling effects.
     """
     bound = [bind_effects(d) for d in draws]
-    motions: list[Motion | None] = [None] * len(draws)
+    motions: list[RodMotion | None] = [None] * len(draws)
     # by rod, by short or long runs, which are efficient together, and by sample rate
     batches: dict[tuple[bool, bool, float], list[int]] = {}
     for number, (c, _) in enumerate(bound):
@@ -79,7 +79,7 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
             (_ROD_SUBSTEPS if flexible else _SUBSTEPS) if fine else (_ROD_COARSE if flexible else _COARSE)
         )
         substeps = max(1, round(substeps * _RATE / rate))  # steps of equal length
-        terms = [[t for t in bound[i][1] if isinstance(t, Term)] for i in numbers]
+        terms = [[t for t in bound[i][1] if isinstance(t, BoundLaw)] for i in numbers]
         for i, motion in zip(
             numbers, integrate([bound[i][0] for i in numbers], terms, substeps=substeps), strict=True
         ):
@@ -87,7 +87,7 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     return [m for m in motions if m is not None]
 
 
-def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
+def read_and_fit(draw: CampaignDraw, motion: RodMotion) -> Simulated:
     """Convert a motion to readings and refit the nominal model."""
     conditions, terms = bind_effects(draw)
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
@@ -101,7 +101,7 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
         values = np.pad(
             drive.values, ((0, conditions.samples - draw.conditions.samples), (0, 0)), mode="edge"
         )
-        read = term.law(Reading(values, motion, conditions, np.random.default_rng(0)), term.params)
+        read = term.law(SensorSignal(values, motion, conditions, np.random.default_rng(0)), term.params)
         drive = replace(drive, values=read[: draw.conditions.samples])
         draw = replace(draw, conditions=replace(draw.conditions, drive=drive))
     about_one_zero = readings - conditions.zero_shift
@@ -118,7 +118,7 @@ class _Search:
         effect = alone.effects[0]
         term = effect.form.bind(effect.value, effect.extra, with_defaults(alone.conditions))[1]
         self.sensor = isinstance(term, ReadingTerm)  # the motion is the same without the effect
-        self.motion: Motion | None = None
+        self.motion: RodMotion | None = None
         self.tried: list[tuple[float, float]] = []
         self.done = False
 

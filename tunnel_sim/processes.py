@@ -1,7 +1,7 @@
 """Independent work side by side in processes of this machine.
 
 Every process has one thread: most of the work is Python, which threads cannot share, and the last bit of a sum must
-not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep.py.
+not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep_cost.py.
 """
 
 from __future__ import annotations

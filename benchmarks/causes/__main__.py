@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.causes.entry import About, answer_all
+from benchmarks.causes.entry_score import read_answers, score
 from benchmarks.causes.make import CAMPAIGNS, check, make, published
 from benchmarks.causes.methods import METHODS
 from benchmarks.causes.page import results_of, write_page
-from benchmarks.causes.score import read_answers, score
 from benchmarks.causes.tracks import EDITIONS, VERSION
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError

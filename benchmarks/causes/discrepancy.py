@@ -67,7 +67,7 @@ def linear(fit: Any, along: Sequence[Path]) -> Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class ErrorEvidence:
     """The evidence of a fit for each size of the model's error.
 
     Args:
@@ -122,7 +122,7 @@ class Discrepancy:
     def _own(self) -> Array:
         return np.asarray(self.basis.T @ self.basis)
 
-    def evidence(self, given: Linear) -> Evidence:
+    def evidence(self, given: Linear) -> ErrorEvidence:
         """Log evidence of a fit; the prior power of further parameters equals the gap's.
 
         Args:
@@ -139,7 +139,7 @@ class Discrepancy:
         alone, occam = float(r @ r - seen @ seen), -float(np.sum(np.log(np.diag(root))))
         gain = np.sum(e2 * z**2 / (1.0 + e2 * w) - np.log1p(e2 * w), axis=1)
         power = np.sum((e2 * z / (1.0 + e2 * w)) ** 2 * w + e2 * w / (1.0 + e2 * w), axis=1)
-        return Evidence(-0.5 * alone + occam + 0.5 * gain, power / self.gap, alone, occam)
+        return ErrorEvidence(-0.5 * alone + occam + 0.5 * gain, power / self.gap, alone, occam)
 
     def _prior(self, given: Linear) -> Array:
         """Prior standard deviations of the parameters, shape (p,)."""

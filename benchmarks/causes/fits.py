@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedCauses:
     """A set of causes fitted to a campaign.
 
     Args:
@@ -44,7 +44,7 @@ class Fitted:
         have = [n for n in ("cn_beta", "cn_r") if n in self.fit.problem.names and self.fit.std(n) > 0.0]
         return {n: {"value": self.fit.value(n), "std": self.fit.std(n)} for n in have}
 
-    def with_one_more(self, name: str) -> Fitted | None:
+    def with_one_more(self, name: str) -> FittedCauses | None:
         """The fit with a further cause, in its textbook form; None where it cannot be fitted.
 
         Args:
@@ -55,7 +55,7 @@ class Fitted:
         return None if found is None else _fitted((*self.names, name), found)
 
 
-def nominal(folder: Path) -> tuple[Fitted, tuple[str, ...], bool]:
+def nominal(folder: Path) -> tuple[FittedCauses, tuple[str, ...], bool]:
     """The nominal model fitted to a campaign.
 
     Args:
@@ -84,8 +84,8 @@ class Grown:
         settled: the answer where no set is weighed (there is no gap, or the noise explains it); else None.
     """
 
-    nominal: Fitted
-    sets: tuple[Fitted, ...]
+    nominal: FittedCauses
+    sets: tuple[FittedCauses, ...]
     random: tuple[tuple[tuple[str, ...], tuple[str, ...], float], ...]
     read_off: tuple[str, ...]
     settled: tuple[str, ...] | None
@@ -105,7 +105,7 @@ def grown(folder: Path) -> Grown:
     settled = not sets or study.answers[0].probability == 1.0
     data = _most_common([h.fit.problem.data for h in sets]) or study.nominal.problem.data
     nominal = study.nominal if data is study.nominal.problem.data else fit_nominal(data)
-    best: dict[tuple[str, ...], Fitted] = {}
+    best: dict[tuple[str, ...], FittedCauses] = {}
     for h in sets:
         one = _fitted(h.names, h.fit)
         if h.fit.problem.data is data and (h.names not in best or one.chi2 < best[h.names].chi2):
@@ -139,7 +139,7 @@ def candidates() -> tuple[str, ...]:
     return tuple(kind.name for kind in KINDS if kind.fitted)
 
 
-def _fitted(names: tuple[str, ...], fit: Any) -> Fitted:
+def _fitted(names: tuple[str, ...], fit: Any) -> FittedCauses:
     problem, runs = fit.problem, len(fit.problem.data.runs)
     own = problem.parameters.of_effects
-    return Fitted(names, fit.total, fit.count, len(problem.effect_names) + own * runs, fit)
+    return FittedCauses(names, fit.total, fit.count, len(problem.effect_names) + own * runs, fit)

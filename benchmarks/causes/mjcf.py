@@ -43,7 +43,7 @@ axis="0 0 1" solreffriction="0.002 1" solimpfriction="0.99 0.999 0.001"/></body>
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ToolboxRun:
     """A run ready for the toolbox.
 
     Args:
@@ -67,7 +67,7 @@ class Trial:
     speed: float
 
     @classmethod
-    def of(cls, run: Run, size: float) -> Trial:
+    def of(cls, run: Run, size: float) -> ToolboxRun:
         """Thin one run out; `size` is the frontal area times the reference length, m³."""
         record, (omega, sigma, rest) = run.record, own_decay(run)
         y, dt = record.yaw_rad, record.sample_interval
@@ -85,7 +85,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ToolboxFit:
     """A set of causes fitted: parameters by name, their values and two of each release, residuals and Jacobian."""
 
     causes: tuple[str, ...]
@@ -99,14 +99,14 @@ class Fit:
         return float(self.left @ self.left)
 
 
-class Rig:
+class ToolboxRig:
     """The runs of a campaign as models; parameters are in hundredths of the rig's own scales."""
 
     def __init__(self, folder: Path) -> None:
         campaign = read_campaign(folder)
         self.length = campaign.rig.reference_length or 1.0
         size = (campaign.rig.frontal_area or 1.0) * self.length
-        self.trials = [Trial.of(run, size) for run in campaign.runs]
+        self.trials = [ToolboxRun.of(run, size) for run in campaign.runs]
         self.springs = sorted({t.spring for t in self.trials})
         self.swing = max(float(np.hypot(t.start[0], t.start[1] / t.decay[0])) for t in self.trials)
         self.fastest = max(t.speed for t in self.trials)
@@ -138,7 +138,7 @@ class Rig:
             found += [("spring_miscalibration", (f"spring {k:g}",)) for k in self.springs]
         return found
 
-    def write(self, spec: Any, trial: Trial, x: Mapping[str, float]) -> Any:
+    def write(self, spec: Any, trial: ToolboxRun, x: Mapping[str, float]) -> Any:
         """The compiled model of a run with parameters by name."""
         p = {name: 0.01 * value for name, value in x.items()}
         inertia, omega, swing = self.inertia, self.omega, self.swing
@@ -234,7 +234,7 @@ class Rig:
             row = rows.stop
         return found
 
-    def fit(self, causes: tuple[str, ...], names: tuple[str, ...], x: Array) -> Fit:
+    def fit(self, causes: tuple[str, ...], names: tuple[str, ...], x: Array) -> ToolboxFit:
         """Fit by the toolbox.
 
         Args:
@@ -254,4 +254,4 @@ class Rig:
             output=io.StringIO(),
         )  # fmt: skip
         rest = np.concatenate(left(result.x.reshape(-1, 1), fitted)[0])[:, 0]
-        return Fit(causes, names, np.ravel(result.x), rest, result.jac)
+        return ToolboxFit(causes, names, np.ravel(result.x), rest, result.jac)

@@ -35,7 +35,7 @@ assert TRAINING_SEED != SEED
 
 
 @dataclass(frozen=True)
-class Setting:
+class NetworkSetting:
     """A network and its training.
 
     Args:
@@ -49,7 +49,7 @@ class Setting:
     dropout: float
 
 
-SETTINGS = tuple(Setting(w, 1e-2, d) for w in (32, 64) for d in (0.2, 0.4))
+SETTINGS = tuple(NetworkSetting(w, 1e-2, d) for w in (32, 64) for d in (0.2, 0.4))
 
 
 def make_campaigns(folder: Path, number: int, *, chunk: int = CHUNK) -> float:
@@ -94,7 +94,7 @@ def make_campaigns(folder: Path, number: int, *, chunk: int = CHUNK) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class TrainingCampaigns:
     """Training campaigns.
 
     Args:
@@ -111,12 +111,12 @@ class Samples:
     acts: Array
     asked: Array
 
-    def __getitem__(self, places: NDArray[np.int64]) -> Samples:
+    def __getitem__(self, places: NDArray[np.int64]) -> TrainingCampaigns:
         """Some of the campaigns."""
-        return Samples(*(getattr(self, f.name)[places] for f in fields(self)))
+        return TrainingCampaigns(*(getattr(self, f.name)[places] for f in fields(self)))
 
 
-def read_samples(folder: Path) -> Samples:
+def read_samples(folder: Path) -> TrainingCampaigns:
     """The statistics of all training campaigns of a folder.
 
     Args:
@@ -134,7 +134,7 @@ def read_samples(folder: Path) -> Samples:
     there = [np.arange(most) < len(runs) for runs, _ in found]
     acts = [[name in truth["effects"] for name in LABELS] for truth in truths.values()]
     asked = [[name not in truth["small"] for name in LABELS] for truth in truths.values()]
-    return Samples(
+    return TrainingCampaigns(
         np.array(padded),
         np.array(there, np.float64),
         np.array([whole for _, whole in found]),
@@ -143,7 +143,9 @@ def read_samples(folder: Path) -> Samples:
     )
 
 
-def trained(samples: Samples, seed: int, settings: Sequence[Setting], epochs: int = EPOCHS) -> Classifier:
+def trained(
+    samples: TrainingCampaigns, seed: int, settings: Sequence[NetworkSetting], epochs: int = EPOCHS
+) -> Classifier:
     """Train one network per fold with every setting, and keep the setting with the least held-out loss.
 
     A network stops at the least loss on its held-out fold. The temperature is optimal on the held-out folds.
@@ -162,7 +164,7 @@ def trained(samples: Samples, seed: int, settings: Sequence[Setting], epochs: in
     seen = samples.runs[samples.there > 0.0]
     scaling = [np.stack([v.mean(axis=0), v.std(axis=0) + 1e-3]) for v in (seen, samples.whole)]
     folds = np.array_split(rng.permutation(len(samples.whole)), FOLDS)
-    best: tuple[float, Setting, list[dict[str, Array]], Array] | None = None
+    best: tuple[float, NetworkSetting, list[dict[str, Array]], Array] | None = None
     for setting in settings:
         found = []
         for fold in folds:
@@ -188,10 +190,10 @@ def trained(samples: Samples, seed: int, settings: Sequence[Setting], epochs: in
 
 
 def _train_one(
-    seen: Samples,
-    held_out: Samples,
+    seen: TrainingCampaigns,
+    held_out: TrainingCampaigns,
     scaling: Sequence[Array],
-    setting: Setting,
+    setting: NetworkSetting,
     epochs: int,
     rng: np.random.Generator,
 ) -> tuple[float, dict[str, Array], Array]:
@@ -208,7 +210,7 @@ def _train_one(
         table[-1] = -2.0 if name == LAYERS[-1] else 0.0
         weights[name] = torch.tensor(table, dtype=torch.float32, requires_grad=True)
 
-    def tensors(given: Samples) -> list[torch.Tensor]:
+    def tensors(given: TrainingCampaigns) -> list[torch.Tensor]:
         x = scaled(given.runs, *scaling[0]) * given.there[:, :, None]
         values = (x, given.there, scaled(given.whole, *scaling[1]), given.acts, given.asked)
         return [torch.tensor(v, dtype=torch.float32) for v in values]
@@ -252,7 +254,7 @@ def _mirrored(runs: Array) -> Array:
     return np.stack([mirrored(one) for one in runs])
 
 
-def _loss(logits: Array, samples: Samples) -> float:
+def _loss(logits: Array, samples: TrainingCampaigns) -> float:
     """Mean over the campaigns of the cross-entropy of their labels, nats."""
     each = np.logaddexp(0.0, logits) - samples.acts * logits
     return float(np.sum(each * samples.asked) / len(logits))

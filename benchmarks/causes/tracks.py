@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.causes.entry import NAMES
-from tunnel_reference.between_runs import MIXED
 from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
 from tunnel_reference.make import plan_kinds
+from tunnel_reference.scatter_draws import MIXED
 
 REAL = "real"
 _ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
@@ -29,7 +29,7 @@ class Track:
         first: families that act in turn, one in every campaign; empty: all.
         about: description in a few words.
         scatter: whether the runs differ by chance.
-        level: of the scatter, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        level: of the scatter, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: share of campaigns that state their scatter.
         normal: share of campaigns with normal scatter; the others have another distribution.
     """
@@ -109,7 +109,7 @@ _ALL = {name: track for edition in EDITIONS.values() for name, track in edition.
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class TrackDraw:
     """One campaign to simulate.
 
     Args:
@@ -123,7 +123,7 @@ class Drawn:
     draw: CampaignDraw
 
 
-def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
+def draw_all(seed: int, counts: Mapping[str, int]) -> list[TrackDraw]:
     """Draw the simulated campaigns.
 
     Args:
@@ -136,7 +136,7 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
     drawn = [(track, draw) for track, count in counts.items() for draw in _track(seed, track, count)]
     of = next(edition.tracks for edition in EDITIONS.values() if set(counts) <= set(edition.tracks))
     order = np.random.default_rng([seed, len(of)]).permutation(len(drawn))
-    return [Drawn(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
+    return [TrackDraw(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
 
 
 def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:

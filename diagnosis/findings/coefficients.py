@@ -65,7 +65,7 @@ _MOST_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class NormalMixture:
     """A mixture of normal distributions.
 
     Args:
@@ -235,11 +235,11 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
         _, first, parts = each[0]
         change = chosen.unknown_std * (first.mean - (_value(answers.nominal, name) or first.mean))
         if answers.unknown > 0.0:
-            doubted = Mixture(first.weights, first.means, first.variances + change**2)
+            doubted = NormalMixture(first.weights, first.means, first.variances + change**2)
             each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
         probability = np.array([p for p, _, _ in each])
         probability /= probability.sum()
-        whole = Mixture(
+        whole = NormalMixture(
             np.concatenate([p * m.weights for p, (_, m, _) in zip(probability, each, strict=True)]),
             np.concatenate([m.means for _, m, _ in each]),
             np.concatenate([m.variances for _, m, _ in each]),
@@ -375,7 +375,7 @@ class Central:
     interval: tuple[float, float] | None
 
     @classmethod
-    def of(cls, whole: Mixture, chosen: AnswerSettings) -> Central:
+    def of(cls, whole: NormalMixture, chosen: AnswerSettings) -> Central:
         """The centre of a mixture, in its unit."""
         tail = 0.5 * (1.0 - chosen.coefficient_interval)
         low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
@@ -420,7 +420,7 @@ def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
 
 def _of_answer(
     answer: Possible, campaign: Campaign, name: str
-) -> tuple[float, Mixture, dict[str, float]] | None:
+) -> tuple[float, NormalMixture, dict[str, float]] | None:
     """Probability, distribution and variances by source of a coefficient under one answer."""
     fit, value = answer.fit, _value(answer.fit, name)
     if value is None:
@@ -445,7 +445,7 @@ def _of_answer(
         "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,
     }
     noise, forms = small.noise[:, place], small.forms[:, place]
-    found = Mixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
+    found = NormalMixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
     within = {
         "noise": float(small.weights @ noise),
         "small causes": float(small.weights @ forms) + found.between,

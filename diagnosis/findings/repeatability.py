@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
 
-from diagnosis.likelihood.between_runs import RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Scatter
 from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
-from identification.campaign.between_runs import (
+from identification.campaign.random_effects import (
     RunProducts,
     WidthPrior,
     likeliest_widths,
@@ -131,7 +131,7 @@ class AnswerWithout:
 
 
 @dataclass(frozen=True)
-class Repeatability:
+class RunRepeatability:
     """Repeatability of the runs under the answer.
 
     Args:
@@ -160,7 +160,7 @@ _PATTERN = 0.05  # relative range of a condition that makes a pattern
 _OF_TREND = 2  # numbers of a straight line
 
 
-def repeatability(fitted: Fit) -> Repeatability | None:
+def repeatability(fitted: Fit) -> RunRepeatability | None:
     """Repeatability of the runs.
 
     Args:
@@ -176,7 +176,7 @@ def repeatability(fitted: Fit) -> Repeatability | None:
     rate = fitted.settings.scatter.outlier_rate
     outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
     outlier = outliers[0].id if outliers else ""
-    return Repeatability(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
+    return RunRepeatability(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ class _Runs:
 
     fitted: Fit
     scatter: Scatter
-    columns: RunColumns
+    columns: ScatterColumns
     kept: Sequence[int]
 
     @classmethod
@@ -210,7 +210,7 @@ class _Runs:
         jacobian = sensitivities(problem, point)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
             return None
-        columns = RunColumns.of(problem, point, scaled_residuals(problem, point), jacobian)
+        columns = ScatterColumns.of(problem, point, scaled_residuals(problem, point), jacobian)
         return cls(fitted, scatter, columns, [k for k, one in enumerate(scatter) if one.name in own])
 
     @property

@@ -16,7 +16,7 @@ from identification.trade_off import ROLES, Combination, Role, Setting, TradeOff
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.units import angle_power, dimension
+from tunnel_sim.vocabulary.dimensions import angle_power, dimension
 
 
 def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:

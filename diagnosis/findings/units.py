@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.findings.hidden import Hidden
-from diagnosis.findings.repeatability import Repeatability
+from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from identification.estimate import Quantity
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
-from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
+from tunnel_sim.vocabulary.dimensions import NUMBER, dimension, in_si, product
 
 
 def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
@@ -83,7 +83,7 @@ def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dic
     return {name: own_estimate(value, similarity) for name, value in values.items()}
 
 
-def own_repeatability(given: Repeatability, similarity: Similarity) -> Repeatability:
+def own_repeatability(given: RunRepeatability, similarity: Similarity) -> RunRepeatability:
     """The runs' repeatability with frequencies of the measured rig; all else is relative."""
     runs = (replace(one, frequency_hz=similarity.own(one.frequency_hz, "Hz")) for one in given.runs)
     return replace(given, runs=tuple(runs))

@@ -18,7 +18,7 @@ from diagnosis.findings.decision import Decision
 from diagnosis.findings.found import Found
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judgements import Remainder
-from diagnosis.findings.repeatability import Repeatability
+from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
 from diagnosis.search.disturbance import Disturbance
@@ -92,7 +92,7 @@ class Findings:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Remainder | None = None
-    repeatability: Repeatability | None = None
+    repeatability: RunRepeatability | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.likelihood.between_runs import Between, Kept, RunColumns, width_prior
 from diagnosis.likelihood.normal_equations import Products, damped_step, normal_equations
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
@@ -71,9 +71,9 @@ class Fit:
         return self.problem.linear(self.point)
 
     @cached_property
-    def columns(self) -> RunColumns:
+    def columns(self) -> ScatterColumns:
         """The columns of a fit with chance differences between the runs."""
-        return RunColumns.of(self.problem, self.point, self.residuals, self.jacobian)
+        return ScatterColumns.of(self.problem, self.point, self.residuals, self.jacobian)
 
     @property
     def widths(self) -> Array:

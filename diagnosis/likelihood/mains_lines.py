@@ -15,7 +15,13 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.residuals import Line, ResidualSpectrum, block_gain, resonance, smooth_spectra
+from diagnosis.likelihood.residuals import (
+    ResidualSpectrum,
+    SpectralLine,
+    block_gain,
+    resonance,
+    smooth_spectra,
+)
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from tunnel_sim.vocabulary.record import Array
@@ -50,7 +56,7 @@ _CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
 
 
 @dataclass(frozen=True, eq=False)
-class MainsLine(Line):
+class MainsLine(SpectralLine):
     """A line at a multiple of the mains' frequency.
 
     Args:

@@ -70,7 +70,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Motions:
+class CompiledRuns:
     """Runs in the form that the compiled integrator takes.
 
     Args:
@@ -91,7 +91,7 @@ class Motions:
     ringing: Sequence[Ringing | None]
 
     @classmethod
-    def of(cls, asked: Asked, like: int | None = None) -> Motions:
+    def of(cls, asked: Asked, like: int | None = None) -> CompiledRuns:
         """The motions of some runs.
 
         Args:
@@ -212,7 +212,7 @@ class Motions:
 
 def readings(asked: Asked) -> list[Array]:
     """Block means of the reading, by run, shape (blocks,) each; infinite where the motion diverges."""
-    motions = Motions.of(asked)
+    motions = CompiledRuns.of(asked)
     alike = {places[0]: places for places in motions.alike()}
     parts = [[alike[place] for place in part] for part in motions.parts(list(alike), _TOGETHER)]
     found: list[Array] = [np.zeros(0)] * len(asked.runs)
@@ -228,7 +228,9 @@ def readings(asked: Asked) -> list[Array]:
     return found
 
 
-def side_by_side(work: Callable[[_Part], None], parts: Sequence[_Part], motions: Motions, data: Data) -> None:
+def side_by_side(
+    work: Callable[[_Part], None], parts: Sequence[_Part], motions: CompiledRuns, data: Data
+) -> None:
     """Run some work on parts of a campaign's runs, in as many threads as the settings allow.
 
     Only the integrator works beside another thread. Short parts would wait for the interpreter: one does them all.
@@ -245,7 +247,7 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 
 def read_together(
-    asked: Asked, motions: Motions, members: list[tuple[int, int]], angle: Array, rate: Array
+    asked: Asked, motions: CompiledRuns, members: list[tuple[int, int]], angle: Array, rate: Array
 ) -> list[Array]:
     """Block means of the reading of runs whose motions were integrated together.
 

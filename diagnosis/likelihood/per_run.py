@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import mains_line
-from diagnosis.likelihood.residuals import Line, linear_coefficients, resonance, wind_line
+from diagnosis.likelihood.residuals import SpectralLine, linear_coefficients, resonance, wind_line
 from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
@@ -52,7 +52,7 @@ class ResidualsOf:
         return skip(self.fit, with_input=with_input)
 
 
-def _of_line(line: Line | None) -> Sought | None:
+def _of_line(line: SpectralLine | None) -> Sought | None:
     return None if line is None else Sought((line.amplitude, line.parameter), line.phases, line.drop)
 
 

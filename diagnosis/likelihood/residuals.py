@@ -62,7 +62,7 @@ def residual_spectra(fit: Fit) -> list[ResidualSpectrum]:
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A line found in the spectra.
 
     Args:
@@ -98,7 +98,7 @@ def block_gain(frequency: Hertz, run: RunData) -> float:
     return float(np.sin(run.block * x) / (run.block * np.sin(x))) if run.block > 1 else 1.0
 
 
-def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None:
+def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLine | None:
     """The strongest line of a moment whose frequency is in proportion to the wind speed, in all wind-on runs.
 
     Args:
@@ -148,7 +148,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None
     values, weights = np.array(amplitudes).T
     amplitude = float(np.sum(values * weights) / np.sum(weights))
     drop = float(np.sum([power[at] for power in powers]))
-    return Line(best, drop, float(total[at]) / max(floor, 1e-9), amplitude, phases)
+    return SpectralLine(best, drop, float(total[at]) / max(floor, 1e-9), amplitude, phases)
 
 
 def resonance(fit: Fit, run_index: int) -> float:

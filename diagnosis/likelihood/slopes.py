@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.likelihood.motions import Asked, Motions, block_means, end_weights, side_by_side
+from diagnosis.likelihood.motions import Asked, CompiledRuns, block_means, end_weights, side_by_side
 from diagnosis.model.run_data import RunData
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.rod_modes import Ringing
@@ -44,7 +44,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     if any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects}):
         return unknown
-    motions = Motions.of(asked, like=count)
+    motions = CompiledRuns.of(asked, like=count)
     if motions.rows["twist_stiffness"].any():
         return unknown
     values = terms(motions.law, motions.rows).reshape(points + 1, count, -1)
@@ -62,7 +62,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     return found
 
 
-def _samples(motions: Motions, place: int, count: int) -> Array:
+def _samples(motions: CompiledRuns, place: int, count: int) -> Array:
     """Changes of the samples of a run's wind or drive, as in `slopes`, shape (points, samples): none without any.
 
     NaN at a point where the samples are at other times than at the first.
@@ -81,7 +81,7 @@ def _samples(motions: Motions, place: int, count: int) -> Array:
 
 
 def _part(
-    asked: Asked, motions: Motions, part: list[int], moved: Array, sampled: Sequence[Array]
+    asked: Asked, motions: CompiledRuns, part: list[int], moved: Array, sampled: Sequence[Array]
 ) -> Sequence[Array]:
     """The changes of runs that are integrated side by side, shape (points, blocks) each.
 

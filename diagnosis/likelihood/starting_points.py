@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.likelihood.between_runs import Between, width_prior
 from diagnosis.likelihood.least_squares import Fit, clip
 from diagnosis.likelihood.normal_equations import Products, damped_step, normal_equations
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit
+from diagnosis.likelihood.scatter_widths import Between, width_prior
 from diagnosis.model.chance import Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data

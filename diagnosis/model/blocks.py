@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.run_data import Data, RunData, Samples, means_of
+from diagnosis.model.run_data import Data, RunData, UnevenSamples, means_of
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
@@ -49,7 +49,7 @@ def prepare(
         record = run.record
         block = max(1, round(interval * record.sample_rate))
         count = record.yaw_rad.size // block
-        samples = None if record.uniform else Samples.of(record, block)
+        samples = None if record.uniform else UnevenSamples.of(record, block)
         if samples is None:
             reading = means_of(record.yaw_rad[: count * block], block)
         else:

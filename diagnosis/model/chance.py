@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.model.parameters import Parameter, Prior
+from diagnosis.model.parameters import Parameter, RunParameterPrior
 from diagnosis.model.run_data import Data
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.base import Drawn
@@ -57,7 +57,9 @@ class Chance:
     @property
     def parameter(self) -> Parameter:
         """A run's own relative deviation."""
-        return Parameter(self.name, "1", size=_WIDE * self.usual, owner="per_run", prior=Prior(self.width))
+        return Parameter(
+            self.name, "1", size=_WIDE * self.usual, owner="per_run", prior=RunParameterPrior(self.width)
+        )
 
     def as_wide_as(self, width: float) -> Chance:
         """The same with another width."""

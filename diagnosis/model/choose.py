@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.rig import PerInertia, Rig
+from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.servo import Servo, ServoPerInertia
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: In the order in which they are asked whether a campaign is theirs.
-KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, Rig)
+KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, SpringModel)
 
 
 def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from diagnosis.model.loose import LooseBody
-from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
@@ -167,14 +167,14 @@ class _OfLaw(NominalModel):
 
 
 @dataclass(frozen=True)
-class Joint(_OfLaw, Rig):
+class Joint(_OfLaw, SpringModel):
     """A joint that its law restores."""
 
     coefficient_units: ClassVar[Mapping[str, str]] = {
-        **LooseBody.coefficient_units, **Rig.coefficient_units,
+        **LooseBody.coefficient_units, **SpringModel.coefficient_units,
     }  # fmt: skip
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """For driven runs, which may lack a resonance, the response to known moments first; then as for a rig."""
         if data.driven and not self.own_zeros:
             yield self._driven_start(data)
@@ -182,7 +182,7 @@ class Joint(_OfLaw, Rig):
         else:
             yield from super().starts(data)
 
-    def _driven_start(self, data: Data) -> Start:
+    def _driven_start(self, data: Data) -> FitStart:
         """The readings count as positions of the joint."""
         law = self.law
         found = [
@@ -200,7 +200,7 @@ class Joint(_OfLaw, Rig):
             }
             for r in data.runs
         ]
-        return Start({"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}, own)
+        return FitStart({"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}, own)
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
         """Where gravity alone restores the joint, its rest is one with the sensor's zero."""
@@ -210,7 +210,7 @@ class Joint(_OfLaw, Rig):
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
         """The free inertia, damping and stiffness, then the aerodynamic derivatives."""
         own = (name for name in LooseBody.coefficient_units if name in names)
-        return *own, *Rig.coefficient_units
+        return *own, *SpringModel.coefficient_units
 
     def unseen(self, data: Data) -> Sequence[str]:
         """The limits of a single spring."""
@@ -260,7 +260,7 @@ class ServoJoint(Joint):
                 table.drive[place] = replace(drive, scale=drive.scale * kp / self.kp, offset=offset)
         return table
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """From the kp of the model."""
         for start in super().starts(data):
             yield replace(start, common={**start.common, "servo_kp": self.kp})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,
@@ -93,7 +93,7 @@ class LooseBody(NominalModel):
         """The means of the runs differ."""
         return False
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """Inertia and damping by the response to known moments, and no other moment."""
         found = [
             (run.drive.scale / response[2], 2.0 * response[0])
@@ -108,7 +108,7 @@ class LooseBody(NominalModel):
             }
             for run in data.runs
         ]
-        yield Start({"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}, own)
+        yield FitStart({"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}, own)
 
     def frequency(self, inertia: float, stiffness: float) -> float:
         """The frequency of the reference rig, Hz."""

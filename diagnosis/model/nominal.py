@@ -35,7 +35,7 @@ _AIR_STIFFNESS, _AIR_DAMPING = 4.0, 0.02  # N m/rad and N m s/rad
 
 
 @dataclass(frozen=True)
-class Start:
+class FitStart:
     """Where a fit of the nominal model starts.
 
     Args:
@@ -309,7 +309,7 @@ class NominalModel:
 
     # ---- its starting points ----
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """Starting points for its fit; the second where the fit from the first misses the motion."""
         raise NotImplementedError
 

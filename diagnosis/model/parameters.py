@@ -30,7 +30,7 @@ class Named(Protocol):
 
 
 @dataclass(frozen=True)
-class Prior:
+class RunParameterPrior:
     """Prior of a run's own parameter: a normal distribution.
 
     Args:
@@ -65,7 +65,7 @@ class Parameter:
     owner: Owner = "common"
     of_swing: bool = False
     effect: str = ""
-    prior: Prior | None = None
+    prior: RunParameterPrior | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.starts import Shown, decay_squares
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.dimensions import dimension, in_si, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import dimension, in_si, product
 
 if TYPE_CHECKING:
     from diagnosis.model.run_data import Data, RunData
@@ -52,7 +52,7 @@ _PER_INERTIA = {
 
 
 @dataclass(frozen=True)
-class Rig(NominalModel):
+class SpringModel(NominalModel):
     """A body on springs of stated stiffness: Izz β̈ + C β̇ + Kr β = Ka β + Ca β̇."""
 
     @classmethod
@@ -75,21 +75,21 @@ class Rig(NominalModel):
                 remedy="state spring_stiffness, or leave the model out",
             )
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """From the runs' spectra; then from their own decays, as `identify` finds them."""
         yield self._start(data, Shown.of(data))
         squares = decay_squares(data)
         if squares is not None:
             yield self._start(data, Shown.of(data, squares))
 
-    def _start(self, data: Data, shown: Shown) -> Start:
+    def _start(self, data: Data, shown: Shown) -> FitStart:
         zero = float(np.median(shown.zeros))
         zeros = shown.zeros if self.own_zeros else [zero] * len(shown.zeros)
         own = [
             {"release_angle": float(np.mean(run.reading[:3]) - own_zero), "zero": own_zero}
             for run, own_zero in zip(data.runs, zeros, strict=True)
         ]
-        return Start({**self.dynamics(data, shown), "zero": zero}, own)
+        return FitStart({**self.dynamics(data, shown), "zero": zero}, own)
 
     def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
         """Starting values by name, of the zero apart.
@@ -114,7 +114,7 @@ class Rig(NominalModel):
 
 
 @dataclass(frozen=True)
-class PerInertia(Rig):
+class PerInertia(SpringModel):
     """A body on one spring that is not stated: all moments are per unit inertia."""
 
     per_inertia: ClassVar[bool] = True

@@ -25,7 +25,7 @@ FOLDS = 3  # groups of runs left out in turn
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class UnevenSamples:
     """Samples that are not evenly spaced, on the uniform raster of the blocks.
 
     A block without any has a place for one in its middle, so that every block has a mean; it does not count.
@@ -41,7 +41,7 @@ class Samples:
     count: NDArray[np.int64]
 
     @classmethod
-    def of(cls, record: Record, block: int) -> Samples:
+    def of(cls, record: Record, block: int) -> UnevenSamples:
         """The samples of a record, in blocks that hold ``block`` of them on average.
 
         The raster starts half a mean interval before the first sample, so that jitter moves few samples into the
@@ -62,14 +62,14 @@ class Samples:
         sums = np.stack([np.bincount(self.block, row, self.count.size) for row in rows])
         return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
 
-    def part(self, first: int, last: int, interval: float) -> Samples:
+    def part(self, first: int, last: int, interval: float) -> UnevenSamples:
         """The samples of the blocks from one up to another.
 
         Args:
             interval: of a block, s.
         """
         inside = slice(*np.searchsorted(self.block, (first, last)))
-        return Samples(
+        return UnevenSamples(
             self.time[inside] - first * interval, self.block[inside] - first, self.count[first:last]
         )
 
@@ -139,7 +139,7 @@ class RunData:
     duration: float
     start: float = 0.0
     derivative: int = 0
-    samples: Samples | None = None
+    samples: UnevenSamples | None = None
     drive: DriveMoment | None = None
     multiplied_by: str = ""
     stretch_of: str | None = None

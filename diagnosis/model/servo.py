@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.model.nominal import NominalModel, Start
-from diagnosis.model.rig import PerInertia, Rig
+from diagnosis.model.nominal import FitStart, NominalModel
+from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.model.starts import responses
 from tunnel_sim.effects import Effect
@@ -110,7 +110,7 @@ class _OfServo(NominalModel):
 
 
 @dataclass(frozen=True)
-class Servo(_OfServo, Rig):
+class Servo(_OfServo, SpringModel):
     """A joint held by a servo of stated kp: Izz β̈ + (C + kv) β̇ = kp (command − β).
 
     Args:
@@ -118,19 +118,19 @@ class Servo(_OfServo, Rig):
     """
 
     coefficient_units: ClassVar[Mapping[str, str]] = {
-        "yaw_inertia": "kg m2", "mechanical_damping": "N m s/rad", **Rig.coefficient_units,
+        "yaw_inertia": "kg m2", "mechanical_damping": "N m s/rad", **SpringModel.coefficient_units,
     }  # fmt: skip
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
         """Where a run has a command, and every run states the kp."""
-        return by_command(campaign) and Rig.describes(campaign)
+        return by_command(campaign) and SpringModel.describes(campaign)
 
     def similar(self, change: Similarity) -> NominalModel:
         """The kv of the similar campaign."""
         return replace(self, kv=change.similar(self.kv, "N m s/rad"))
 
-    def starts(self, data: Data) -> Iterator[Start]:
+    def starts(self, data: Data) -> Iterator[FitStart]:
         """Inertia and damping by the response to the command, whose gain is the kp; then as a rig."""
         shown = [
             (run.spring_stiffness / one[1], 2.0 * one[0])
@@ -141,7 +141,7 @@ class Servo(_OfServo, Rig):
             inertia, loss = np.median(shown, axis=0).tolist()
             damping = max(inertia * max(loss, _SLOW) - self.kv, 0.0)
             own = [{"release_angle": float(np.mean(run.reading[:3]))} for run in data.runs]
-            yield Start({"yaw_inertia": inertia, "mechanical_damping": damping}, own)
+            yield FitStart({"yaw_inertia": inertia, "mechanical_damping": damping}, own)
         yield from super().starts(data)
 
 

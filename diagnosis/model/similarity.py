@@ -15,8 +15,8 @@ import numpy as np
 from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
-from tunnel_sim.vocabulary.units import dimension
 
 REFERENCE_FREQUENCY = 2.0  # of the similar rig, Hz
 REFERENCE_STIFFNESS = 16.0  # median of its springs, N m/rad

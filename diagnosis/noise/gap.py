@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import bdtrc, chdtrc, stdtr
 
-from diagnosis.likelihood.between_runs import width_prior
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.noise.bands import p_values

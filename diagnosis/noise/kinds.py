@@ -124,7 +124,7 @@ class Noise:
         return Coloured(**known, spectrum=colour)
 
 
-class Stated(Noise):
+class StatedNoise(Noise):
     """White noise as stated by the campaign, confirmed by the records; arguments as in `Noise`."""
 
     source = "stated"

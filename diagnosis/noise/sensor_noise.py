@@ -17,7 +17,7 @@ from scipy.special import gammaincinv, ndtri
 from diagnosis.model.blocks import BLOCK_INTERVAL
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import frequency
-from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
+from diagnosis.noise.kinds import Estimated, Floor, Noise, StatedNoise
 from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
@@ -202,7 +202,7 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
         reason = Fact("not stated")
     elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
         used = dict.fromkeys(estimates, stated)
-        return Stated(used, stated, Fact("agrees", level), pooled, uncertainty, measured)
+        return StatedNoise(used, stated, Fact("agrees", level), pooled, uncertainty, measured)
     else:
         span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
         beside = {"stated_rad": float(np.sqrt(stated))}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagnosis.model.fact import Fact
-from tunnel_sim.effects.friction import AGAINST_RATE, friction_of
+from tunnel_sim.effects.friction_laws import AGAINST_RATE, friction_of
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.vocabulary.record import Array

@@ -16,7 +16,7 @@ from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import Ranges, paths, ranges
 from diagnosis.remainder.closable import Closable
-from diagnosis.remainder.formula import Formula, Proposal, Term, predicted_drop, propose
+from diagnosis.remainder.formula import Formula, FormulaTerm, Proposal, predicted_drop, propose
 from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.study import Study
 
@@ -94,8 +94,8 @@ def _formulas(base: Fit) -> Iterator[tuple[str, Formula]]:
         yield kind, Formula((term,), (-moment / max(*inside, 1e-300),), False, delta, 0.0)
 
 
-def _terms(r: Ranges) -> Iterator[tuple[str, Term]]:
+def _terms(r: Ranges) -> Iterator[tuple[str, FormulaTerm]]:
     for kind, texts in (("rate", _OF_RATE), ("angle", _OF_ANGLE), ("state", _OF_BOTH)):
-        yield from ((kind, Term(text)) for text in texts)
+        yield from ((kind, FormulaTerm(text)) for text in texts)
     for text in _OF_SLOW_RATE:
-        yield from (("rate", Term(text, {"v": width * r.rate})) for width in _WIDTHS)
+        yield from (("rate", FormulaTerm(text, {"v": width * r.rate})) for width in _WIDTHS)

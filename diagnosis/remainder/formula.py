@@ -22,12 +22,12 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect, known_effects
-from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.dimensions import Dimension, dimension, dimension_text, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import Dimension, dimension, dimension_text, product
 
 _NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
 _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}
@@ -35,7 +35,7 @@ _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f
 
 
 @dataclass(frozen=True)
-class Term:
+class FormulaTerm:
     """A term with the values of its inner parameters.
 
     Args:
@@ -80,30 +80,30 @@ _READING = ("y^2", "y^3", "y^5", "abs(y)", "abs(y)*y", "t", "t^2")
 _READING_PLACE = ("max(abs(y)-c,0)*sign(y)", "max(y-c,0)", "max(-y-c,0)")
 
 
-def terms(kind: str, r: Ranges) -> list[Term]:
+def terms(kind: str, r: Ranges) -> list[FormulaTerm]:
     """The terms that may explain a kind of `KINDS`, without a factor for spring or wind.
 
     Their inner parameters are spaced closely enough for a fit to reach the values between. There are no terms for
     kinds that no formula explains.
     """
-    library: list[Term] = []
+    library: list[FormulaTerm] = []
     if kind in ("angle", "state", "wind"):
-        library += map(Term, _ANGLE)
+        library += map(FormulaTerm, _ANGLE)
         library += _grid(_ANGLE_WIDE, w=_widths(r, 9))
         library += _grid(_ANGLE_PLACE, c=_places(r))
         library += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
         library += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
         library += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
     if kind in ("rate", "state", "wind"):
-        library += map(Term, _RATE)
+        library += map(FormulaTerm, _RATE)
         library += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
     if kind in ("state", "wind"):
-        library += map(Term, _STATE)
+        library += map(FormulaTerm, _STATE)
         library += _grid(_STATE_WIDE, w=_widths(r))
         places = np.linspace(-0.85, 0.85, 18) * r.angle
         library += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
     if kind == "time":
-        library += map(Term, _TIME)
+        library += map(FormulaTerm, _TIME)
         library += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
         library += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
         instants = np.linspace(0.04, 0.96, 24) * r.time
@@ -111,7 +111,7 @@ def terms(kind: str, r: Ranges) -> list[Term]:
         often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
         library += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
     if kind == "reading":
-        library += map(Term, _READING)
+        library += map(FormulaTerm, _READING)
         library += _grid(_READING_PLACE, c=_places(r))
         library += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
         instants = np.linspace(0.04, 0.96, 47) * r.time
@@ -120,10 +120,10 @@ def terms(kind: str, r: Ranges) -> list[Term]:
     return library
 
 
-def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[Term]:
+def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[FormulaTerm]:
     for text in texts:
         for values in combinations(*(grid.tolist() for grid in inner.values())):
-            yield Term(text, dict(zip(inner, values, strict=True)))
+            yield FormulaTerm(text, dict(zip(inner, values, strict=True)))
 
 
 def _widths(r: Ranges, count: int = 6) -> Array:
@@ -149,7 +149,7 @@ class Formula:
         gained: drop of χ² on held-out runs, dimensionless.
     """
 
-    terms: tuple[Term, ...]
+    terms: tuple[FormulaTerm, ...]
     coefficients: tuple[float, ...]
     of_reading: bool
     delta: Array
@@ -217,17 +217,17 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
     )
 
 
-def _candidates(unexplained: Unexplained, kind: str) -> list[Term]:
+def _candidates(unexplained: Unexplained, kind: str) -> list[FormulaTerm]:
     """The terms available for a formula of a kind; none where the runs allow none."""
     of_reading = kind == "reading"
     if of_reading and unexplained.paths[0].run.derivative:
         return []  # an effect's reading is an angle
     found = terms(kind, unexplained.ranges)
     if kind == "wind":
-        fast = [Term("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
-        return [Term("V^2*" + term.text, term.inner) for term in found] + fast
+        fast = [FormulaTerm("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
+        return [FormulaTerm("V^2*" + term.text, term.inner) for term in found] + fast
     if not of_reading and len({path.stiffness for path in unexplained.paths}) > 1:
-        found += [Term("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
+        found += [FormulaTerm("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
     return found
 
 
@@ -365,7 +365,7 @@ def effect_of(table: dict[str, Any]) -> type[Effect]:
     given = dict(table)
     name = str(given.pop("name"))
     parameters = {
-        own: Quantity(**{**values, "meaning": f"parameter {own}"})
+        own: ExpressionParameter(**{**values, "meaning": f"parameter {own}"})
         for own, values in given.pop("parameters").items()
     }
     return expression_effect(name, parameters=parameters, **given)

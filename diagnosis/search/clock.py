@@ -9,7 +9,7 @@ from contextlib import contextmanager
 Progress = Callable[[str], None]
 
 
-class Clock:
+class StepClock:
     """Wall time by step, and the progress call.
 
     Args:

@@ -17,7 +17,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import GapTest
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.odd_run import odd_alone
@@ -37,7 +37,7 @@ def prepared_undisturbed(
     measured: Campaign,
     model: NominalModel,
     kinds: Sequence[type[Effect]],
-    clock: Clock,
+    clock: StepClock,
     settings: Settings,
 ) -> tuple[Prepared, GapTest, tuple[Disturbance, ...]]:
     """As `prepared_and_tested`, without disturbances where there is a gap, and without a run that alone shows it.

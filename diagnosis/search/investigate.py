@@ -11,7 +11,7 @@ from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
-from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.disturbed import prepared_undisturbed, together, undisturbed
 from diagnosis.search.odd_run import odd_runs
 from diagnosis.search.rivals import RIVALS
@@ -58,7 +58,7 @@ def investigate(
     model = model or nominal_model(campaign)
 
     def study(campaign: Campaign, model: NominalModel) -> Study:
-        clock = Clock(progress)
+        clock = StepClock(progress)
         prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
         with clock.step("where" if test.detected else "nominal fit"):
             prepared = prepared.in_wider_blocks()
@@ -131,7 +131,7 @@ def nominal_study(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    model, clock = nominal_model(campaign), Clock()
+    model, clock = nominal_model(campaign), StepClock()
     prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
     return Study(prepared, Gap(test), disturbed=disturbed)
 

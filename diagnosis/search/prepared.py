@@ -32,7 +32,7 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.scatter import as_stated
@@ -152,7 +152,7 @@ def prepared_and_tested(
     measured: Campaign,
     model: NominalModel,
     kinds: Sequence[type[Effect]],
-    clock: Clock,
+    clock: StepClock,
     settings: Settings,
 ) -> tuple[Prepared, GapTest]:
     """Measure the noise, remove the hum, fit the nominal model and test for a gap.

@@ -23,9 +23,9 @@ from diagnosis.search.random_spectra import (
     LONGEST_BANDWIDTH,
     STREAM,
     SURROUNDINGS,
-    Form,
-    Source,
+    MomentSource,
     Spectrum,
+    SpectrumForm,
     SpectrumPart,
     of_surroundings,
     wandering,
@@ -72,7 +72,7 @@ class ProcessNoise:
         return float(self.drops.sum())
 
     @property
-    def sources(self) -> frozenset[Source]:
+    def sources(self) -> frozenset[MomentSource]:
         """The sources of its parts."""
         return frozenset(part.source for part in self.spectrum)
 
@@ -108,7 +108,7 @@ class _Channel:
         )
 
 
-def random_moments(fit: Fit, source: Source) -> list[ProcessNoise]:
+def random_moments(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
     """The random moments of a source that may explain the residuals of a fit.
 
     Returns:
@@ -162,7 +162,7 @@ def likeliest(tried: Iterable[ProcessNoise], chosen: RandomMomentSettings) -> Pr
 
 def _fit(
     channels: Sequence[_Channel],
-    forms: Sequence[Form],
+    forms: Sequence[SpectrumForm],
     known: ProcessNoise | None = None,
     price: float = 0.0,
 ) -> ProcessNoise | None:

@@ -33,7 +33,7 @@ from diagnosis.search.process_noise import (
     random_moments,
     with_response,
 )
-from diagnosis.search.random_spectra import SOURCES, Source
+from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.scatter import settled
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
@@ -120,7 +120,7 @@ class _Beside:
     view: View
 
     @classmethod
-    def found(cls, source: Source, best: Hypothesis, view: View) -> _Beside | None:
+    def found(cls, source: MomentSource, best: Hypothesis, view: View) -> _Beside | None:
         """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
         top = _settled(best, view, source)
@@ -138,7 +138,7 @@ class _Beside:
                 return cls((process, *_others_alike(process, shown, chosen)), top, seen, view)
         return None
 
-    def cost_from(self, source: Source) -> float:
+    def cost_from(self, source: MomentSource) -> float:
         """The cost of a random moment of another source beside the same effects; infinite where none acts."""
         known = self.seen.fit
         cost, process = _explained(source, self.seen)
@@ -193,7 +193,7 @@ def _kind(process: ProcessNoise) -> frozenset[str]:
     return frozenset(part.band for part in process.spectrum)
 
 
-def _explained(source: Source, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
+def _explained(source: MomentSource, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
     """The likeliest random moment of a source in a set's residual, and its cost; infinite where none acts."""
     process = likeliest(random_moments(beside.fit, source), beside.fit.settings.moment)
     return (np.inf, None) if process is None else (_cost(process, beside), process)
@@ -243,7 +243,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
 
 
-def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
+def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
     """Whether a random moment of a source may be the residual of the best set.
 
     It may if perfect agreement of the wind-on runs would raise the set's weight, or if the residual is steady
@@ -270,14 +270,14 @@ def _may_act(source: Source, best: Hypothesis, scale: Scale) -> bool:
     return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
 
 
-def _is_random(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
+def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool:
     """Whether a residual is not noise of the reading, and follows neither a phase nor a law."""
     if source.in_every_run and is_of_reading(fitted, process):
         return False
     return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
 
 
-def _shown_apart(process: ProcessNoise, source: Source, fitted: Fit) -> bool:
+def _shown_apart(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool:
     """Whether the runs in which no other source acts show a random moment too; true where there are none."""
     others = [one for one in SOURCES if one is not source]
     apart = {run.id for run in fitted.problem.data.runs if not any(one.acts(run) for one in others)}
@@ -324,7 +324,7 @@ def follows_the_motion(fitted: Fit, acts: Collection[str]) -> bool:
     return 2.0 * float(fdtrc(count, count, larger)) < fitted.settings.moment.phase_rate
 
 
-def obeys_a_law(fitted: Fit, source: Source) -> bool:
+def obeys_a_law(fitted: Fit, source: MomentSource) -> bool:
     """Whether one law, common to all runs, would explain most of a residual.
 
     A random moment differs from run to run, so no law fitted to some runs predicts the others. A missing law of
@@ -372,7 +372,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, view: View, source: Source) -> Hypothesis:
+def _settled(best: Hypothesis, view: View, source: MomentSource) -> Hypothesis:
     """The best set of effects on rows whose noise includes the response to the random moment.
 
     The given set where no random moment acts or its filter does not settle. The random moment is estimated from

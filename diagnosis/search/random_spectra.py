@@ -28,7 +28,7 @@ _FARTHEST = 1e4  # from that moment, up or down
 
 
 @dataclass(frozen=True)
-class Source(ABC):
+class MomentSource(ABC):
     """Where a random moment comes from.
 
     Traits:
@@ -57,7 +57,7 @@ class Source(ABC):
         """Moment per unit of its intensity in a run in which it acts: N m, or N m per N m."""
 
 
-class _Stream(Source):
+class _Stream(MomentSource):
     """The wind: its intensity is a moment coefficient."""
 
     condition = "wind_on"
@@ -72,7 +72,7 @@ class _Stream(Source):
         return data.air_moment(run)
 
 
-class _Surroundings(Source):
+class _Surroundings(MomentSource):
     """Floor, traffic, draughts: the intensity is the moment itself, in every run."""
 
     condition = "always"
@@ -91,7 +91,7 @@ class _Surroundings(Source):
 
 
 STREAM, SURROUNDINGS = _Stream(), _Surroundings()
-SOURCES: tuple[Source, ...] = (STREAM, SURROUNDINGS)
+SOURCES: tuple[MomentSource, ...] = (STREAM, SURROUNDINGS)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class SpectrumPart:
     bandwidth: float
     centre: float = 0.0
     strouhal_number: float = 0.0
-    source: Source = STREAM
+    source: MomentSource = STREAM
 
     @property
     def states(self) -> int:
@@ -137,23 +137,23 @@ Spectrum = tuple[SpectrumPart, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class SpectrumForm:
     """A form of a part of a spectrum: from what parameters it is made, and where they are sought."""
 
     part: Callable[..., SpectrumPart]
     grid: Sequence[tuple[float, ...]]
     bounds: Sequence[tuple[float, float]]
     steps: Sequence[float]  # of the first simplex, in logarithms
-    source: Source = STREAM
+    source: MomentSource = STREAM
 
 
-BROAD = Form(
+BROAD = SpectrumForm(
     SpectrumPart,
     [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, LONGEST_BANDWIDTH)],
     ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH)),
     (0.5, 0.5),
 )
-CENTRED = Form(
+CENTRED = SpectrumForm(
     SpectrumPart,
     [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)],
     ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0)),
@@ -161,7 +161,7 @@ CENTRED = Form(
 )
 
 
-def wandering(data: Data) -> Form | None:
+def wandering(data: Data) -> SpectrumForm | None:
     """Vortex shedding with a wandering phase; None without wind or body width."""
     fastest = max(run.wind_speed for run in data.runs)
     if data.width <= 0.0 or fastest <= 0.0:
@@ -169,7 +169,7 @@ def wandering(data: Data) -> Form | None:
     # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
     reduced = fastest / data.width
     numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
-    return Form(
+    return SpectrumForm(
         lambda s, b, n: SpectrumPart(s, b, strouhal_number=n),
         [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers],
         ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0)),
@@ -177,21 +177,21 @@ def wandering(data: Data) -> Form | None:
     )
 
 
-def of_surroundings(unit: float) -> tuple[Form, Form]:
+def of_surroundings(unit: float) -> tuple[SpectrumForm, SpectrumForm]:
     """A moment of the surroundings without and with a centre, as `BROAD` and `CENTRED` are those of the stream.
 
     Args:
         unit: the moment whose response is as large as the noise, N m.
     """
     bounds = (unit / _FARTHEST, unit * _FARTHEST)
-    broad = Form(
+    broad = SpectrumForm(
         lambda s, b: SpectrumPart(s, b, source=SURROUNDINGS),
         [(share * unit, b) for share in _SHARES for b in (0.3, 3.0, LONGEST_BANDWIDTH)],
         (bounds, *BROAD.bounds[1:]),
         BROAD.steps,
         SURROUNDINGS,
     )
-    centred = Form(
+    centred = SpectrumForm(
         lambda s, b, f: SpectrumPart(s, b, f, source=SURROUNDINGS),
         [
             (share * unit, *rest)

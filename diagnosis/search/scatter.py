@@ -13,15 +13,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from diagnosis.likelihood.between_runs import Between, Kept, RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.settings import ScatterSettings
-from identification.campaign.between_runs import WidthPrior
+from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits
@@ -110,7 +110,7 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
         return None
     residuals = found.residuals if not found.problem.scatter else scaled_residuals(problem, point)
-    columns, prior = RunColumns.of(problem, point, residuals, jacobian), width_prior(problem)
+    columns, prior = ScatterColumns.of(problem, point, residuals, jacobian), width_prior(problem)
     if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
         return None
     layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
@@ -135,7 +135,7 @@ def evident(fitted: Fit) -> Fit:
     return with_scatter(fitted, tuple(found))
 
 
-def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
+def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
     """The numbers in which the runs differ, found by removing the least needed one repeatedly."""
     kept = np.ones(prior.usual.size, bool)
     while kept.sum() > 1:
@@ -198,13 +198,13 @@ def named(fitted: Fit) -> tuple[str, ...]:
     return tuple(one.name for one in fitted.problem.scatter if one.shown)
 
 
-def _evident(columns: RunColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
+def _evident(columns: ScatterColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
     """Whether the runs differ by more than the least widths."""
     limit = chdtri(float(which.sum()), chosen.scatter_rate)
     return bool(_gain(columns, prior, np.ones_like(which), which) >= limit)
 
 
-def _gain(columns: RunColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
+def _gain(columns: ScatterColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
     """Drop of −2 ln L by some of the differences beside the others that are kept."""
     whole = columns.likeliest(_held(prior, ~kept))
     without = columns.likeliest(_held(prior, ~kept | lost))

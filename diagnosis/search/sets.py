@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
@@ -145,7 +145,7 @@ class Sets:
         return found
 
 
-def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
+def compared(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> Sets:
     """The sets with those that the answer is compared with, without those that the runs do not confirm.
 
     Args:
@@ -164,7 +164,7 @@ def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
         return resolved(sets)
 
 
-def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
+def _with_near_sets(sets: Sets, clock: StepClock) -> Sets:
     """Add every set with one effect less than the answer, or with an equivalent effect."""
     best, view = sets.best, sets.view
     if best is None or len(best.effects) == 1:

@@ -12,7 +12,7 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
@@ -218,7 +218,7 @@ class Study:
         )
 
     @classmethod
-    def of_sets(cls, sets: Sets, gap: Gap, clock: Clock) -> Study:
+    def of_sets(cls, sets: Sets, gap: Gap, clock: StepClock) -> Study:
         """The study whose answers are sets; the first of them and its parts are fitted to whole runs.
 
         Args:

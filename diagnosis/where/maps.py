@@ -59,7 +59,7 @@ class GroupExcess:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class RunTrace:
     """One run against time: the readings and the residuals of the models.
 
     A model's prediction is the reading minus its residual.
@@ -84,7 +84,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class ExcessMap:
     """Excess by amplitude and by wind speed, or by time where the runs have one speed.
 
     Args:
@@ -136,8 +136,8 @@ class Maps:
     lines: tuple[ResidualLine, ...]
     backbones: tuple[Backbone, ...]
     phase_plane: PhasePlane | None
-    traces: tuple[Trace, ...]
-    grid: Grid
+    traces: tuple[RunTrace, ...]
+    grid: ExcessMap
     unit: str = "rad"
 
     def to_json_dict(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 
 @dataclass(frozen=True)
-class Finding:
+class Conclusion:
     """A conclusion with its reason.
 
     Args:
@@ -41,8 +41,8 @@ class Place:
 
     survey: Survey
     runs: tuple[str, ...]
-    channel: Finding
-    condition: Finding
+    channel: Conclusion
+    condition: Conclusion
 
 
 def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise_ratio: float = 1.0) -> Place:
@@ -81,31 +81,31 @@ def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> 
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
-def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
+def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusion:
     """Whether the gap needs wind: ``wind_on`` where the wind-off runs, fitted alone, show no gap."""
     runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
-        return Finding("always", Fact("wind off"))
+        return Conclusion("always", Fact("wind off"))
     if not off:
-        return Finding(None, Fact("wind on in every run"))
+        return Conclusion(None, Fact("wind on in every run"))
     if min(run.p_value for run in shown) * len(runs) > chosen.run_rate:
-        return Finding(None, Fact("no single run"))
+        return Conclusion(None, Fact("no single run"))
     most = max(shown, key=lambda run: run.share)
     if len(shown) >= chosen.one_run_of and most.share > chosen.one_run and most.id not in off:
-        return Finding(None, Fact("one run", {"run": most.id}))
+        return Conclusion(None, Fact("one run", {"run": most.id}))
     # without coefficients and a gain that these runs lack
     data = nominal.problem.data.alone(off)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
-        return Finding(None, Fact("wind-off runs not fitted"))
+        return Conclusion(None, Fact("wind-off runs not fitted"))
     excesses = run_excesses(campaign, alone)
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
     if min(tests) * len(tests) < chosen.still_rate:
-        return Finding("always", Fact("wind-off runs show it", {"runs": len(off)}))
-    return Finding("wind_on", Fact("wind-off runs show none", {"runs": len(off)}))
+        return Conclusion("always", Fact("wind-off runs show it", {"runs": len(off)}))
+    return Conclusion("wind_on", Fact("wind-off runs show none", {"runs": len(off)}))
 
 
 def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[float, float] | None:
@@ -127,12 +127,12 @@ def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[f
     return interval if brief and interval[0] > chosen.blow_after * length else None
 
 
-def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Finding:
+def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclusion:
     """The channel on which the gap acts, from features of the residual and the inferred condition."""
     chosen = nominal.settings.where
     blow = blow_interval(survey, chosen.blow_share, chosen)
     if blow is not None:
-        return Finding("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
+        return Conclusion("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in survey.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
@@ -140,34 +140,34 @@ def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Findin
     if lines and len(lines) >= max(1, len(survey.maps.runs) // chosen.line_one_in):
         hertz = float(np.median([line.frequency for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
-        return Finding(
+        return Conclusion(
             "forcing" if similar < chosen.fastest_moment else "sensor",
             Fact("spectral line", {"frequency_hz": hertz}),
         )
     if excess.get("above", 0.0) > chosen.fast_share * whole:
-        return Finding("sensor", Fact("too fast"))
+        return Conclusion("sensor", Fact("too fast"))
     if excess.get("0", 0.0) > chosen.slow_share * whole:
         if excess.get("2f0", 0.0) > chosen.shifted_centre * whole:
-            return Finding("stiffness", Fact("shifted centre and harmonic"))
+            return Conclusion("stiffness", Fact("shifted centre and harmonic"))
         if condition == "wind_on":
-            return Finding("forcing", Fact("shifted centre with wind"))
-        return Finding("sensor", Fact("shifted centre"))
+            return Conclusion("forcing", Fact("shifted centre with wind"))
+        return Conclusion("sensor", Fact("shifted centre"))
     if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > chosen.harmonic_share * whole:
-        return Finding("sensor", Fact("harmonics"))
+        return Conclusion("sensor", Fact("harmonics"))
     apart = _between_runs(nominal, survey)
     if apart is not None:
         return apart
     if all(run.drive is not None for run in nominal.problem.data.runs):
-        return Finding(None, Fact("every run driven"))
+        return Conclusion(None, Fact("every run driven"))
     frequency, damping = drift(list(survey.maps.backbones))
     if frequency > chosen.drift_ratio * max(damping, 0.0) and frequency > 0.0:
-        return Finding("stiffness", Fact("frequency along the decay"))
+        return Conclusion("stiffness", Fact("frequency along the decay"))
     if damping > chosen.drift_ratio * max(frequency, 0.0) and damping > 0.0:
-        return Finding("damping", Fact("damping along the decay"))
-    return Finding(None, Fact("both along the decay"))
+        return Conclusion("damping", Fact("damping along the decay"))
+    return Conclusion(None, Fact("both along the decay"))
 
 
-def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
+def _between_runs(nominal: Fit, found: Survey) -> Conclusion | None:
     """The channel where every run alone is linear, but the runs do not agree on the coefficients."""
     sizes = [run.reading.size for run in nominal.problem.data.runs]
     left, shifts = 0.0, []
@@ -182,5 +182,5 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
-        return Finding(None, Fact("frequency between runs"))
-    return Finding("damping", Fact("damping between runs"))
+        return Conclusion(None, Fact("frequency between runs"))
+    return Conclusion("damping", Fact("damping between runs"))

@@ -21,7 +21,7 @@ from diagnosis.where.excess import (
     run_excesses,
     within_bands,
 )
-from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace
+from diagnosis.where.maps import ExcessMap, GroupExcess, Maps, RunMap, RunTrace
 from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.record import Array
 
@@ -239,7 +239,7 @@ def _times(fit: Fit, index: int) -> Array:
     return run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
 
 
-def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> Grid:
+def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> ExcessMap:
     """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
     setting = speed_groups(run.wind_speed for run in runs)
     speeds = sorted(set(setting.values()))
@@ -256,7 +256,7 @@ def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: floa
         amplitude = [a[keep] for a, keep in zip(samples.amplitude, kept, strict=True)]
         power = [p[keep] for p, keep in zip(samples.power, kept, strict=True)]
         columns.append(replace(samples, power=power).over(rows, amplitude))
-    return Grid(
+    return ExcessMap(
         rows,
         None if shared else np.array(speeds),
         edges * seconds if shared else None,
@@ -279,7 +279,7 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
     return profile(edges, places, powers, ones, [2.0] * len(excesses))
 
 
-def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
+def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[RunTrace, ...]:
     """Every run against time, the largest excess first."""
     order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
     most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
@@ -305,7 +305,7 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
             whole = time <= last - length
             first = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
             last = first + length
-        trace = Trace(
+        trace = RunTrace(
             run.id,
             time * similarity.own(1.0, "s"),
             reading * factor + similarity.rest,

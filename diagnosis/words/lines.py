@@ -21,7 +21,7 @@ from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
 from identification.printing import COEFFICIENTS, Document, significant, unit_mark
 from tunnel_sim.effects import Effect, known_effects
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 _MOST = 0.5  # of a variance: more than all its other sources together
 _COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root

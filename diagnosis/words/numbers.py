@@ -10,8 +10,8 @@ from typing import Any
 from diagnosis.findings.closure import Misfit
 from identification.printing import Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.quantities import Share
-from tunnel_sim.vocabulary.units import beside
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")

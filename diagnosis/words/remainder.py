@@ -22,7 +22,7 @@ from diagnosis.words.numbers import (
 from diagnosis.words.scatter import scattering
 from identification.printing import COEFFICIENTS, Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 
 def rest_words(document: Document) -> str:

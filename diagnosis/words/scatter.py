@@ -7,7 +7,7 @@ from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import listed, plain, probability, rounded_up
-from identification.blocks import Table
+from identification.blocks import TextTable
 from identification.printing import Document, concise, significant, with_std
 from identification.status import SYSTEMATIC
 from tunnel_sim.effects import ALL_EFFECTS
@@ -326,7 +326,7 @@ def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str, of: str = "_
     return percent_of((sum(one[f"{name}{of}"] ** 2 for one in runs) / len(runs)) ** 0.5)
 
 
-def repeatability_table(document: Document) -> Table:
+def repeatability_table(document: Document) -> TextTable:
     """Every run against the model; a table without rows where the runs repeat."""
     found, rows = document.get("repeatability"), []
     known = scatters(document)
@@ -342,7 +342,7 @@ def repeatability_table(document: Document) -> Table:
     title = "Every run against the model"
     if known:
         title += ", and its scatter by chance (one standard deviation)"
-    return Table(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
+    return TextTable(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
 
 
 def _band(width: Share) -> str:

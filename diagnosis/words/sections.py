@@ -55,7 +55,7 @@ from identification.blocks import (
     Pairs,
     Paragraph,
     Section,
-    Table,
+    TextTable,
     brief,
 )
 from identification.printing import COEFFICIENTS, Document, significant, trade_off_line
@@ -295,9 +295,9 @@ def _provenance(document: Document) -> Section:
                 (
                     Heading("Units and terms"),
                     Pairs(TERMS),
-                    Table("Versions", ("of", "version"), versions),
-                    Table("Records", ("file", "SHA-256"), hashes),
-                    Table("Time taken", ("step", "time"), seconds, right=("time",)),
+                    TextTable("Versions", ("of", "version"), versions),
+                    TextTable("Records", ("file", "SHA-256"), hashes),
+                    TextTable("Time taken", ("step", "time"), seconds, right=("time",)),
                 )
             ),
         ),

@@ -22,7 +22,7 @@ from diagnosis.words.numbers import (
 )
 from diagnosis.words.remainder import ceiling
 from diagnosis.words.scatter import answer_name, spread_estimate
-from identification.blocks import Table
+from identification.blocks import TextTable
 from identification.printing import (
     Document,
     coefficient_label,
@@ -33,12 +33,12 @@ from identification.printing import (
     with_std,
 )
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 _IN_BRACKETS = "root mean square (in brackets: mean square over the noise variance)"
 
 
-def candidates_table(document: Document) -> Table:
+def candidates_table(document: Document) -> TextTable:
     """The answers considered and their shares of the gap, most probable first; a last row counts the others."""
     rows, given, chosen = [], ranked(document), settings_of(document).words
     probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
@@ -58,7 +58,7 @@ def candidates_table(document: Document) -> Table:
         rows.append((f"{len(others)} more, together", probability(together), "", "", ""))
     detail = ("residual [× noise variance]", "parameters")
     heads = ("answer", "probability", "explained in the fit", *detail)
-    return Table(
+    return TextTable(
         f"Answers for {document['campaign']}",
         heads,
         tuple(rows),
@@ -74,7 +74,7 @@ def _estimate(document: Document, full: str, answer: str, given: Document) -> st
     return spread_estimate(document, full.rpartition(".")[0] or answer, given) or estimated(given, mark)
 
 
-def parameters_table(document: Document) -> Table:
+def parameters_table(document: Document) -> TextTable:
     """The parameters of the answer; a table without rows where it has none."""
     answer = document["candidates"][0]
     rows, effect = [], ""
@@ -87,10 +87,10 @@ def parameters_table(document: Document) -> Table:
     whose = "Parameters" if document.get("decided", True) else f"Parameters of the {set_out(document)}"
     units = explained({given["unit"] for given in answer["parameters"].values()})
     heads = ("effect", "parameter", "estimate")
-    return Table(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
+    return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
 
 
-def runs_table(document: Document, campaign: Campaign | None = None) -> Table:
+def runs_table(document: Document, campaign: Campaign | None = None) -> TextTable:
     """The gap before and after, all runs first; a table without rows where no gap was found.
 
     Args:
@@ -124,10 +124,10 @@ def runs_table(document: Document, campaign: Campaign | None = None) -> Table:
     shown = "shows the gap"
     heads = ("run", *conditions, "before", "after", shown)
     detail = (*conditions, shown)
-    return Table(f"Gap, {_IN_BRACKETS}", heads, tuple(rows), right=heads[1:-1], detail=detail)
+    return TextTable(f"Gap, {_IN_BRACKETS}", heads, tuple(rows), right=heads[1:-1], detail=detail)
 
 
-def waterfall_table(document: Document) -> Table:
+def waterfall_table(document: Document) -> TextTable:
     """The residual gap with each cause added, and without each; a table without rows where no cause is named."""
     steps, without = document.get("waterfall", ()), document.get("without", {})
     rows = []
@@ -137,10 +137,10 @@ def waterfall_table(document: Document) -> Table:
         rows.append((name, misfit_text(document, step["excess"]), alone))
     title = f"Gap {document.get('waterfall_on', '')} as the causes are added, {_IN_BRACKETS}"
     heads = ("cause added", "residual gap", "without this cause")
-    return Table(title, heads, tuple(rows), heads[1:], names=heads[:1])
+    return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
 
 
-def closable_table(document: Document) -> Table:
+def closable_table(document: Document) -> TextTable:
     """Share that each kind could explain, in per cent, the named kind first.
 
     A table without rows where nothing remains beyond chance.
@@ -156,10 +156,10 @@ def closable_table(document: Document) -> Table:
         for one in ceilings
     ]
     title = "Share of the residual gap that each kind of law could explain, estimated without a formula"
-    return Table(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
+    return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 
-def coefficients_table(document: Document) -> Table:
+def coefficients_table(document: Document) -> TextTable:
     """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
 
     A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
@@ -182,7 +182,7 @@ def coefficients_table(document: Document) -> Table:
     detail = () if skewed else ("95 % interval",)
     heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
     title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
-    return Table(title, heads, tuple(rows), right=heads[1:], detail=detail)
+    return TextTable(title, heads, tuple(rows), right=heads[1:], detail=detail)
 
 
 def _rows(document: Document) -> Iterator[tuple[str, Document | None, Document | None]]:
@@ -231,7 +231,7 @@ SOURCES = {
 """The sources of a coefficient's variance."""
 
 
-def hidden_table(document: Document) -> Table:
+def hidden_table(document: Document) -> TextTable:
     """Upper limits on undetected effects, and the change of each coefficient at that size."""
     hidden, rows = document.get("hidden", ()), []
     names = [name for name in document["coefficients"]["after"] if hidden and name in hidden[0]["moves"]]
@@ -242,10 +242,10 @@ def hidden_table(document: Document) -> Table:
     heads = [f"would change {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
     units = explained({one["size"]["unit"] for one in hidden})
     title = f"Upper limits on undetected effects (95 %), which ± does not include{units}"
-    return Table(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
+    return TextTable(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
 
 
-def patch_table(document: Document) -> Table:
+def patch_table(document: Document) -> TextTable:
     """The changes of the patch; a table without rows where no model was given."""
     model = document.get("model") or {"written": (), "file": ""}
     rows = []
@@ -253,7 +253,7 @@ def patch_table(document: Document) -> Table:
         numbers = _numbers(one["before"]), _numbers(one["after"])
         rows.append((one["name"], *numbers, unit_mark(beside(one["unit"], ""))))
     heads = ("attribute", "before", "after", "unit")
-    return Table(f"Changes to {model['file']}", heads, tuple(rows), heads[1:3])
+    return TextTable(f"Changes to {model['file']}", heads, tuple(rows), heads[1:3])
 
 
 def _numbers(values: list[float]) -> str:
@@ -261,7 +261,7 @@ def _numbers(values: list[float]) -> str:
     return " ".join(significant(value, 4) for value in values[: last + 1])
 
 
-def lines_table(document: Document) -> Table:
+def lines_table(document: Document) -> TextTable:
     """Narrow lines in the residuals."""
     rows = tuple(
         (
@@ -273,10 +273,10 @@ def lines_table(document: Document) -> Table:
         for line in (document.get("maps") or {}).get("lines", [])
     )
     heads = ("run", "frequency [Hz]", "amplitude", "share of the run's gap")
-    return Table("Narrow lines in the residuals", heads, rows, right=heads[1:])
+    return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])
 
 
-def budget_table(document: Document) -> Table:
+def budget_table(document: Document) -> TextTable:
     """The uncertainty budget of the coefficients of the answer; no rows where the document has no shares.
 
     A row for each source: its standard deviation and its share of the variance, by coefficient.
@@ -295,7 +295,7 @@ def budget_table(document: Document) -> Table:
         columns.append([*cells, significant(std, 2)])
     title = "Uncertainty budget with the causes: standard deviation by source, and share of the variance"
     rows = tuple(zip(*columns, strict=True)) if heads else ()
-    return Table(title, ("source", *heads), rows, right=tuple(heads))
+    return TextTable(title, ("source", *heads), rows, right=tuple(heads))
 
 
 TESTS = {
@@ -313,9 +313,9 @@ TESTS = {
 """The tested properties, by the names of the tests."""
 
 
-def tests_table(document: Document) -> Table:
+def tests_table(document: Document) -> TextTable:
     """The tests of the gap: name, tested property, and p-value."""
     tests = document["gap"]["tests"].items()
     rows = tuple((name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests)
     title = "Tests of the gap; p is the probability that noise alone gives as much"
-    return Table(title, ("test", "tested property", "p"), rows, right=("p",))
+    return TextTable(title, ("test", "tested property", "p"), rows, right=("p",))

@@ -154,8 +154,8 @@ class _Held:
 
 def untrained() -> list[Point]:
     """The policies for comparison with the agents."""
-    from tunnel_sim.envs.conditions import CN_BETA, FreeDecayConfig
     from tunnel_sim.envs.engines import operator_action
+    from tunnel_sim.envs.episode_conditions import CN_BETA, FreeDecayConfig
 
     config, found = FreeDecayConfig(**FREE_DECAY), []
     rig = config.rig()

@@ -18,7 +18,14 @@ import numpy as np
 from identification.campaign.derivatives import Design, derivatives, loads
 from identification.estimate import PARAMETERS
 from identification.policy import LEAST_ENERGY, SAFE_DEVIATIONS
-from identification.signal.decay_fit import Prior, Reading, RunFit, fit_decays, information_at, linearised_at
+from identification.signal.decay_fit import (
+    Reading,
+    RunFit,
+    SharedPrior,
+    fit_decays,
+    information_at,
+    linearised_at,
+)
 from identification.signal.free_decay import Decay
 from identification.statistics import determined, eliminate, embed, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -128,7 +135,7 @@ def update_belief(
         normal = normal + link.T @ weight @ link
         right = right + link.T @ weight @ np.array([own.decay.rate, own.decay.stiffness])
     readings, start = [reading for reading, _ in runs], scaled_solve(normal, right)
-    fit = fit_decays(readings, links, start, prior=Prior(prior.shared, known))
+    fit = fit_decays(readings, links, start, prior=SharedPrior(prior.shared, known))
     if not fit.converged:
         raise ValueError("the joint fit does not converge")
     return Belief(fit.parameters, fit.normal / variance)

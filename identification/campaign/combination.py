@@ -21,7 +21,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.repeatability import MeasuredRuns, scatter_between
+from identification.campaign.run_scatter import MeasuredRuns, scatter_between
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
 from identification.printing import with_std
@@ -68,7 +68,7 @@ def combined_estimate(
 ) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k, g).
 
-    Scatter between the runs is in the covariance (`identification.campaign.repeatability`). Where they contradict
+    Scatter between the runs is in the covariance (`identification.campaign.run_scatter`). Where they contradict
     each other beyond it, the covariance is widened by the ratio of Birge, Phys. Rev. 40 (1932) 207–227, doi
     10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
 

@@ -19,9 +19,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from identification.campaign.derivatives import build_design, combine, has_size, loads, wind_off
-from identification.campaign.repeatability import (
+from identification.campaign.run_scatter import (
     MeasuredRuns,
-    Scatter,
+    ScatterFit,
     scatter_between,
 )
 from identification.campaign.springs import inertia_of_springs
@@ -108,7 +108,7 @@ def _mean_std(values: Array) -> float:
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
 
 
-def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
+def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> ScatterFit | None:
     """The scatter between the runs, computed as for every method; None if it does not count."""
     design = build_design([one.run for one in seen], campaign.rig)
     values, weights = [], []
@@ -127,7 +127,7 @@ def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
     return scatter_between(measured, start[0], campaign.repeatability)
 
 
-def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: Scatter) -> list[Array]:
+def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: ScatterFit) -> list[Array]:
     """Change of the outcome by one standard deviation of each kind of scatter, by kind, shape (q, runs)."""
     every = []
     values = np.array([seen[:2] for seen in scatter.seen])
@@ -145,7 +145,7 @@ def _filled(
     pairing: _Pairing,
     seen: Sequence[PairedRun],
     campaign: Campaign,
-    scatter: Scatter | None,
+    scatter: ScatterFit | None,
 ) -> Estimate:
     """The estimate, with its wind-off line, with the coefficients and the air of its runs.
 

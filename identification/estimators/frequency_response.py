@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Status
 from identification.signal.decay_fit import Reading, project_run
-from identification.signal.forcing import ANGLE, ANGULAR_RATE, Forced, State
+from identification.signal.forcing import ANGLE, ANGULAR_RATE, Forced, RunUnknowns
 from identification.signal.run_fit import Gained, describe_run, identify_run
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
@@ -151,7 +151,7 @@ def _fitted(
     for _ in range(_STEPS):
         with np.errstate(all="ignore"):  # a distant trial may overflow; it is then rejected
             decay, gain = forcing.at(forcing.link @ parameters)
-            state = State(decay, 0.0, float(initial[0]), float(initial[1]), gain)
+            state = RunUnknowns(decay, 0.0, float(initial[0]), float(initial[1]), gain)
             rows = forcing.rows(reading.time, decay)
             residual, local = reading.residual(state, rows), forcing.weights(state) @ rows
             left = lines.weighted(residual)

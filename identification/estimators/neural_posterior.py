@@ -28,7 +28,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.repeatability import MeasuredRuns, scatter_between
+from identification.campaign.run_scatter import MeasuredRuns, scatter_between
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.posterior import (

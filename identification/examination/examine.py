@@ -15,7 +15,7 @@ from identification.campaign.derivatives import loads
 from identification.estimate import Estimate, Quantity
 from identification.examination.free_motion import find_release, with_zeros, without_rest
 from identification.examination.self_excited import self_excited_runs, swing_of
-from identification.examination.slips.base import Seen
+from identification.examination.slips.base import SlipEvidence
 from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.files.plausible import few_samples
@@ -133,7 +133,7 @@ def examine(campaign: Campaign) -> Examined:
     return Examined(kept, (*remarks, *(() if seen is None else found_in(seen))))
 
 
-def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | None]:
+def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvidence | None]:
     """Mend the records of a campaign, and measure its free decays.
 
     Returns:
@@ -162,7 +162,7 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | N
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
-    seen = Seen(kept, campaign, swings)
+    seen = SlipEvidence(kept, campaign, swings)
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
@@ -184,7 +184,7 @@ def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class SampleClock:
     """The uniform clock of a record's samples.
 
     Args:
@@ -242,7 +242,7 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     return replace(campaign, runs=tuple(even.get(run.id, run) for run in campaign.runs)), tuple(remarks)
 
 
-def find_clock(time_s: Array) -> Clock | None:
+def find_clock(time_s: Array) -> SampleClock | None:
     """The uniform clock that explains time stamps; samples may be missing. None if there is none.
 
     The stamps are its ticks, rounded to their last decimal or to the ticks of a logger's timer. They may be off by
@@ -282,7 +282,7 @@ def find_clock(time_s: Array) -> Clock | None:
         clock = start + interval * (place - place.mean())
         away = float(np.abs(time_s - clock).max())
         if away <= max(allowed, CLOCK_TOLERANCE * interval):
-            return Clock(interval, place.astype(np.int64), clock, away)
+            return SampleClock(interval, place.astype(np.int64), clock, away)
     return None
 
 

@@ -128,7 +128,7 @@ _STANDS_OUT = 1e-4  # βλ/α below which the prior determines a direction
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class TrainingProgress:
     """The state of a training, sufficient to resume it.
 
     Args:
@@ -143,7 +143,7 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class TrainingPairs:
     """Training pairs, scaled.
 
     Args:
@@ -158,7 +158,7 @@ class Problem:
     output_scaling: Scaling
 
     @classmethod
-    def of(cls, pairs: tuple[Array, Array], sizes: tuple[int, ...], *, unit_deviation: bool) -> Problem:
+    def of(cls, pairs: tuple[Array, Array], sizes: tuple[int, ...], *, unit_deviation: bool) -> TrainingPairs:
         """Scale inputs and targets to zero mean, and to unit deviation: inputs only on request."""
         inputs, output = Scaling.of(pairs[0]), Scaling.of(pairs[1][:, None])
         if not unit_deviation:
@@ -217,7 +217,7 @@ def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor
     return outputs, torch.cat(parts, dim=1)
 
 
-def advance_training(progress: Progress, problem: Problem) -> Progress:
+def advance_training(progress: TrainingProgress, problem: TrainingPairs) -> TrainingProgress:
     """One step of Levenberg–Marquardt, after a re-estimation of α and β; ``finished`` where no step lowers F.
 
     It solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ remains accurate where β is
@@ -248,12 +248,12 @@ def advance_training(progress: Progress, problem: Problem) -> Progress:
         moved = weights - step - rest / (held.alpha + damping)
         left = _forward(moved, problem.sizes, inputs)[2] - targets
         if float(held.beta * (left @ left) + held.alpha * (moved @ moved)) < cost:
-            return Progress(moved.numpy(), held, damping / _FACTOR, progress.iteration + 1)
+            return TrainingProgress(moved.numpy(), held, damping / _FACTOR, progress.iteration + 1)
         damping *= _FACTOR
     return replace(progress, held=held, iteration=progress.iteration + 1, finished=True)
 
 
-def conclude_training(progress: Progress, problem: Problem) -> tuple[Network, dict[str, Any]]:
+def conclude_training(progress: TrainingProgress, problem: TrainingPairs) -> tuple[Network, dict[str, Any]]:
     """The trained network with its posterior, and the record of its training."""
     import torch
 
@@ -299,8 +299,8 @@ class Checkpoint:
         running: the current training; None between two.
     """
 
-    ended: tuple[Progress, ...] = ()
-    running: Progress | None = None
+    ended: tuple[TrainingProgress, ...] = ()
+    running: TrainingProgress | None = None
 
     def to_bytes(self, spec: dict[str, Any]) -> bytes:
         """As safetensors, valid only for a training of the same specification, as JSON."""
@@ -322,7 +322,7 @@ class Checkpoint:
             if document["spec"] != json.loads(json_line(spec)):
                 return None
             tensors = load(content)
-            kept: list[Progress] = []
+            kept: list[TrainingProgress] = []
             for at, (alpha, beta, damping, iteration, finished) in enumerate(document["state"]):
                 weights = tensors[f"weights.{at}"]
                 numbers = np.array([alpha, beta, damping], dtype=np.float64)
@@ -335,7 +335,7 @@ class Checkpoint:
                 if not isinstance(iteration, int) or iteration < 0 or not isinstance(finished, bool | int):
                     return None
                 held = Hyperparameters(alpha, beta)
-                kept.append(Progress(weights, held, damping, iteration, bool(finished)))
+                kept.append(TrainingProgress(weights, held, damping, iteration, bool(finished)))
             ended = document["ended"]
             if not isinstance(ended, int) or not max(0, len(kept) - 1) <= ended <= len(kept):
                 return None
@@ -417,7 +417,7 @@ def train(
                     state, name = checkpoint.running, f"{which} network, start {start + 1} of {spec.starts}"
                     if state is None:
                         rng = np.random.default_rng([spec.seed, _START, number, start])
-                        state = Progress(first_weights(problem.sizes, rng))
+                        state = TrainingProgress(first_weights(problem.sizes, rng))
                     while state.iteration < spec.steps(which) and not state.finished:
                         state = advance_training(state, problem)
                         checkpoint = replace(checkpoint, running=state)
@@ -458,6 +458,6 @@ def train(
         return TrainedNetworks(networks, weights, json.loads(json_line(record)))
 
 
-def problem_of(spec: TrainingSpec, which: str) -> Problem:
+def problem_of(spec: TrainingSpec, which: str) -> TrainingPairs:
     """The scaled training pairs of a network, ``damping`` or ``frequency``."""
-    return Problem.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)
+    return TrainingPairs.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)

@@ -25,7 +25,7 @@ from identification.signal.forcing import (
     ZERO,
     Free,
     Rows,
-    State,
+    RunUnknowns,
     forcing_of,
 )
 from identification.signal.free_decay import Decay
@@ -68,7 +68,7 @@ class Reading:
         """
         return replace(cls.from_record(run.record), forcing=forcing_of(run, derivative))
 
-    def residual(self, state: State, rows: Rows) -> Angles:
+    def residual(self, state: RunUnknowns, rows: Rows) -> Angles:
         """Reading less model; ``rows`` are those of the forcing at the decay."""
         free = self.forcing.freed(self.yaw, rows, state.gain)
         return np.asarray(free - state.zero * rows[4] - state.angle * rows[0] - state.rate * rows[1])
@@ -85,7 +85,7 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class RunFit(State):
+class RunFit(RunUnknowns):
     """One run at the optimum.
 
     Args:
@@ -128,7 +128,7 @@ class DecayFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Prior:
+class SharedPrior:
     """Prior of the shared parameters, a normal distribution.
 
     Args:
@@ -153,7 +153,7 @@ def fit_decays(
     *,
     zero: float | None = None,
     own_zeros: bool = False,
-    prior: Prior | None = None,
+    prior: SharedPrior | None = None,
     tolerance: float = _TOLERANCE,
 ) -> DecayFit:
     """Fit runs whose decay rate, stiffness and gain are linear in shared parameters.
@@ -262,11 +262,13 @@ def linearised_at(
         rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
     """
-    found = run_at(FREE, State(decay, 0.0, angle, rate), FREE.rows(time, decay), residual)
+    found = run_at(FREE, RunUnknowns(decay, 0.0, angle, rate), FREE.rows(time, decay), residual)
     return found.information, found.score
 
 
-def run_at(forcing: Free, state: State, rows: Array, residual: Array, gram: Array | None = None) -> RunFit:
+def run_at(
+    forcing: Free, state: RunUnknowns, rows: Array, residual: Array, gram: Array | None = None
+) -> RunFit:
     """A run linearised about a state.
 
     Args:
@@ -303,7 +305,7 @@ def _project(
     parameters: Array,
     kind: ZeroKind,
     zero: float | None = None,
-    prior: Prior | None = None,
+    prior: SharedPrior | None = None,
 ) -> _Point:
     nothing = _Point(parameters, 0.0, ())
     at_decay = [r.forcing.at(link @ parameters) for r, link in zip(readings, links, strict=True)]
@@ -332,7 +334,7 @@ def _project(
     for reading, block, gram, (decay, gain), (angle, rate), best in zip(
         readings, rows, grams, at_decay, states, zeros, strict=True
     ):
-        state = State(decay, best, float(angle), float(rate), gain)
+        state = RunUnknowns(decay, best, float(angle), float(rate), gain)
         residual = reading.residual(state, block)
         runs.append(run_at(reading.forcing, state, block, residual, gram))
         cost += float(inner(residual, residual))
@@ -356,7 +358,7 @@ def shared_system(
     links: Sequence[Array],
     zero: ZeroKind,
     parameters: PerParameter,
-    prior: Prior | None = None,
+    prior: SharedPrior | None = None,
 ) -> tuple[Array, Array]:
     """Information, shape (m, m), and score, shape (m,), of shared parameters φ, shape (p,), and a shared zero last.
 

@@ -47,7 +47,7 @@ Rows: TypeAlias = Annotated[Array, "shape (rows, n), SI"]
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class RunUnknowns:
     """The unknowns of one run.
 
     Args:
@@ -121,7 +121,7 @@ class Free:
         """The terms of the motion and their derivatives, by row, at times since the initial state."""
         return response_rows(time, decay, constant=True)
 
-    def weights(self, state: State) -> Array:
+    def weights(self, state: RunUnknowns) -> Array:
         """The run's Jacobian, transposed, as a combination of the rows, shape (5 or 6, m)."""
         weights = np.zeros((5, 5))
         weights[:2, :4] = sensitivity_weights(state.decay, state.angle, state.rate)
@@ -194,7 +194,7 @@ class Forced(Free):
         """The rows of a free decay, then those of the input."""
         return np.vstack([super().rows(time, decay), self.responses(time, decay)])
 
-    def weights(self, state: State) -> Array:
+    def weights(self, state: RunUnknowns) -> Array:
         """The run's Jacobian, transposed, as a combination of the rows, shape (6, m)."""
         weights = np.zeros((6, 8))
         weights[:5, :5] = super().weights(state)
@@ -249,7 +249,7 @@ class Loose(Forced):
         rows[4] = rest[0]
         return rows
 
-    def weights(self, state: State) -> Array:
+    def weights(self, state: RunUnknowns) -> Array:
         """The run's Jacobian, transposed, as a combination of the rows, shape (6, m)."""
         weights = np.zeros((6, 10))
         weights[:, :8] = super().weights(state)

@@ -67,7 +67,7 @@ def samples_in_cycle(omega_n: float, sample_interval: Seconds) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class ReadingNoise:
     """The noise of fitted runs.
 
     Args:
@@ -92,7 +92,7 @@ def stated_noise(sensor: SensorProperties) -> float | None:
     return float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
 
 
-def noise_of(residuals: Sequence[Residual], sensor: SensorProperties) -> Noise:
+def noise_of(residuals: Sequence[Residual], sensor: SensorProperties) -> ReadingNoise:
     """The noise behind the standard deviations: the stated level where residuals agree, else the measured one."""
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
@@ -115,7 +115,7 @@ def noise_of(residuals: Sequence[Residual], sensor: SensorProperties) -> Noise:
     if not departs and bears_out and stated is not None:
         bears_out = _agree(total, stated, count - unknowns)
     used = reference if departs or (bears_out and stated is not None) else total
-    return Noise(
+    return ReadingNoise(
         NoiseLevel(
             std=used,
             source="stated" if bears_out else "residual",
@@ -151,7 +151,7 @@ def _exceeds(power: float, freedom: float, degrees: float) -> tuple[bool, float]
     return bool(power / freedom > chance * (1.0 + NOISE_TOLERANCE) ** 2), power / freedom
 
 
-def _coloured(residuals: Sequence[Residual], total: float, stated: float | None) -> Noise | None:
+def _coloured(residuals: Sequence[Residual], total: float, stated: float | None) -> ReadingNoise | None:
     """Coloured noise that explains the residuals; None where there is none.
 
     It does where the whitened residuals pass the test of white noise, also close to the motion alone, and have one
@@ -192,7 +192,7 @@ def _coloured(residuals: Sequence[Residual], total: float, stated: float | None)
         departs=False,
         disagrees=stated is not None and not bears_out,
     )
-    return Noise(level, tuple(colours), tuple(powers))
+    return ReadingNoise(level, tuple(colours), tuple(powers))
 
 
 def _independent_squares(residual: Residual) -> float:

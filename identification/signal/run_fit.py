@@ -25,7 +25,7 @@ from identification.signal.decay_fit import DecayFit, Reading, RunFit, fit_decay
 from identification.signal.forcing import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
-from identification.signal.noise import Noise, Residual, noise_of, samples_in_cycle, slow_power
+from identification.signal.noise import ReadingNoise, Residual, noise_of, samples_in_cycle, slow_power
 from identification.statistics import determined, eliminate, inner, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -196,7 +196,7 @@ def decay_covariance_of(fitted: RunFit) -> Array:
 
 def noise_and_failure(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
-) -> tuple[Noise, Status | None]:
+) -> tuple[ReadingNoise, Status | None]:
     """The noise from the residual of one run's fit, and the status of a failure; None if there is none.
 
     Args:

@@ -21,7 +21,7 @@ _RATE = 0.01
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedNumber:
     """An estimated number.
 
     Args:
@@ -47,12 +47,12 @@ class TurningPointFit:
         said: sentences on the uncertainties, and on departures from the model.
     """
 
-    omega_n: Fitted
-    zeta: Fitted
-    period: Fitted
-    decrement: Fitted
-    zero: Fitted
-    first_swing: Fitted
+    omega_n: FittedNumber
+    zeta: FittedNumber
+    period: FittedNumber
+    decrement: FittedNumber
+    zero: FittedNumber
+    first_swing: FittedNumber
     said: tuple[str, ...]
 
 
@@ -62,7 +62,7 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
     remarks: list[str] = []
     line = np.column_stack([np.ones(k.size), k])
     times = _Linear.of(line, points.time_s, points.time_std, "times", "s", remarks)
-    half = Fitted(float(times.solution[1]), sqrt(times.covariance[1, 1]))
+    half = FittedNumber(float(times.solution[1]), sqrt(times.covariance[1, 1]))
     first, sides = _decay(k, points.angle_rad)
     columns = _slopes(k, first)
     weights = points.angle_std
@@ -80,12 +80,12 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
     # ωn = ωd √(π² + δ²)/π
     omega_std = omega * sqrt((half.std / half.value) ** 2 + (delta * stds[2] / (pi**2 + delta**2)) ** 2)
     return TurningPointFit(
-        omega_n=Fitted(omega, omega_std),
-        zeta=Fitted(zeta, zeta_std),
-        period=Fitted(2.0 * half.value, 2.0 * half.std),
-        decrement=Fitted(2.0 * delta, 2.0 * stds[2]),
-        zero=Fitted(zero, stds[0]),
-        first_swing=Fitted(swing, stds[1]),
+        omega_n=FittedNumber(omega, omega_std),
+        zeta=FittedNumber(zeta, zeta_std),
+        period=FittedNumber(2.0 * half.value, 2.0 * half.std),
+        decrement=FittedNumber(2.0 * delta, 2.0 * stds[2]),
+        zero=FittedNumber(zero, stds[0]),
+        first_swing=FittedNumber(swing, stds[1]),
         said=tuple(remarks),
     )
 

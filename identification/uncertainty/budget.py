@@ -2,7 +2,7 @@
 
 First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2: U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ +
 U_scatter + U_model. The estimate itself includes noise and scatter between runs, the latter by
-`identification.campaign.repeatability`. The uncertainties of stated inputs come from a TOML file
+`identification.campaign.run_scatter`. The uncertainties of stated inputs come from a TOML file
 (docs/how-to/state-uncertainties.md). Errors that neither repeats nor other methods with the same model show are not
 included: run the diagnosis.
 """

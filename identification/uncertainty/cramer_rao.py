@@ -18,11 +18,11 @@ import numpy as np
 
 from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import Design, build_design, derivatives, has_size
-from identification.campaign.repeatability import moves_of
+from identification.campaign.run_scatter import moves_of
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import Reading, information_at, run_at, shared_system
 from identification.signal.filter import discretised, steady_filters
-from identification.signal.forcing import State
+from identification.signal.forcing import RunUnknowns
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
 from tunnel_sim.vocabulary.between_runs import SCATTERED
@@ -215,7 +215,9 @@ def campaign_bound(
 
             rows = np.asarray(lfilter(*filters[i], rows, axis=1))
         fits.append(
-            run_at(reading.forcing, State(decay, 0.0, *initial, gain), rows, np.zeros(reading.time.size))
+            run_at(
+                reading.forcing, RunUnknowns(decay, 0.0, *initial, gain), rows, np.zeros(reading.time.size)
+            )
         )
     normal = shared_system(fits, links, "own" if drifting else "shared", values)[0]
     places = linked.size + np.arange(priors.size)

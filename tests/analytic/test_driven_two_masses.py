@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data, RunData
 from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.effects import effect_class
@@ -102,7 +102,7 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool, on_body: bool, t
     )
     body = RIG.body
     problem = Problem(
-        Data((data,), body.frontal_area, body.length, body.width, Rig().among((data,))),
+        Data((data,), body.frontal_area, body.length, body.width, SpringModel().among((data,))),
         (effect_class("rod_flexibility"),),
         rod_followed=followed,
     )
@@ -117,7 +117,7 @@ def test_a_rod_too_stiff_to_ring_acts_by_its_first_order() -> None:
     data = RunData(
         "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, NOISE, SPRING, 0.0, 0.0, TIME[-1], drive=drive
     )
-    problem = Problem(Data((data,), 1.0, 1.0, 1.0, Rig()), (kind,))
+    problem = Problem(Data((data,), 1.0, 1.0, 1.0, SpringModel()), (kind,))
     release = np.array([[0.1, 0.3]])
 
     def moved(compliance: float) -> Array:

@@ -15,7 +15,7 @@ from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting
 from tests.reference.rigs import rig
 from tunnel_reference import moments
-from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.integrator import BoundLaw, Phase, integrate
 from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -87,8 +87,8 @@ def test_the_reference_simulator_agrees():
     given = ({"stiffness": 3.0, "angle": 0.1, "second": 0.0}, {"moment": 0.004, "share": 0.05})
     gravity, friction = ({name: np.full(c.runs, value) for name, value in one.items()} for one in given)
     terms = [
-        Term(moments.gravity, Phase.MOMENT, gravity),
-        Term(moments.loaded_level, Phase.FRICTION, friction),
+        BoundLaw(moments.gravity, Phase.MOMENT, gravity),
+        BoundLaw(moments.loaded_level, Phase.FRICTION, friction),
     ]
     (found,) = integrate([c], [terms], substeps=4)
     (run,) = np.flatnonzero(c.wind_speed == 0.0)[:1]

@@ -48,7 +48,7 @@ def test_the_diagnosis_is_what_is_shown(tmp_path: Path) -> None:
 
 
 def test_the_arguments_are_those_of_the_code() -> None:
-    from tunnel_sim.envs.conditions import FreeDecayConfig
+    from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 
     table = {name.strip("`"): default.strip("`") for name, default, _ in rows(TEXT, "Arguments")}
     defaults = FreeDecayConfig()
@@ -63,7 +63,7 @@ def test_the_arguments_are_those_of_the_code() -> None:
 
 
 def test_the_options_are_those_of_the_code() -> None:
-    from tunnel_sim.envs.conditions import OPTIONS, TRUTH
+    from tunnel_sim.envs.episode_conditions import OPTIONS, TRUTH
 
     words = {
         word for name, meaning, *_ in rows(TEXT, "Start") for word in re.findall(r"`(\w+)`", name + meaning)

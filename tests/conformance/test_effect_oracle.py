@@ -26,12 +26,12 @@ from tests.reference.effect_oracle import (
     reading,
     under_moment,
 )
-from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import Effect, EffectChain, effect_class, effect_from, the_effect
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
@@ -166,7 +166,7 @@ OWN = 1.4995 / RUN.duration
 def by_the_reference_simulator() -> dict[str, np.ndarray]:
     """The textbook's forms: their severity parameters are the effects', and so are the names of the others."""
     run = RUN
-    conditions = Conditions(
+    conditions = TrueConditions(
         np.array([run.spring]), np.array([run.speed]), np.array([run.release]), np.array([run.release]),
         oracle.DENSITY, run.duration, oracle.INERTIA, oracle.DAMPING, oracle.CN_BETA, oracle.CN_R,
         noise_std=0.0, resolution=1e-12,

@@ -17,10 +17,10 @@ from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
-from tunnel_sim.vocabulary.units import dimension
 
 RIG = load_rig()
 SENSOR = SensorModel(zero=0.003)

@@ -16,7 +16,7 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
@@ -24,11 +24,11 @@ from diagnosis.search.prepared import fit_nominal
 from tests.reference.linear_rig import response_of_a_loose_body
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
-from tunnel_sim.vocabulary.units import dimension
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.05, 3e-4, 200.0
 WEIGHT, HARDENING = 12.0, 0.8
@@ -36,7 +36,7 @@ TIME = np.arange(0.0, 10.0, 1.0 / RATE)
 
 
 @dataclass(frozen=True)
-class Hardening(Rig):
+class Hardening(SpringModel):
     """Springs of a stated characteristic."""
 
     further: float = HARDENING

@@ -14,6 +14,10 @@ import numpy as np
 import polars as pl
 from hypothesis import strategies as st
 
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.where.described import Where
 from tests.fuzz.campaigns import free_decays
 from tests.fuzz.tables import parquet
 from tests.fuzz.values import odd_words
@@ -208,26 +212,26 @@ def checkpoint() -> tuple[Any, bytes]:
 @cache
 def answer_document() -> dict[str, Any]:
     """A diagnosis of one cause, as JSON's types."""
-    from diagnosis.facts import closure
 
-    from diagnosis import result
+    from diagnosis import Diagnosis, Settings
     from diagnosis.answer.held_out import ON_RUNS
+    from diagnosis.findings.decision import decision
+    from identification.estimate import Quantity
 
     values = {
-        "cn_beta": result.Quantity(0.45, 0.01, "1/rad"),
-        "cn_r": result.Quantity(-0.1, 0.01, "1/rad"),
+        "cn_beta": Quantity(0.45, 0.01, "1/rad"),
+        "cn_r": Quantity(-0.1, 0.01, "1/rad"),
     }
-    friction = {"friction_moment": result.Quantity(0.004, 1e-5, "N m")}
-    gap = result.GapSummary(
-        True, 2.0, 0.1, 0.99, ON_RUNS, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9}
-    )
-    return result.Diagnosis(
+    friction = {"friction_moment": Quantity(0.004, 1e-5, "N m")}
+    gap = GapSummary(True, 2.0, 0.1, 0.99, ON_RUNS, (RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
+    return Diagnosis(
         "c1", ("coulomb_friction",), gap,
-        result.Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
-        (result.Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), result.Candidate("none", 0.1, 2.0, 0.0)),
-        ("quadratic_damping",), None, result.Coefficients(values, values),
-        closure.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
-        closure.NoiseSummary(5e-4, None, "estimated", ""),
+        Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
+        (Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), Candidate("none", 0.1, 2.0, 0.0)),
+        ("quadratic_damping",), None, Coefficients(values, values),
+        Confirmation(True, 0.0, "r1", 0.0, 1e-5),
+        NoiseSummary(5e-4, None, "estimated", ""),
+        decision([("coulomb_friction", 0.9), ("none", 0.1)], Settings().answer),
     ).to_json_dict() | {"wall_s": 3.0}  # fmt: skip
 
 

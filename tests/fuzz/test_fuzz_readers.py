@@ -146,7 +146,7 @@ def spring_table(folder: Path, draw: Draw) -> None:
 
 def effect_option(_folder: Path, draw: Draw) -> None:
     """The value of ``--effect`` changed, and the effect made."""
-    from tunnel_lab.terminal.inputs import parse_effect
+    from tunnel_lab.terminal.arguments import parse_effect
     from tunnel_sim.effects import effect_from
 
     setting = parse_effect(draw(spoilt_text(seeds.EFFECT, r"[^:,=]+")))
@@ -217,7 +217,7 @@ def estimate(_folder: Path, draw: Draw) -> None:
 
 def blind_answers(folder: Path, draw: Draw) -> None:
     """Truth, answer or seal of a blind set changed; the hashes mostly agree."""
-    from tunnel_lab.experiments.blind import page as blind
+    from tunnel_lab.experiments.blind import score_page as blind
     from tunnel_lab.experiments.blind import score_set
     from tunnel_lab.experiments.blind.sets import folder_hash
 

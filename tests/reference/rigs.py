@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.conditions import Conditions
+from tunnel_reference.true_conditions import TrueConditions
 
 
 def rig(
     stiffness=(21.02, 67.98), speed=(0.0, 25.0), angle=(0.35, 0.3), duration=2.0, **changes
-) -> Conditions:
+) -> TrueConditions:
     """Two runs by default: one in still air, one in the wind."""
     n = len(stiffness)
-    base = Conditions(
+    base = TrueConditions(
         spring_stiffness=np.array(stiffness),
         wind_speed=np.array(speed),
         release_angle=np.array(angle),

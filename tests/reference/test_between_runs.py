@@ -11,11 +11,11 @@ from tests.reference.free_decays import damped_cosine
 from tests.reference.rigs import rig
 from tunnel_reference import draw as drawing
 from tunnel_reference import make
-from tunnel_reference.between_runs import FORMS, LEVELS, MIXED, USUAL, draw_scatter, scattered
 from tunnel_reference.catalogue import Group
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH
 from tunnel_reference.draw import KINDS, CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.scatter_draws import FORMS, LEVELS, MIXED, USUAL, draw_scatter, scattered
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH
 
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35, 0.2, 0.35, 0.14), duration=2.0)
 

@@ -10,13 +10,13 @@ import pytest
 from tests.reference.effect_cases import BETWEEN_RUNS, ON_DRIVEN_RUNS, VOCABULARY
 from tests.reference.rigs import rig
 from tunnel_reference.catalogue import Group
-from tunnel_reference.conditions import Input
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
 from tunnel_reference.moments import shaking, turbulence
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
+from tunnel_reference.true_conditions import DrivenInput
 
 ALL_FORMS = (*FORMS, *OUTSIDE_FORMS, *LAW_FORMS)
 
@@ -26,7 +26,11 @@ def drawn(form, value, sign=1, seed=3, **changes):
         stiffness=(21.02, 67.98, 21.02, 67.98), speed=(0.0, 0.0, 25.0, 25.0), angle=(0.35,) * 4, **changes
     )
     moment = 0.3 * np.sin(15.0 * c.time)[:, None] * np.ones(4) if form.driven else np.zeros((c.samples, 4))
-    c = replace(c, drive=Input("moment_nm", moment, np.full(4, False), np.full(4, 0.1))) if form.driven else c
+    c = (
+        replace(c, drive=DrivenInput("moment_nm", moment, np.full(4, False), np.full(4, 0.1)))
+        if form.driven
+        else c
+    )
     extra = {k: float(v) for k, v in form.draw(np.random.default_rng(seed), c).items()}
     return CampaignDraw("single", c, (EffectDraw(form, extra, sign, 1.0, value),), seed)
 

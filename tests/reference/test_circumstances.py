@@ -20,7 +20,7 @@ from tunnel_reference.draw import (
     redraw,
 )
 from tunnel_reference.forms import forms_of
-from tunnel_reference.integrator import Motion
+from tunnel_reference.integrator import RodMotion
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import (
     OWN_EXCESS,
@@ -58,7 +58,7 @@ def test_a_rig_of_another_scale_has_the_same_coefficients():
 
 def test_coloured_noise_has_the_stated_variance_and_colour():
     c = replace(RIG, duration=40.0, coloured_share=0.8, noise_corner=10.0, resolution=1e-9)
-    still = Motion(np.zeros((c.samples, 4)), np.zeros((c.samples, 4)))
+    still = RodMotion(np.zeros((c.samples, 4)), np.zeros((c.samples, 4)))
     noise = read_motion(c, still, (), np.random.default_rng(1)) - c.zero
     assert noise.std() == pytest.approx(c.noise_std, rel=0.05)
     power = np.mean(np.abs(np.fft.rfft(noise, axis=0)) ** 2, axis=1)
@@ -70,7 +70,9 @@ def test_coloured_noise_has_the_stated_variance_and_colour():
 def test_jittered_samples_are_those_of_the_motion_when_they_were_taken():
     c = replace(RIG, clock_jitter=0.5, clock_seed=3, noise_std=0.0, resolution=1e-9)
     even = np.arange(c.samples) / c.sample_rate
-    motion = Motion(np.tile(np.sin(20.0 * even)[:, None], 4), np.tile(20.0 * np.cos(20.0 * even)[:, None], 4))
+    motion = RodMotion(
+        np.tile(np.sin(20.0 * even)[:, None], 4), np.tile(20.0 * np.cos(20.0 * even)[:, None], 4)
+    )
     found = read_motion(c, motion, (), np.random.default_rng(1))[:-1, 0] - c.zero
     assert np.allclose(found, np.sin(20.0 * c.time[:-1]), atol=3e-9)
     assert np.all(np.diff(c.time) > 0.0)
@@ -130,7 +132,7 @@ def test_a_motion_that_is_no_decay_is_infinitely_severe(monkeypatch):
     n = round(RIG.duration * RIG.sample_rate)
     away = np.full((n, RIG.runs), 1e200)
     for angle in (away, np.full_like(away, np.nan)):
-        search.motion = Motion(angle, away)
+        search.motion = RodMotion(angle, away)
         search.try_out()
     assert seen == [np.inf, np.inf]
 

@@ -10,13 +10,13 @@ import pytest
 from tests.reference.free_decays import damped_cosine
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH
 from tunnel_reference.departures import DEPARTURES, draw_departures
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign, draw_conditions
 from tunnel_reference.forms import forms_of
-from tunnel_reference.integrator import Motion
+from tunnel_reference.integrator import RodMotion
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH
 
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35, 0.2, 0.35, 0.14), duration=4.0)
 
@@ -113,7 +113,7 @@ def test_the_noise_of_a_run_and_its_tails_are_as_drawn():
         np.random.default_rng(4), c, certain=("noise_differs", "noise_has_tails", "zeros_differ")
     )
     c = replace(c, noise_tails=12.0)
-    still = Motion(np.zeros((c.samples, c.runs)), np.zeros((c.samples, c.runs)))
+    still = RodMotion(np.zeros((c.samples, c.runs)), np.zeros((c.samples, c.runs)))
     read = read_motion(c, still, (), np.random.default_rng(1))
     assert np.allclose(read.std(axis=0), c.noise_std * c.noise_scale, rtol=0.01)
     assert np.allclose(read.mean(axis=0), c.zero_shift, atol=5.0 * c.noise_std * 2.0 / np.sqrt(c.samples))
@@ -153,7 +153,7 @@ def hum(form, seed=0, **changes):
     shape = next(one for one in forms_of("mains_hum") if one.name == form)
     effect = EffectDraw(shape, shape.draw(np.random.default_rng(seed), c), 1, 1.0, 1.0)
     _, term = shape.bind(1.0, effect.extra, c)
-    still = Motion(np.zeros((c.samples, c.runs)), np.zeros((c.samples, c.runs)))
+    still = RodMotion(np.zeros((c.samples, c.runs)), np.zeros((c.samples, c.runs)))
     return c, effect.extra["frequency"], read_motion(c, still, (term,), np.random.default_rng(1))
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH
 from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
 from tunnel_reference.forms import forms_of
 from tunnel_reference.in_phase import in_phase
+from tunnel_reference.true_conditions import FRONTAL_AREA, REFERENCE_LENGTH
 
 FORMS = {form.name: form for form in forms_of("unsteady_aero_lag")}
 

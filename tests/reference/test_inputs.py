@@ -13,14 +13,14 @@ from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference import moments as m
-from tunnel_reference.conditions import Input
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
+from tunnel_reference.driven_inputs import linear_response
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, FORMS
 from tunnel_reference.forms_actuators import ACTUATORS
-from tunnel_reference.inputs import linear_response
-from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.integrator import BoundLaw, Phase, integrate
 from tunnel_reference.nominal_fit import fit_driven
 from tunnel_reference.severity import read_and_fit, simulate_motions
+from tunnel_reference.true_conditions import DrivenInput
 
 PLAIN = replace(rig(duration=0.5, sample_rate=100.0), start_rate=np.array([0.4, -0.2]))
 
@@ -36,7 +36,7 @@ def driven(column, held, *, gain=1.0, delay=0.0):
     }[column]
     return replace(
         PLAIN,
-        drive=Input(column, values, np.full(2, held), np.full(2, 0.1), gain, True, np.full(2, delay)),
+        drive=DrivenInput(column, values, np.full(2, held), np.full(2, 0.1), gain, True, np.full(2, delay)),
     )
 
 
@@ -76,7 +76,7 @@ def solved(c, run, cubic):
 def test_an_input_acts_as_its_equation_says(column, held, delay):
     c = driven(column, held, gain=2.5 if column == "drive" else 1.0, delay=delay)
     cubic = 3.0
-    law = Term(
+    law = BoundLaw(
         m.polynomial_spring,
         Phase.MOMENT,
         {"k2": np.zeros(2), "k3": np.full(2, cubic), "k4": np.zeros(2), "k5": np.zeros(2)},
@@ -102,7 +102,7 @@ def test_the_nominal_fit_finds_rig_and_gain_again():
         (21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=4.0, sample_rate=250.0
     )
     values = np.random.default_rng(1).standard_normal((c.samples, 4)) * 4.0
-    unknown = Input("drive", values, np.full(4, False), np.full(4, 0.1), 0.5)
+    unknown = DrivenInput("drive", values, np.full(4, False), np.full(4, 0.1), 0.5)
     c = replace(c, drive=unknown, zero=0.002, start_rate=np.full(4, 0.5))
     (motion,) = simulate_motions([CampaignDraw("none", c, (), 0)])
     other = replace(c, yaw_inertia=0.102, cn_beta=0.4, drive=replace(unknown, gain=0.48))

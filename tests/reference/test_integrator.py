@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from tests.reference.rigs import rig
 from tunnel_reference import moments as m
-from tunnel_reference.conditions import REFERENCE_LENGTH, Rod
-from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.integrator import BoundLaw, Phase, integrate
+from tunnel_reference.true_conditions import REFERENCE_LENGTH, TwistingRod
 
 
 def closed_form(c, run):
@@ -96,7 +96,7 @@ CASES = {
 def smooth():
     """The motions of all cases, and the linear one, in one batch."""
     laws = [
-        [Term(law, Phase.MOMENT, {k: np.full(2, v) for k, v in values.items()})]
+        [BoundLaw(law, Phase.MOMENT, {k: np.full(2, v) for k, v in values.items()})]
         for law, values, _ in CASES.values()
     ]
     *motions, linear = integrate([rig(duration=1.0)] * (len(CASES) + 1), [*laws, []], substeps=4)
@@ -118,7 +118,7 @@ def test_a_law_that_acts_twice_in_a_campaign_adds_up():
 
     def spring(**values):
         terms = {"k2": 0.0, "k3": 0.0, "k4": 0.0, "k5": 0.0} | values
-        return Term(m.polynomial_spring, Phase.MOMENT, {k: np.full(2, v) for k, v in terms.items()})
+        return BoundLaw(m.polynomial_spring, Phase.MOMENT, {k: np.full(2, v) for k, v in terms.items()})
 
     apart, other = integrate([c, c], [[spring(k2=0.1), spring(k3=0.5)], [spring(k3=0.5)]], substeps=4)
     together, alone = integrate([c, c], [[spring(k2=0.1, k3=0.5)], [spring(k3=0.5)]], substeps=4)
@@ -131,7 +131,7 @@ def test_a_law_that_acts_twice_in_a_campaign_adds_up():
 def test_dead_zone_matches_an_adaptive_solver():
     c = rig()
     half = 0.004
-    term = Term(
+    term = BoundLaw(
         m.dead_zone, Phase.ANGLE, {"half": np.full(2, half), "left": np.zeros(2), "centre": np.zeros(2)}
     )
     (motion,) = integrate([c], [[term]])
@@ -146,8 +146,8 @@ def test_dead_zone_matches_an_adaptive_solver():
 def test_lag_and_speed_drift_match_an_adaptive_solver():
     c = rig(speed=(15.0, 25.0))
     tau = 0.8 * REFERENCE_LENGTH / c.true_speed
-    lag = Term(m.lag_one, Phase.ANGLE, {"w1": np.ones(2), "tau1": tau}, np.tile(c.start_angle, (1, 1)))
-    drift = Term(
+    lag = BoundLaw(m.lag_one, Phase.ANGLE, {"w1": np.ones(2), "tau1": tau}, np.tile(c.start_angle, (1, 1)))
+    drift = BoundLaw(
         m.speed_drift,
         Phase.WIND,
         {"drift": np.full(2, 0.1), "span": np.full(2, 2.0), "exponent": np.ones(2)},
@@ -167,7 +167,7 @@ def test_lag_and_speed_drift_match_an_adaptive_solver():
 
 
 def test_flexible_rod_matches_the_exponential_of_its_matrix():
-    rod = Rod(compliance=1e-3, share=0.15, damping_ratio=0.02)
+    rod = TwistingRod(compliance=1e-3, share=0.15, damping_ratio=0.02)
     c = rig(duration=0.5, rod=rod)
     (motion,) = integrate([c], [[]], substeps=20)
     k, inertia = 1.0 / rod.compliance, c.yaw_inertia
@@ -226,7 +226,7 @@ def coulomb_exact(c, run, tc, end):
 @pytest.mark.parametrize("tc", [0.004, 0.6])
 def test_coulomb_friction_matches_its_closed_form_to_rest(tc):
     c = rig(duration=3.0)
-    term = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.full(2, tc)})
+    term = BoundLaw(m.coulomb_level, Phase.FRICTION, {"moment": np.full(2, tc)})
     (motion,) = integrate([c], [[term]])
     for run in range(2):
         assert np.max(np.abs(motion.angle[:, run] - coulomb_exact(c, run, tc, 3.0))) < 1e-8
@@ -237,8 +237,8 @@ def test_coulomb_friction_matches_its_closed_form_to_rest(tc):
 
 def test_friction_sticks_at_release_and_breaks_loose_under_a_rising_moment():
     c = rig(stiffness=(20.0,), speed=(0.0,), angle=(0.001,), duration=0.5)
-    stick = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.05])})
-    push = Term(
+    stick = BoundLaw(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.05])})
+    push = BoundLaw(
         m.harmonic_moment,
         Phase.MOMENT,
         {
@@ -260,7 +260,7 @@ def test_energy_is_kept_without_damping_and_falls_by_the_friction_work():
     (motion,) = integrate([c], [[]], substeps=5)
     energy = 0.5 * 40.0 * motion.angle[:, 0] ** 2 + 0.05 * motion.rate[:, 0] ** 2
     assert np.ptp(energy) / energy[0] < 1e-9
-    term = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.01])})
+    term = BoundLaw(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.01])})
     (motion,) = integrate([c], [[term]], substeps=5)
     energy = 0.5 * 40.0 * motion.angle[:, 0] ** 2 + 0.05 * motion.rate[:, 0] ** 2
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(motion.angle[:, 0])))])
@@ -270,8 +270,8 @@ def test_energy_is_kept_without_damping_and_falls_by_the_friction_work():
 @pytest.mark.slow
 def test_a_campaign_moves_the_same_alone_and_in_a_batch():
     first, second = rig(), rig(stiffness=(35.0, 20.0), duration=1.0)
-    term = Term(m.quadratic_damping, Phase.MOMENT, {"coefficient": np.full(2, 0.01)})
-    dry = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.full(2, 0.01)})
+    term = BoundLaw(m.quadratic_damping, Phase.MOMENT, {"coefficient": np.full(2, 0.01)})
+    dry = BoundLaw(m.coulomb_level, Phase.FRICTION, {"moment": np.full(2, 0.01)})
     together = integrate([first, second, first], [[term], [], [dry]], substeps=2)
     for number, (c, terms) in enumerate([(first, [term]), (second, []), (first, [dry])]):
         (alone,) = integrate([c], [terms], substeps=2)
@@ -280,4 +280,4 @@ def test_a_campaign_moves_the_same_alone_and_in_a_batch():
 
 def test_rigid_and_flexible_rods_are_not_mixed():
     with pytest.raises(ValueError, match="one kind of rod"):
-        integrate([rig(), rig(rod=Rod(1e-4))], [[], []])
+        integrate([rig(), rig(rod=TwistingRod(1e-4))], [[], []])

@@ -10,7 +10,7 @@ import pytest
 from tests.reference.rigs import rig
 from tunnel_reference import readings as r
 from tunnel_reference.integrator import integrate
-from tunnel_reference.readings import Order, Reading, ReadingTerm, read_motion
+from tunnel_reference.readings import Order, ReadingTerm, SensorSignal, read_motion
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_backlash_lags_by_its_half_width_on_the_way(swing):
     c, motion = swing
     half = np.full(2, 0.002)
     out = r.backlash(
-        Reading(motion.angle, motion, c, np.random.default_rng(0)), {"half": half, "start": 0 * half}
+        SensorSignal(motion.angle, motion, c, np.random.default_rng(0)), {"half": half, "start": 0 * half}
     )
     gap = motion.angle - out
     assert np.max(np.abs(gap)) <= 0.002 + 1e-12
@@ -58,10 +58,10 @@ def test_backlash_lags_by_its_half_width_on_the_way(swing):
 def test_backlash_is_rate_independent(swing):
     c, motion = swing
     params = {"half": np.full(2, 0.002), "start": np.zeros(2)}
-    slow = r.backlash(Reading(motion.angle, motion, c, np.random.default_rng(0)), params)
+    slow = r.backlash(SensorSignal(motion.angle, motion, c, np.random.default_rng(0)), params)
     quick_motion = replace(motion, rate=2.0 * motion.rate)
     quick = r.backlash(
-        Reading(motion.angle, quick_motion, rig(sample_rate=2000.0), np.random.default_rng(0)), params
+        SensorSignal(motion.angle, quick_motion, rig(sample_rate=2000.0), np.random.default_rng(0)), params
     )
     assert np.max(np.abs(slow - quick)) < 1e-12
 
@@ -70,7 +70,7 @@ def test_curves_agree_with_their_cubic_at_small_angles(swing):
     c, motion = swing
     small = 0.1 * motion.angle
     for s in (-0.5, 0.5):
-        reading = Reading(small, motion, c, np.random.default_rng(0))
+        reading = SensorSignal(small, motion, c, np.random.default_rng(0))
         cubic = r.cubic_curve(reading, {"s": np.full(2, s)})
         for other in (r.sine_curve, r.tangent_curve):
             assert np.max(np.abs(other(reading, {"s": np.full(2, s)}) - cubic)) < 3e-8
@@ -80,7 +80,7 @@ def test_loaded_potentiometer_has_unit_slope_at_zero(swing):
     c, motion = swing
     for value in (0.0, 1e-5):
         out = r.loaded_potentiometer(
-            Reading(np.full((1, 2), value), motion, c, np.random.default_rng(0)), {"s": np.full(2, 0.3)}
+            SensorSignal(np.full((1, 2), value), motion, c, np.random.default_rng(0)), {"s": np.full(2, 0.3)}
         )
         assert out == pytest.approx(np.full((1, 2), value), rel=1e-3, abs=1e-12)
 

@@ -5,7 +5,7 @@ import pytest
 
 from identification import Status, identify
 from tunnel_lab.experiments.score_grid import Cell, draw_trial
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 
 pytestmark = pytest.mark.slow
 TRIALS = 12

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import chdtri
 from scipy.stats import binom
 
-from identification.campaign.between_runs import (
+from identification.campaign.random_effects import (
     RunProducts,
     UsualWidths,
     likeliest_widths,

@@ -17,8 +17,8 @@ from identification.estimators import make_estimator
 from identification.estimators.output_error import OutputError
 from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-from tunnel_reference.conditions import Conditions
 from tunnel_reference.moments import turbulence
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects.random_moments import Buffeting
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -140,7 +140,7 @@ def random_moment(kind, seed):
         moved = effect.on_run(settings, settings, effect.draw(settings, np.random.default_rng(seed)))
         return 0.25 / 0.003 * np.array(moved.series["forcing"].values)[:count]
     one = np.ones(1)
-    conditions = Conditions(
+    conditions = TrueConditions(
         16.12 * one,
         20.0 * one,
         AMPLITUDE * one,

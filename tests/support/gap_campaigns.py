@@ -13,7 +13,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data, RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import Similarity
@@ -75,7 +75,7 @@ def campaign(
         if any(getattr(e, i.name) != i.default for i in e.parameters() if i.name in form)
         for name in form
     )
-    problem = Problem(Data(runs, 0.036, 0.625, 0.225, Rig().among(runs)), kinds, free_forms=shaped)
+    problem = Problem(Data(runs, 0.036, 0.625, 0.225, SpringModel().among(runs)), kinds, free_forms=shaped)
     values = [
         getattr(e, i.name)
         for e in effects

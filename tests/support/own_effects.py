@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 
@@ -36,7 +36,7 @@ CUBIC = expression_effect(
     "stated_cubic",
     channel="stiffness",
     moment="-k*Kr*b^3",
-    parameters={"k": Quantity("1/rad2", 0.2, -10.0, 50.0, 0.0, "hardening")},
+    parameters={"k": ExpressionParameter("1/rad2", 0.2, -10.0, 50.0, 0.0, "hardening")},
 )
 
 DETENT = expression_effect(
@@ -44,8 +44,8 @@ DETENT = expression_effect(
     channel="stiffness",
     moment="-k*b*exp(-(b/w)^2)",
     parameters={
-        "k": Quantity("N m/rad", 0.1, 0.0, 50.0, 0.0, "stiffness at the centre"),
-        "w": Quantity("rad", 0.05, 0.01, 0.3, 0.06, "width"),
+        "k": ExpressionParameter("N m/rad", 0.1, 0.0, 50.0, 0.0, "stiffness at the centre"),
+        "w": ExpressionParameter("rad", 0.05, 0.01, 0.3, 0.06, "width"),
     },
 )
 

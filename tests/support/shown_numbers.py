@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from identification.blocks import Block, Card, Detail, Table
+from identification.blocks import Block, Card, Detail, TextTable
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")
@@ -70,7 +70,7 @@ def assert_known(text: str, values: Iterable[float]) -> None:
         assert any(one.means(value) for value in known), (text, one)
 
 
-def assert_units(table: Table) -> None:
+def assert_units(table: TextTable) -> None:
     """Every number has a unit, in its cell, heading or row label, and every estimate an uncertainty."""
     labelled = all("[" in first for first, *_ in table.rows)
     for heading, *cells in zip(table.columns, *table.rows, strict=True):

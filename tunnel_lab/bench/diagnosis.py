@@ -35,8 +35,8 @@ from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
@@ -146,7 +146,7 @@ class DiagnosePage:
         try:
             document = read_diagnosis(self._session)
             if document is not None and is_current(self._session, self._session.diagnosis):
-                Answer(self._session, document)
+                ShownAnswer(self._session, document)
             elif document is not None:
                 words = "The campaign has changed since it was diagnosed; diagnose it again."
                 ui.label(words).classes("fault")
@@ -162,7 +162,7 @@ class DiagnosePage:
 
 
 @dataclass(frozen=True)
-class Progress:
+class DiagnosisProgress:
     """The progress of a diagnosis, from its printed lines.
 
     Args:
@@ -178,20 +178,20 @@ class Progress:
     seconds: float = 0.0
 
 
-def progress_of(lines: Sequence[str]) -> Progress:
+def progress_of(lines: Sequence[str]) -> DiagnosisProgress:
     """The progress of a diagnosis, from its printed lines."""
     names = {words: name for name, words in STEPS.items()}
-    found = Progress()
+    found = DiagnosisProgress()
     for seconds, stage, effects in (m.groups() for m in map(_PRINTED.fullmatch, lines) if m):
         now = float(seconds)
         if effects is None and stage in names:
-            found = Progress((*found.stages, (seconds, stage)), "", Reached(names[stage], now), now)
+            found = DiagnosisProgress((*found.stages, (seconds, stage)), "", Reached(names[stage], now), now)
         elif effects is not None and found.stages and stage == found.stages[-1][1]:
             found = replace(found, tried=plain(effects), seconds=now)
     return found
 
 
-class Answer:
+class ShownAnswer:
     """The answer in words and figures, and fits with causes chosen by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import tomli_w
 from nicegui import background_tasks, ui
 
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Paragraph, TextTable
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
 from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text, unit
@@ -166,15 +166,15 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
         for line in notes(document):
             estimators.setdefault(line, []).append(document["estimator"])
     return [
-        Table("Coefficients ± one standard deviation", ("quantity", *names), rows),
+        TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
         _runs("ωn [rad/s] of the runs ± one standard deviation", "omega_n", documents, names),
         _runs("ζ [1] of the runs ± one standard deviation", "zeta", documents, names),
         *(Paragraph(line, ", ".join(given)) for line, given in estimators.items()),
     ]
 
 
-def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> Table:
+def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> TextTable:
     by_run = [{run["id"]: run[key] for run in document["runs"]} for document in documents]
     ids = list(dict.fromkeys(name for runs in by_run for name in runs))[:_MOST_RUNS]
     rows = tuple((name, *(quantity_text(runs.get(name)) for runs in by_run)) for name in ids)
-    return Table(title, ("run", *names), rows)
+    return TextTable(title, ("run", *names), rows)

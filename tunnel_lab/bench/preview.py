@@ -72,7 +72,7 @@ class Mark:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnRecord:
     """A record as it is drawn: the time in s, and the reading in its unit, None within a gap."""
 
     title: str
@@ -320,7 +320,7 @@ def _column(
     return Column(channel.name, unit, f"guessed from {what}", role, used)
 
 
-def drawn(imported: Imported) -> list[Drawn]:
+def drawn(imported: Imported) -> list[DrawnRecord]:
     """The first records, with their runs."""
     raws = {id(part.raw): part.raw for part in imported.parts}
     unit = imported.campaign.sensor.unit
@@ -331,7 +331,7 @@ def drawn(imported: Imported) -> list[Drawn]:
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
             fault = part.said[-1] if part.run is None else ""
             marks.append(Mark(part.id, raw.source.name, start, end, *_rest(part, unit), fault))
-        records.append(Drawn(raw.id, unit, *points(time, raw.cleaned.reading), tuple(marks)))
+        records.append(DrawnRecord(raw.id, unit, *points(time, raw.cleaned.reading), tuple(marks)))
     return records
 
 

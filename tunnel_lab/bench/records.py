@@ -266,7 +266,7 @@ class RecordsPage:
         """Save a reading at rest; where the field is emptied, it is detected again."""
         await self._moved(mark, "rest", field.value)
 
-    def _chart(self, record: preview.Drawn) -> Chart:
+    def _chart(self, record: preview.DrawnRecord) -> Chart:
         marks = {f"{mark.run} {kind}": (mark, kind) for mark in record.marks for kind in _KINDS}
         curves: list[Sequence[float | None]] = [record.time, record.reading]
         label = f"reading [{record.unit}]"

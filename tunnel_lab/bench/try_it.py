@@ -21,10 +21,10 @@ from tunnel_sim.files.writing import write_whole
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import beside
 
 _SLIDERS = {
     "cn_beta": ("Cnβ", "1/rad", -1.0, 1.5, 0.01),

@@ -243,7 +243,7 @@ def is_current(session: Session, result: Path) -> bool:
 @lru_cache(maxsize=16)
 def _hashes(session: Session, _: object) -> dict[str, str]:
     """SHA-256 of the campaign's files; they are read again only when their state has changed."""
-    from tunnel_lab.terminal.inputs import file_hashes
+    from tunnel_lab.terminal.arguments import file_hashes
 
     return file_hashes(session.campaign)
 

@@ -17,9 +17,9 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
+from tunnel_lab.terminal.arguments import output_file
 from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import output_file
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
@@ -90,8 +90,8 @@ def doctor() -> None:
     results = tuple((part, text if fine else f"FAILED: {text}") for part, text, fine in checks)
     show(
         [
-            Table("Installation", ("part", "version or state"), (*installed(), *extras())),
-            Table("Self-check", ("check", "result"), results),
+            TextTable("Installation", ("part", "version or state"), (*installed(), *extras())),
+            TextTable("Self-check", ("check", "result"), results),
         ]
     )
     if not all(fine for _, _, fine in checks):

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     SchedulerOption,
     output_file,
@@ -238,7 +238,7 @@ def score(
       0 scored, 2 bad input: an answer is missing, or a file does not match its hash.
     """
     from diagnosis import vocabulary
-    from tunnel_lab.experiments.blind import page as blind
+    from tunnel_lab.experiments.blind import score_page as blind
     from tunnel_lab.experiments.blind import score_set
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_json, write_whole

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from identification.printing import Document
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
-from tunnel_sim.vocabulary.units import beside
+from tunnel_sim.vocabulary.dimensions import beside
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, Quantity
@@ -93,7 +93,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     from identification import identify
     from tunnel_lab.bench.workspace import Session
     from tunnel_lab.report import write_report
-    from tunnel_lab.terminal.inputs import file_hashes
+    from tunnel_lab.terminal.arguments import file_hashes
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json, write_whole
@@ -143,7 +143,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
     show([found_table(plan, document), waterfall_table(document)])
 
 
-def found_table(plan: CampaignPlan, document: Document) -> Table:
+def found_table(plan: CampaignPlan, document: Document) -> TextTable:
     """The injected values, beside the results of the nominal model and of the model with the causes."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
@@ -168,7 +168,9 @@ def found_table(plan: CampaignPlan, document: Document) -> Table:
         cell = "not found" if found is None else estimated(found)
         rows.append((f"{info.symbol} {unit(info.unit)}", significant(truth), "", cell, error))
     heads = ("quantity", "planted", "nominal model", "with the causes", "error")
-    return Table("Planted and found, ± one standard deviation σ", heads, tuple(rows), ("planted", "error"))
+    return TextTable(
+        "Planted and found, ± one standard deviation σ", heads, tuple(rows), ("planted", "error")
+    )
 
 
 def planted_and_found(
@@ -297,7 +299,7 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
             say(f"Note, {estimate.estimator}: {line}")
 
 
-def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> Table:
+def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> TextTable:
     """An estimate beside the injected values.
 
     Args:
@@ -318,4 +320,4 @@ def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> Table:
         rows.append((*cells, with_std(quantity.value, quantity.std), relative, in_stds(error, quantity.std)))
     heads = ("quantity", "truth", "estimate ± std", "error", "error/std")
     right = ("truth", "error", "error/std")
-    return Table(f"{estimate.estimator} against the injected truth", heads, tuple(rows), right)
+    return TextTable(f"{estimate.estimator} against the injected truth", heads, tuple(rows), right)

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from identification.printing import Document, coefficient_label, estimated, in_stds, unit_mark, with_std
-from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     LeaveOutOption,
     file_hashes,
@@ -25,10 +24,11 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
-from tunnel_sim.vocabulary.units import beside
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -286,7 +286,7 @@ def compare(
     show(comparison_tables(names, diagnoses))
 
 
-def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[Table]:
+def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[TextTable]:
     """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
 
     Args:
@@ -352,8 +352,8 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     quantity, parameter = ("quantity",), ("effect", "parameter")
     change = f"Coefficients with the causes: difference from {names[0]}"
     return [
-        Table("Gap and answer", (*quantity, *names), answers),
-        Table("Parameters ± one standard deviation", (*parameter, *names), rows),
-        Table("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
-        Table(change, (*quantity, *names[1:]), tuple(differences)),
+        TextTable("Gap and answer", (*quantity, *names), answers),
+        TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
+        TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
+        TextTable(change, (*quantity, *names[1:]), tuple(differences)),
     ]

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from identification.printing import unit_mark
-from tunnel_lab.terminal.inputs import EffectsFileOption, output_file, refuse_unwritable_files
+from tunnel_lab.terminal.arguments import EffectsFileOption, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -154,7 +154,7 @@ def run(
         )
         for info in kind.parameters()
     )
-    show([Table("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right)])
+    show([TextTable("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right)])
     say(ABOUT_DIRECTIONS)
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 
@@ -185,7 +185,7 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
     }
 
 
-def listing(kinds: Sequence[type[Effect]]) -> Table:
+def listing(kinds: Sequence[type[Effect]]) -> TextTable:
     """Effects with equation and parameters, one row each."""
     last = "equation, then parameters [unit]"
     rows = []
@@ -194,7 +194,9 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
         rows.append((kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters])))
     names = ("effect", "channel", "condition")
     groups = tuple(kinds)
-    return Table("Effects beyond the nominal model", (*names, last), tuple(rows), names=names, groups=groups)
+    return TextTable(
+        "Effects beyond the nominal model", (*names, last), tuple(rows), names=names, groups=groups
+    )
 
 
 def example(kind: type[Effect]) -> str:

@@ -12,7 +12,7 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.report.import_table import parts_table
-from tunnel_lab.terminal.inputs import LeaveOutOption, ending, output_file, split_names
+from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, split_names
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS

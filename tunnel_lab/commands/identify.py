@@ -15,12 +15,11 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Paragraph, TextTable
 from identification.estimators import SUMMARIES, make_estimator
 from identification.printing import budget_blocks, estimate_blocks
-from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.arguments import (
     LeaveOutOption,
     chosen_estimator,
     chosen_estimators,
@@ -31,6 +30,7 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -227,7 +227,7 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     cells = tuple((name, with_std(one.value, one.std)) for name, one in rows)
     heading = "value ± one standard deviation"
     title = f"{points.name}: {points.time_s.size} turning points"
-    show([Table(title, ("quantity", heading), cells, right=(heading,))])
+    show([TextTable(title, ("quantity", heading), cells, right=(heading,))])
     for line in fit.said:
         say(f"Note: {line}")
     say(

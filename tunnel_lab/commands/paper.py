@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary import limits
@@ -73,7 +73,7 @@ def show_springs(springs: SpringTable, source: str) -> None:
         numbers = (f"{stiffness:g}", f"{frequency:g}", f"{square:.2f}", f"{residual:+.1f}")
         rows.append((name, *numbers, "off the line" if flag else ""))
     heads = ("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", "remark")
-    show([Table(f"Springs of {source}", heads, tuple(rows), heads[1:-1])])
+    show([TextTable(f"Springs of {source}", heads, tuple(rows), heads[1:-1])])
     if fit.inertia.value <= 0.0:
         problem = "stiffness does not rise with frequency, so this table gives no inertia: check it"
         say(problem, stderr=True)
@@ -184,15 +184,15 @@ def paper(
     [bold]Exit status[/bold]
       0 written, 2 bad input, 130 interrupted (finished parts are kept).
     """
-    from tunnel_lab.paper import networks, rig
-    from tunnel_lab.paper.page import write_paper
+    from tunnel_lab.paper import networks, rig_tables
+    from tunnel_lab.paper.paper_page import write_paper
 
     known = {
-        "table-1": rig.table_1,
-        "table-2": rig.table_2,
-        "equations": rig.equations,
-        "figure-1": rig.figure_1,
-        "figure-2": rig.figure_2,
+        "table-1": rig_tables.table_1,
+        "table-2": rig_tables.table_2,
+        "equations": rig_tables.equations,
+        "figure-1": rig_tables.figure_1,
+        "figure-2": rig_tables.figure_2,
         "figure-3": networks.figure_3,
         "table-3": networks.table_3,
         "table-4": networks.table_4,
@@ -204,5 +204,5 @@ def paper(
     with bar("paper") as progress:
         page, sections = write_paper(out, known, list(dict.fromkeys(only or known)), progress=progress)
     rows = tuple((part.title, part.theirs, part.ours, part.outcome) for part in sections.values())
-    show([Table("The paper, ours beside theirs", ("item", "paper", "here", "outcome"), rows)])
+    show([TextTable("The paper, ours beside theirs", ("item", "paper", "here", "outcome"), rows)])
     say_written(page)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import (
+from tunnel_lab.terminal.arguments import (
     SchedulerOption,
     chosen_estimators,
     estimator_option,
@@ -24,10 +24,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from tunnel_lab.experiments.answers import Failed
+    from tunnel_lab.experiments.estimate_rows import Failed
     from tunnel_lab.experiments.runner import Workers
     from tunnel_lab.experiments.score import Results
-    from tunnel_lab.experiments.view import View
+    from tunnel_lab.experiments.view import ExperimentView
 
 PACKAGED = "packaged"
 """Name of the installed baseline."""
@@ -159,7 +159,7 @@ def score(
             raise typer.Exit(1)
 
 
-def _present(view: View, out: Path | None, failed: Iterable[Failed]) -> None:
+def _present(view: ExperimentView, out: Path | None, failed: Iterable[Failed]) -> None:
     """Write and print what was found."""
     written = "" if out is None else view.write(out)
     if out is not None:
@@ -213,8 +213,8 @@ def _breakdown(
     seed: int,
     trials: int | None,
 ) -> None:
-    from tunnel_lab.experiments.answers import failures_in
     from tunnel_lab.experiments.breakdown import REALISATIONS, breakdown_of, breakdown_view, make_cases
+    from tunnel_lab.experiments.estimate_rows import failures_in
     from tunnel_lab.experiments.experiment import results_of
 
     terminal = console(stderr=True).is_terminal

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.inputs import given_campaign, split_names
+from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.arguments import given_campaign, split_names
 from tunnel_lab.terminal.outputs import say, say_written
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.files.reading import as_described

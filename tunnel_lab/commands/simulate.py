@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identification.blocks import Table
-from tunnel_lab.terminal.inputs import (
+from identification.blocks import TextTable
+from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     ending,
     output_file,
@@ -308,7 +308,7 @@ def _changes(document: PlanDocument) -> float:
     return springs * (costs.spring_change + len(document.wind_speeds) * costs.speed_change)
 
 
-def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> Table:
+def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> TextTable:
     """The bounds of both plans, and their ratio with the first repeated ``longer`` times, for equal rig time."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, significant, unit
@@ -325,4 +325,4 @@ def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) 
     ratios = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
     cells.append(("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in ratios)))
     title = "Cramér–Rao bounds: the smallest standard deviations"
-    return Table(title, ("plan", *heads), tuple(cells), right=heads)
+    return TextTable(title, ("plan", *heads), tuple(cells), right=heads)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import SchedulerOption, chosen_estimators, estimator_option
+from tunnel_lab.terminal.arguments import SchedulerOption, chosen_estimators, estimator_option
 from tunnel_lab.terminal.outputs import say
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError, counted

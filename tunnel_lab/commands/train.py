@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from identification.blocks import Table
-from tunnel_lab.terminal.inputs import SchedulerOption, refuse_unwritable_files
+from identification.blocks import TextTable
+from tunnel_lab.terminal.arguments import SchedulerOption, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -144,7 +144,7 @@ def train(
         for name, network in record["networks"].items()
         for number, start in enumerate(network["starts"], 1)
     )  # fmt: skip
-    show([Table(f"Trained with seed {record['seed']}", ("network", "start", *headings), rows, headings)])
+    show([TextTable(f"Trained with seed {record['seed']}", ("network", "start", *headings), rows, headings)])
     errors = record["errors"]
     say(
         f"On {record['data']['test_count']} test responses: errors of ζ up to {errors['zeta']:.1e} "
@@ -156,7 +156,7 @@ def train(
 
 def _train_posterior(out: Path, seed: int, shards: int, steps: int, workers: Workers, restart: bool) -> None:
     """Train and write both networks of `neural_posterior`, with a record beside them."""
-    from tunnel_lab.experiments.training import TrainingSpec, train
+    from tunnel_lab.experiments.training import ShardedTraining, train
     from tunnel_sim.files.writing import write_json, write_whole
 
     refuse_unwritable_files(out, out.with_suffix(".json"))
@@ -165,7 +165,7 @@ def _train_posterior(out: Path, seed: int, shards: int, steps: int, workers: Wor
         shutil.rmtree(folder)
     with bar("training", 1) as progress:
         weights, record = train(
-            TrainingSpec(seed, shards, steps),
+            ShardedTraining(seed, shards, steps),
             folder,
             workers,
             progress=lambda what, done, all_of_it: progress(done, all_of_it, what),

@@ -19,7 +19,7 @@ from tunnel_lab.envs.menu import PRESETS, WHERE, Costs, Preset, make_menu, prese
 from tunnel_lab.envs.session import (
     LARGE,
     CampaignSession,
-    Conditions,
+    EpisodeConditions,
     Knowledge,
     answers,
     diagnostic_information,
@@ -30,7 +30,7 @@ from tunnel_lab.envs.session import (
 from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.envs import arguments_of, refuse_unknown
-from tunnel_sim.envs.conditions import refuse_long
+from tunnel_sim.envs.episode_conditions import refuse_long
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.arguments import (
@@ -43,8 +43,8 @@ from tunnel_sim.vocabulary.arguments import (
 )
 from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import beside
 
 Observation = dict[str, Array]
 WIDTH, HEIGHT = 960, 480
@@ -125,7 +125,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
                 base.max_runs if max_runs is None else max_runs, "max_runs", WHERE
             )
         )
-        self.conditions = Conditions(
+        self.conditions = EpisodeConditions(
             rig=loaded,
             sensor=preset_sensor(base, noise_std, sample_rate),
             menu=make_menu(

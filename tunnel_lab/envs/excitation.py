@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.engines import operator_action
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 from tunnel_sim.envs.information import propagator
 from tunnel_sim.vocabulary.arguments import Number
 

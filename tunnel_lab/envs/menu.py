@@ -25,7 +25,7 @@ def refusal(what: str, remedy: str) -> EnvError:
 
 
 @dataclass(frozen=True)
-class Choice:
+class RunChoice:
     """The conditions of one run.
 
     Args:
@@ -80,7 +80,7 @@ class Menu:
         """Number of springs, speeds, angles and durations."""
         return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
 
-    def choice(self, action: Iterable[int]) -> Choice:
+    def choice(self, action: Iterable[int]) -> RunChoice:
         """The run of an action: indices of spring, speed, angle and duration.
 
         Raises:
@@ -94,7 +94,7 @@ class Menu:
             raise refusal(f"action {numbers.tolist()} is outside the menu", remedy)
         spring, speed, angle, duration = numbers.tolist()
         number, stiffness = self.springs[spring]
-        return Choice(
+        return RunChoice(
             number, stiffness, self.wind_speeds[speed], self.release_angles[angle], self.durations[duration]
         )
 
@@ -151,7 +151,7 @@ class Costs:
         for name, value in vars(self).items():
             Number(unit="s").checked(value, f"costs: {name}", WHERE)
 
-    def of(self, choice: Choice, last: Choice | None) -> float:
+    def of(self, choice: RunChoice, last: RunChoice | None) -> float:
         """Rig time of a run after another, s; the first run (None) needs a change of spring and speed."""
         spring = last is None or choice.spring != last.spring
         speed = last is None or choice.wind_speed != last.wind_speed

@@ -20,7 +20,7 @@ from diagnosis.findings.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.study import Study
 from identification.campaign.belief import expected_belief, information_gain
-from tunnel_lab.envs.menu import Choice, Menu, refusal
+from tunnel_lab.envs.menu import Menu, RunChoice, refusal
 from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -60,7 +60,7 @@ def greedy(known: Knowledge) -> Action:
     return _best(known, lambda choice: expected_gain(known, choice))
 
 
-def _best(known: Knowledge, gain: Callable[[Choice], float]) -> Action:
+def _best(known: Knowledge, gain: Callable[[RunChoice], float]) -> Action:
     """The action with the largest gain per rig time; the scripted one where no action has a gain."""
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
@@ -71,7 +71,7 @@ def _best(known: Knowledge, gain: Callable[[Choice], float]) -> Action:
     return scripted(known) if chosen is None else chosen
 
 
-def expected_gain(known: Knowledge, choice: Choice) -> float:
+def expected_gain(known: Knowledge, choice: RunChoice) -> float:
     """Expected information of a run on (Cnβ, Cnr), nats; 0 where the run might diverge."""
     conditions = known.conditions
     after = expected_belief(
@@ -96,7 +96,7 @@ def separating(known: Knowledge) -> Action:
     if rivals is None or not rivals[0].problem.data.wind_on:
         return scripted(known)
 
-    def gain(choice: Choice) -> float:
+    def gain(choice: RunChoice) -> float:
         run = planned_run(
             rivals[0],
             spring_stiffness=choice.spring_stiffness,

@@ -30,7 +30,7 @@ from identification.signal.decay_fit import Reading, RunFit
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.noise import stated_noise
 from identification.signal.run_fit import identify_run
-from tunnel_lab.envs.menu import WHERE, Choice, Costs, Menu, refusal
+from tunnel_lab.envs.menu import WHERE, Costs, Menu, RunChoice, refusal
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
@@ -54,7 +54,7 @@ OPTIONS = ("truth", "effects")
 
 
 @dataclass(frozen=True)
-class Conditions:
+class EpisodeConditions:
     """The fixed conditions of all episodes of an environment.
 
     Args:
@@ -96,7 +96,7 @@ class Conditions:
         rate = self.sensor.sample_rate
         return np.arange(max(2, round(duration * rate))) / rate
 
-    def link(self, choice: Choice) -> Array:
+    def link(self, choice: RunChoice) -> Array:
         """Dependence of the run's decay on the shared parameters, shape (2, 4); see `run_link`."""
         condition = choice.condition("next", self.rig.air.density)
         return run_link(stated_run(condition, _EMPTY), self.rig_properties)
@@ -116,9 +116,9 @@ class Knowledge:
         status: of the last run, ``ok`` or the fault.
     """
 
-    conditions: Conditions
+    conditions: EpisodeConditions
     beliefs: tuple[Belief, ...]
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[RunChoice, ...] = ()
     costs: tuple[float, ...] = ()
     runs: tuple[Run, ...] = ()
     fits: tuple[tuple[Array, Reading, RunFit], ...] = ()
@@ -137,7 +137,7 @@ class Knowledge:
         return self.beliefs[-1]
 
     @property
-    def last(self) -> Choice | None:
+    def last(self) -> RunChoice | None:
         """The last run; None before the first."""
         return self.choices[-1] if self.choices else None
 
@@ -152,13 +152,13 @@ class Knowledge:
         rig, sensor = self.conditions.rig_properties, self.conditions.sensor_properties
         return Campaign("campaign-v0", rig, sensor, self.runs)
 
-    def cost(self, choice: Choice) -> float:
+    def cost(self, choice: RunChoice) -> float:
         """Cost of a further run, s."""
         return self.conditions.costs.of(choice, self.last)
 
     def observation(self) -> dict[str, Array]:
         """The observation of the environment; docs/reference/envs/campaign.md lists the keys."""
-        last = self.last or Choice(0, 0.0, 0.0, 0.0, 0.0)
+        last = self.last or RunChoice(0, 0.0, 0.0, 0.0, 0.0)
         run = [last.spring_stiffness, last.wind_speed, last.release_angle, last.duration]
         observed = {
             "estimate": np.clip(self.belief.values, -LARGE, LARGE),
@@ -171,7 +171,7 @@ class Knowledge:
         return observed
 
 
-def first_knowledge(conditions: Conditions) -> Knowledge:
+def first_knowledge(conditions: EpisodeConditions) -> Knowledge:
     """The knowledge before the first run: the prior is the distribution from which the truth is drawn."""
     return Knowledge(conditions, (prior_belief(MEAN, STD),))
 
@@ -183,7 +183,7 @@ class CampaignSession:
         rng: parent of the generators of the runs; the noise of a run depends only on its number.
     """
 
-    def __init__(self, conditions: Conditions, truth: RigTruth, rng: np.random.Generator) -> None:
+    def __init__(self, conditions: EpisodeConditions, truth: RigTruth, rng: np.random.Generator) -> None:
         self._conditions = conditions
         self.truth = truth
         self._rng = rng
@@ -191,7 +191,7 @@ class CampaignSession:
         assert isinstance(seed, np.random.SeedSequence)
         self._between = between_runs(seed)
 
-    def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
+    def perform(self, known: Knowledge, choice: RunChoice) -> Knowledge:
         """Make a run and update the knowledge.
 
         A run whose motion grows without bound is lost: it takes time and gives no result.
@@ -257,8 +257,8 @@ class CampaignSession:
 
 
 def _deviating(
-    choice: Choice, values: Mapping[str, float], own: Mapping[str, float]
-) -> tuple[Choice, dict[str, float]]:
+    choice: RunChoice, values: Mapping[str, float], own: Mapping[str, float]
+) -> tuple[RunChoice, dict[str, float]]:
     """The conditions and coefficients of a run that deviates from the choice."""
 
     def true(name: str, stated: float) -> float:

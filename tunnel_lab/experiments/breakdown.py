@@ -17,21 +17,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Paragraph, TextTable
 from identification.printing import significant
 from identification.scoring import score
-from tunnel_lab.experiments.answers import counted_failures, not_given
+from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
-from tunnel_lab.experiments.view import View
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.plotting.style import figure, styled
-from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class BiasCase:
     truth: dict[str, float]
 
 
-def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
+def conditions_of(seed: int, *, duration: float = 10.0) -> TrueConditions:
     """The campaign to which the effects are added.
 
     Args:
@@ -104,7 +104,7 @@ def conditions_of(seed: int, *, duration: float = 10.0) -> Conditions:
     springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
     release = np.round(np.radians(degrees), 4)
     start = release * (1.0 + 0.03 * np.random.default_rng(seed).standard_normal(release.size))
-    return Conditions(
+    return TrueConditions(
         spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
         air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2),
         yaw_inertia=TRUTH["yaw_inertia"], mechanical_damping=TRUTH["mechanical_damping"],
@@ -169,7 +169,7 @@ def make_cases(
     return cases
 
 
-def draw_effect(conditions: Conditions, name: str, severity: float, seed: int) -> CampaignDraw:
+def draw_effect(conditions: TrueConditions, name: str, severity: float, seed: int) -> CampaignDraw:
     """A campaign with one effect in its textbook form.
 
     Args:
@@ -263,7 +263,7 @@ def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def breakdown_view(results: pl.DataFrame) -> View:
+def breakdown_view(results: pl.DataFrame) -> ExperimentView:
     """The view of a breakdown.
 
     Args:
@@ -272,7 +272,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     frame = breakdown_frame(results)
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
     tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
-    return View(
+    return ExperimentView(
         "Bias caused by each unmodelled effect",
         [*tables, Paragraph(ABOUT), *not_given_notes(not_given(results))],
         {f"breakdown-{one.replace('_', '-')}": partial(breakdown_figure, frame, one) for one in given},
@@ -280,7 +280,7 @@ def breakdown_view(results: pl.DataFrame) -> View:
     )
 
 
-def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
+def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[TextTable]:
     """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
     mine = frame.filter(pl.col("quantity") == quantity)
     estimators = mine["estimator"].unique(maintain_order=True).to_list()
@@ -299,7 +299,7 @@ def breakdown_tables(frame: pl.DataFrame, quantity: str) -> list[Table]:
             for effect, severity in mine.select(places).unique(maintain_order=True).iter_rows()
         )
         title = f"Bias of {NAMES[quantity]} [%]"
-        tables.append(Table(title, ("effect", "×", *some), rows, right=("×", *some), names=("effect",)))
+        tables.append(TextTable(title, ("effect", "×", *some), rows, right=("×", *some), names=("effect",)))
     return tables
 
 

@@ -27,7 +27,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import polars as pl
 
 from identification.estimators import Own, own_estimators
-from tunnel_lab.experiments.answers import Failed, counted_failures
+from tunnel_lab.experiments.estimate_rows import Failed, counted_failures
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
@@ -280,7 +280,7 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CommandOutcome:
     """The outcome of a command: the number of tasks finished before it, and the estimates that failed in it."""
 
     found: int
@@ -299,7 +299,7 @@ def _done(
 
 def run(
     experiment: Experiment[TaskT], store: Store, workers: Workers, progress: Progress | None = None
-) -> Outcome:
+) -> CommandOutcome:
     """Do the unfinished tasks of an experiment. Only this process stores results: a repeated task is stored once.
 
     Args:
@@ -328,12 +328,12 @@ def run(
             reached += experiment.weight(task)
             show(reached, total)
     every = (one for name in sorted(failed) for one in failed[name])
-    return Outcome(len(experiment.tasks) - len(waiting), counted_failures(every))
+    return CommandOutcome(len(experiment.tasks) - len(waiting), counted_failures(every))
 
 
 def run_in(
     experiment: Experiment[TaskT], folder: Path, workers: Workers, progress: Progress | None = None
-) -> tuple[Parts[TaskT], Outcome]:
+) -> tuple[Parts[TaskT], CommandOutcome]:
     """Begin or continue an experiment in a folder, after which its results are complete; errors as of `begin`."""
     store = begin(experiment, folder)
     outcome = run(experiment, store, workers, progress)
@@ -344,7 +344,7 @@ def run_in(
 
 def results_of(
     experiment: Experiment[TaskT], folder: Path | None, workers: Workers, progress: Progress | None = None
-) -> tuple[pl.DataFrame, Outcome]:
+) -> tuple[pl.DataFrame, CommandOutcome]:
     """The complete results of an experiment of some minutes.
 
     Args:

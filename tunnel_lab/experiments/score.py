@@ -18,7 +18,7 @@ import polars as pl
 
 from identification.estimate import UNITS
 from identification.scoring import Trials
-from tunnel_lab.experiments.answers import (
+from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
     RAISED,
     Failed,
@@ -33,7 +33,7 @@ from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import trials_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_grid import Grid
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.kept_process import read_apart
 from tunnel_sim.files.reading import (
     as_described,
@@ -63,7 +63,7 @@ Key = tuple[str, int, str]
 
 
 @dataclass(frozen=True)
-class Unit:
+class TrialBatch:
     """Trials of one cell, from the first up to but excluding the last; trials and cells are numbered from 0."""
 
     cell: int
@@ -71,12 +71,12 @@ class Unit:
     stop: int
 
 
-def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[Unit]:
+def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[TrialBatch]:
     """Some estimators on every trial of a grid, ordered across cells, to estimate the remaining time early."""
     return Experiment(
         "score",
         [
-            Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+            TrialBatch(cell, first, min(first + UNIT_TRIALS, grid.trials))
             for first in range(0, grid.trials, UNIT_TRIALS)
             for cell in range(len(grid.cells))
         ],
@@ -90,7 +90,7 @@ def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[Unit]:
     )
 
 
-def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> Done:
+def score_unit(grid: Grid, estimators: Sequence[str], unit: TrialBatch) -> Done:
     """Every estimator on the unit's trials."""
     from tunnel_lab.experiments.score_grid import draw_trial
 

@@ -14,7 +14,7 @@ from tunnel_lab.experiments.figures import NAMES
 from tunnel_lab.experiments.score import Results
 from tunnel_lab.experiments.score_grid import Cell
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled, text_width
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

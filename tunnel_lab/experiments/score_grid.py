@@ -20,7 +20,7 @@ from pydantic import Field, TypeAdapter
 
 from identification.estimators import free_decay_estimators
 from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound, in_phase
-from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
+from tunnel_lab.terminal.arguments import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice
@@ -265,7 +265,7 @@ def packaged_grid() -> Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ScoreTrial:
     """A campaign without stated noise, with truth and Cramér–Rao bound by quantity, SI.
 
     The bound is for the nominal model, including any scatter between the runs.
@@ -276,7 +276,7 @@ class Trial:
     bound: Mapping[str, float]
 
 
-def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
+def draw_trial(cell: Cell, seed: int, number: int) -> ScoreTrial:
     """Make one trial of a cell; trials are numbered from 0. Results are bit-identical for equal arguments.
 
     Raises:
@@ -304,14 +304,14 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
         density = rig.air.density
         truth = in_phase(truth, effects_of(cell.effect), [(k, v, density) for k, v, _ in runs], rig)
         bound = coefficients_bound(campaign, truth, [release for *_, release in runs], noise, scatter)
-        return Trial(campaign, dict(vars(truth)), bound)
+        return ScoreTrial(campaign, dict(vars(truth)), bound)
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
     omega = 2.0 * np.pi * cell.frequency * (1.0 + _FREQUENCY_SPREAD * rng.uniform(-1.0, 1.0))
     inertia = rig.dynamics.yaw_inertia
     truth = Truth(0.0, 0.0, inertia, 2.0 * zeta * omega * inertia)
     campaign = _campaign(cell, truth, [(inertia * omega**2, 0.0, cell.amplitude)], rig, rng)
     bound = decay_bound(campaign.runs[0].record.time_s, cell.amplitude, float(omega), float(zeta), noise)
-    return Trial(campaign, {"zeta": zeta, "omega_n": omega}, bound)
+    return ScoreTrial(campaign, {"zeta": zeta, "omega_n": omega}, bound)
 
 
 def effects_of(text: str) -> tuple[Effect, ...]:

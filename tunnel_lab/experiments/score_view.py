@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from identification.blocks import Block, Paragraph, Table
+from identification.blocks import Block, Paragraph, TextTable
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing import concise, significant
@@ -28,7 +28,7 @@ from identification.statistics import Proportion
 from tunnel_lab.experiments.experiment import parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text
 from tunnel_lab.experiments.score import Results, groups_of
-from tunnel_lab.experiments.view import View
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 ABOUT = (
@@ -42,7 +42,7 @@ _FEW = 20
 
 
 @dataclass(frozen=True)
-class Finding:
+class AspectComparison:
     """One aspect of one estimator in the baseline and now, and whether it is significantly worse."""
 
     estimator: str
@@ -53,7 +53,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ScoreVerdict:
     """The result of a check.
 
     Args:
@@ -62,13 +62,13 @@ class Verdict:
         added: unchecked estimators, which are not in the baseline.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[AspectComparison, ...]
     false_alarm_rate: float
     identical: bool
     added: tuple[str, ...] = ()
 
     @property
-    def worse(self) -> tuple[Finding, ...]:
+    def worse(self) -> tuple[AspectComparison, ...]:
         """The worse findings, the most significant first."""
         worse = [finding for finding in self.findings if finding.worse]
         return tuple(sorted(worse, key=lambda finding: finding.change.p_value))
@@ -79,7 +79,7 @@ class Verdict:
         return not self.worse
 
 
-def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> Verdict:
+def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> ScoreVerdict:
     """Compare a score with its baseline, cell by cell and over all cells of a kind together.
 
     Args:
@@ -113,8 +113,8 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
                     every = f"all {len(cells)} {group}"
                     tested += [(name, every, quantity, change) for change in changes(old, new)]
     verdicts = holm([change.p_value for *_, change in tested], rate)
-    return Verdict(
-        findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
+    return ScoreVerdict(
+        findings=tuple(AspectComparison(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
         false_alarm_rate=rate,
         identical=_estimates(baseline, estimators).equals(_estimates(now, estimators)),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
@@ -164,7 +164,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def summary_tables(results: Results) -> list[Table]:
+def summary_tables(results: Results) -> list[TextTable]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     heads = ("RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]")
 
@@ -185,7 +185,7 @@ def _table(
     heads: tuple[str, ...],
     cells: Sequence[int],
     figures: Callable[[str, Sequence[int], str], tuple[str, ...]],
-) -> Table:
+) -> TextTable:
     """Each estimator's name and time in the first column, which has no heading, and a row for each quantity."""
     rows: list[tuple[str, ...]] = []
     groups: list[str] = []
@@ -197,10 +197,10 @@ def _table(
         rows += [(text, *[""] * len(heads)) for text in (name, time)]
         rows += [(f"  {NAMES[quantity]}", *figures(name, cells, quantity)) for quantity in given]
         groups += [name] * (2 + len(given))
-    return Table(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
+    return TextTable(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
 
 
-def score_view(results: Results, *, cells: bool = False) -> View:
+def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
     """The view of a score.
 
     Args:
@@ -208,7 +208,7 @@ def score_view(results: Results, *, cells: bool = False) -> View:
     """
     from tunnel_lab.experiments.score_drawing import score_figure
 
-    return View(
+    return ExperimentView(
         f"Score on the grid {results.grid.name}",
         [*summary_tables(results), *(cell_tables(results) if cells else ()), *notes_below(results)],
         {"score": partial(score_figure, results)},
@@ -253,7 +253,7 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
     )
 
 
-def cell_tables(results: Results) -> list[Table]:
+def cell_tables(results: Results) -> list[TextTable]:
     """One table for each cell: a section for each estimator, a row for each quantity."""
     heads = ("RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
 
@@ -279,7 +279,7 @@ def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
-def _worse_table(verdict: Verdict) -> Table:
+def _worse_table(verdict: ScoreVerdict) -> TextTable:
     """The findings that are worse, the most significant first."""
     rows = []
     for finding in verdict.worse[:_SHOWN_WORSE]:
@@ -291,10 +291,12 @@ def _worse_table(verdict: Verdict) -> Table:
         cells = (finding.estimator, NAMES[finding.quantity], change.aspect, before, now)
         rows.append((*cells, f"{change.p_value:.1g}", finding.where))
     right = ("before", "now", "p")
-    return Table("Worse than the baseline", ("estimator", "", "aspect", *right, "where"), tuple(rows), right)
+    return TextTable(
+        "Worse than the baseline", ("estimator", "", "aspect", *right, "where"), tuple(rows), right
+    )
 
 
-def verdict_blocks(verdict: Verdict) -> list[Block]:
+def verdict_blocks(verdict: ScoreVerdict) -> list[Block]:
     """The result of a check: the worse findings, and the verdict in words."""
     rate = f"{100 * verdict.false_alarm_rate:g} %"
     tests = f"{counted(len(verdict.findings), 'test')}, false-alarm rate {rate} of all together"

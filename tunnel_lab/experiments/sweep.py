@@ -27,7 +27,7 @@ from tunnel_lab.experiments.sweep_tables import (
     check_sweep_size,
 )
 from tunnel_lab.experiments.sweep_work import RECORDS, run_shard
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_file import PlanDocument, check_conditions, first_twice, plan_from, run_count
 from tunnel_sim.files.reading import as_described, parse_json

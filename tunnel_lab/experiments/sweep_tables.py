@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BeforeValidator, Field
 
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.plan_file import (
     STEPS_PER_SECOND,
     EffectTable,
@@ -39,7 +39,7 @@ T = TypeVar("T")
 Many = Annotated[list[T], BeforeValidator(_listed), Field(min_length=1)]
 
 
-class RigTable(StrictModel):
+class SweepRigTable(StrictModel):
     """``[[rig]]``: a rig description with changes; the packaged description where no file is named."""
 
     name: OneLine = Field(default="packaged", description="a short name in quotes")
@@ -131,7 +131,7 @@ class SweepDocument(StrictModel):
     )
     records: bool = Field(default=False, description="true or false")
     cases_per_shard: int | None = Field(default=None, ge=1, description="a whole number, one or more")
-    rig: Many[RigTable] = Field(default=[RigTable()], description="[[rig]] tables")
+    rig: Many[SweepRigTable] = Field(default=[SweepRigTable()], description="[[rig]] tables")
     conditions: Many[ConditionsTable] = Field(
         description="a [conditions] table with springs, wind_speeds, release_angles_deg and duration"
     )

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification.blocks import Paragraph, Table
+from identification.blocks import Paragraph, TextTable
 from identification.printing import concise, significant, unit
 from identification.scoring import Score, score
-from tunnel_lab.experiments.answers import NOT_ASKED, not_given
+from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text, trials_of
 from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
-from tunnel_lab.experiments.view import View
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
@@ -61,7 +61,7 @@ _WIDE = 10.0  # ratio of the largest to the least value above which an axis is l
 
 
 @dataclass(frozen=True)
-class Line:
+class ScoreLine:
     """The score of an estimator for a quantity at a place on an axis.
 
     Args:
@@ -93,7 +93,7 @@ class Line:
         }  # fmt: skip
 
 
-def summarise(results: pl.LazyFrame) -> list[Line]:
+def summarise(results: pl.LazyFrame) -> list[ScoreLine]:
     """Score the results of a sweep.
 
     Returns:
@@ -103,7 +103,7 @@ def summarise(results: pl.LazyFrame) -> list[Line]:
     columns = ("effect", "severity", *AXES, "truth", "value", "std", "bound", "status", "unit")
     asked = pl.col("value").is_not_null() | ~pl.col("status").is_in(NOT_ASKED)
     pairs = results.select("estimator", "quantity").unique(maintain_order=True).collect()
-    lines: list[Line] = []
+    lines: list[ScoreLine] = []
     for estimator, quantity in pairs.iter_rows():
         if quantity not in absent.get(estimator, ()):
             mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
@@ -115,7 +115,7 @@ def summarise(results: pl.LazyFrame) -> list[Line]:
     )
 
 
-def sweep_view(results: pl.LazyFrame, name: str) -> View:
+def sweep_view(results: pl.LazyFrame, name: str) -> ExperimentView:
     """The view of the finished part of a sweep.
 
     Args:
@@ -126,7 +126,7 @@ def sweep_view(results: pl.LazyFrame, name: str) -> View:
     texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
     csv = pl.DataFrame([line.to_row() for line in lines]).with_columns(texts).write_csv()
     tables = (overall_table(lines), *map(axis_table, along.values()))
-    return View(
+    return ExperimentView(
         f"Sweep {name}",
         [*tables, Paragraph(BRACKETS), *not_given_notes(unanswered(results))],
         {name: partial(error_figure, part) for name, part in along.items()},
@@ -139,19 +139,19 @@ def unanswered(results: pl.LazyFrame) -> dict[str, tuple[str, ...]]:
     return not_given(results.filter(pl.col("truth").is_not_null()))
 
 
-def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
+def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[ScoreLine]:
     """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
     plain = data.filter(pl.col("effect") == NO_EFFECT)
     base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
-    yield Line(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
+    yield ScoreLine(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
     for axis, (_, at_unit) in AXES.items():
         for at, part in _along(_repeating(base, but=axis), axis):
-            yield Line(axis, effects, at, at_unit, estimator, quantity, _score(part))
+            yield ScoreLine(axis, effects, at, at_unit, estimator, quantity, _score(part))
     for effect in sorted(set(data["effect"]) - {NO_EFFECT}):
         both = _repeating(data.filter(pl.col("effect").is_in([effect, NO_EFFECT])))
         at_unit = effect_class(effect.partition(" + ")[0]).parameters()[0].unit
         for at, part in _along(both, SEVERITY):
-            yield Line(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
+            yield ScoreLine(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
 
 
 def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
@@ -175,9 +175,9 @@ def _score(data: pl.DataFrame) -> Score:
     return score(trials_of(data, percent=bool((data["truth"] != 0.0).all())))
 
 
-def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
+def groups(lines: Iterable[ScoreLine]) -> dict[str, list[ScoreLine]]:
     """Lines by the name of their figure, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``."""
-    by_name: dict[str, list[Line]] = {}
+    by_name: dict[str, list[ScoreLine]] = {}
     for line in lines:
         if line.axis != OVERALL:
             what = line.effect.replace(" + ", "-and-") if line.axis == SEVERITY else line.axis
@@ -186,7 +186,7 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
 
 
 @styled
-def error_figure(lines: Sequence[Line]) -> Figure | None:
+def error_figure(lines: Sequence[ScoreLine]) -> Figure | None:
     """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
 
     Returns:
@@ -243,11 +243,11 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     return fig
 
 
-def _label(line: Line) -> str:
+def _label(line: ScoreLine) -> str:
     return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
 
 
-def overall_table(lines: Iterable[Line]) -> Table:
+def overall_table(lines: Iterable[ScoreLine]) -> TextTable:
     """Bias, RMSE, coverage and failures of each estimator and quantity over the cases of `_repeating`.
 
     The title names these cases.
@@ -269,7 +269,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
         )
         for line in kept
     )
-    return Table(
+    return TextTable(
         f"All cases {pooled}{repeating}",
         ("estimator", "quantity", "trials", *heads),
         rows,
@@ -278,7 +278,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
     )
 
 
-def axis_table(lines: Sequence[Line]) -> Table:
+def axis_table(lines: Sequence[ScoreLine]) -> TextTable:
     """RMSE along one axis, a column for each quantity that has a panel in the figures."""
     label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
@@ -290,7 +290,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
         (significant(at), name, *(_figure(cells.get((at, name, quantity))) for quantity in quantities))
         for at, name in pairs
     )
-    return Table(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
+    return TextTable(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
 
 
 def _figure(quantity: Quantity | None) -> str:

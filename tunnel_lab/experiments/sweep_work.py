@@ -12,7 +12,8 @@ import polars as pl
 
 from identification.estimate import PARAMETERS, UNITS
 from identification.estimators import make_estimator
-from tunnel_lab.experiments.answers import (
+from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds, recovered
+from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
     Failed,
     Failure,
@@ -20,9 +21,8 @@ from tunnel_lab.experiments.answers import (
     counted_failures,
     quantity_rows,
 )
-from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds, recovered
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
-from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
 from tunnel_sim.vocabulary.errors import TunnelError, one_line

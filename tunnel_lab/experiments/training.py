@@ -55,7 +55,7 @@ _GREATEST_GRADIENT = 5.0
 
 
 @dataclass(frozen=True)
-class TrainingSpec:
+class ShardedTraining:
     """The specification of a training: shards of two hundred campaigns each, and batches of each network."""
 
     seed: int = 1
@@ -68,7 +68,10 @@ class TrainingSpec:
 
 
 def train(
-    spec: TrainingSpec, folder: Path, workers: Workers, progress: Progress = lambda _what, _done, _all: None
+    spec: ShardedTraining,
+    folder: Path,
+    workers: Workers,
+    progress: Progress = lambda _what, _done, _all: None,
 ) -> tuple[bytes, dict[str, Any]]:
     """Simulate the missing shards, and fit both networks; finished work in the folder is kept and used.
 
@@ -128,7 +131,7 @@ def train(
 
 
 def _fitted(
-    kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
+    kind: str, spec: ShardedTraining, samples: Mapping[str, Array], folder: Path, progress: Progress
 ) -> dict[str, Array]:
     """The weights of one network; the fit continues from the checkpoint of the same training, if any."""
     mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in samples.items())])

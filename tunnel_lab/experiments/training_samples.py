@@ -17,13 +17,13 @@ from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.rivals import Features, campaign_features, record_features
 from tunnel_lab.experiments.experiment import Done, Experiment, parquet
 from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
-from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS
-from tunnel_reference.integrator import Motion, Term, integrate
+from tunnel_reference.integrator import BoundLaw, RodMotion, integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects, read_and_fit
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -104,7 +104,7 @@ def read_samples(folder: Path, dataset: str, part: str, count: int | None = None
     return {series.name: series.to_numpy() for series in pl.concat(frames).rechunk()}
 
 
-def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
+def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, TrueConditions, list[str], int]]:
     """Draw and simulate the campaigns of a shard, and yield each reading of each campaign.
 
     Yields:
@@ -147,7 +147,7 @@ def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[st
             yield replace(campaign, runs=runs), c, [e.form.family for e in draw.effects], number
 
 
-def truth_of(c: Conditions) -> dict[str, float]:
+def truth_of(c: TrueConditions) -> dict[str, float]:
     """The campaign's true coefficients by name, SI."""
     return {name: getattr(c, name) for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")}
 
@@ -261,7 +261,7 @@ def label(form: Form) -> str:
     return f"{form.family}/{form.name}"
 
 
-def at_low_rate(c: Conditions) -> Conditions:
+def at_low_rate(c: TrueConditions) -> TrueConditions:
     """The campaign at the sample rate of training, with white noise of unchanged information."""
     share = SAMPLE_RATE / c.sample_rate
     white = (1.0 - c.coloured_share) * c.noise_std**2 * share
@@ -329,12 +329,12 @@ def _clipped(form: Form, value: float) -> float:
     return float(np.clip(value, least, form.limits[1]))
 
 
-def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
+def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[RodMotion]:
     """Integrate campaigns together; campaigns with a flexible rod, always a single effect, in closed form."""
     bound = [bind_effects(draw) for draw in draws]
     rigid = [place for place, (c, _) in enumerate(bound) if c.rod is None]
-    terms = [[term for term in bound[place][1] if isinstance(term, Term)] for place in rigid]
-    integrated: dict[int, Motion] = {}
+    terms = [[term for term in bound[place][1] if isinstance(term, BoundLaw)] for place in rigid]
+    integrated: dict[int, RodMotion] = {}
     if rigid:
         integrated = dict(
             zip(rigid, integrate([bound[p][0] for p in rigid], terms, substeps=substeps), strict=True)
@@ -344,7 +344,7 @@ def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
     ]
 
 
-def flexible_motion(c: Conditions) -> Motion:
+def flexible_motion(c: TrueConditions) -> RodMotion:
     """The upper end of a linear rod, by the modes of its four states."""
     angle = np.empty((c.samples, c.runs))
     rate = np.empty_like(angle)
@@ -372,4 +372,4 @@ def flexible_motion(c: Conditions) -> Motion:
         weights = np.linalg.solve(modes, start.astype(complex))
         states = (modes * weights) @ np.exp(np.outer(values, time))
         angle[:, run], rate[:, run] = states[2].real, states[3].real
-    return Motion(angle, rate)
+    return RodMotion(angle, rate)

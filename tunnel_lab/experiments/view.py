@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class View:
+class ExperimentView:
     """The results of an experiment.
 
     Args:

@@ -17,7 +17,7 @@ from identification.neural.networks import Networks, held_out_points, shipped_ne
 from identification.neural.three_cycles import cycles_time, network_inputs
 from identification.printing import concise, significant
 from identification.signal.free_decay import Decay, response_rows
-from tunnel_lab.paper.page import Picture, Section, signed
+from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
 from tunnel_lab.plotting.style import (
     BLUE,
     COLOURS,
@@ -31,7 +31,7 @@ from tunnel_lab.plotting.style import (
     save_both,
     styled,
 )
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -65,12 +65,12 @@ SOFTENING = (
 _MECHANICAL_DAMPING, _DAMPING_BESIDE_QUADRATIC = 0.0095, 0.0035
 
 
-def figure_3(folder: Path) -> Section:
+def figure_3(folder: Path) -> PaperSection:
     """Errors of both networks on held-out responses."""
     errors = fig3_errors(shipped_networks(), np.random.default_rng(3))
     save_both(error_figure(errors), folder / "network-errors.png")
     zeta, omega = (float(np.abs(e).max()) for e in (errors.zeta_percent, errors.omega_percent))
-    return Section(
+    return PaperSection(
         title="Fig. 3",
         about="errors of the networks on responses that they were not trained on",
         theirs="“very close”; no numbers are printed",
@@ -92,7 +92,7 @@ def figure_3(folder: Path) -> Section:
     )
 
 
-def table_3(folder: Path) -> Section:
+def table_3(folder: Path) -> PaperSection:
     """Windows of three cycles: the paper's run, and simulated runs."""
     from tunnel_sim import simulate_campaigns
 
@@ -112,7 +112,7 @@ def table_3(folder: Path) -> Section:
         )
         for row, linear, softening in zip(paper_windows(), windows["linear"], windows["softening"], strict=False)
     )  # fmt: skip
-    return Section(
+    return PaperSection(
         title="Table III",
         about="ζ and ωn of eight consecutive windows of three cycles",
         theirs="ζ falls from 0.0091 to 0.0065, ωn rises from 12.43 to 12.63 rad/s",
@@ -141,7 +141,7 @@ def table_3(folder: Path) -> Section:
     )  # fmt: skip
 
 
-def table_4(_: Path) -> Section:
+def table_4(_: Path) -> PaperSection:
     """Cnβ and Cnr by both methods."""
     from tunnel_sim import simulate_campaigns
 
@@ -180,7 +180,7 @@ def table_4(_: Path) -> Section:
         least = min(errors, key=errors.__getitem__)
         closer.append("network" if least == NETWORK else "conventional method")
     linear, soft = closer
-    return Section(
+    return PaperSection(
         title="Table IV",
         about="Cnβ and Cnr of both methods",
         theirs="network 0.4719 and −0.1033, conventional 0.49519 and −0.11397 1/rad",
@@ -200,7 +200,7 @@ def table_4(_: Path) -> Section:
     )
 
 
-def figures_4_to_6(folder: Path) -> Section:
+def figures_4_to_6(folder: Path) -> PaperSection:
     """The record, and the responses regenerated from each method's ζ and ωn."""
     from tunnel_sim import simulate_campaigns
 
@@ -210,7 +210,7 @@ def figures_4_to_6(folder: Path) -> Section:
     save_both(response_figure(campaign.runs[1], estimates, magnified=_MAGNIFIED), folder / "responses.png")
     distances = closeness(campaign, plan.truth)
     network, conventional = distances[NETWORK].response, distances[CONVENTIONAL].response
-    return Section(
+    return PaperSection(
         title="Figs 4 to 6",
         about="the measured response, and those generated from both methods' estimates",
         theirs="the network's response is closer to the record",

@@ -9,8 +9,8 @@ from pydantic import AfterValidator, ConfigDict, Field
 
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, validate
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import dimension
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
 Excess = Annotated[float, Field(description="a ratio to the noise variance")]

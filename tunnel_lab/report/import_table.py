@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
 
 
-def parts_table(imported: Imported) -> Table:
+def parts_table(imported: Imported) -> TextTable:
     """The runs of an import: samples, rate, begin and end, swing, conditions, and the file where several."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
     used = [part.run for part in imported.parts if part.run is not None]
@@ -32,4 +32,4 @@ def parts_table(imported: Imported) -> Table:
                 "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             ]
         rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
-    return Table("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
+    return TextTable("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_lab.plotting.style import with_breaks
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
@@ -342,7 +342,7 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class DrawnAxes:
     """Two drawings of the same axes, and the positions of the samples.
 
     Args:
@@ -375,7 +375,7 @@ class Trace:
         return picture
 
 
-def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
+def draw_trace(record: Record, width: int, height: int, title: str) -> DrawnAxes:
     """Draw a record's axes once; width and height in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -396,7 +396,7 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
     full = _pixels(canvas)
     places = axes.transData.transform(np.column_stack((time, angle)))
     box = axes.get_window_extent()
-    return Trace(
+    return DrawnAxes(
         faint,
         full,
         time,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from identification.blocks import Block, Table, brief, lines
-from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
-from tunnel_lab.terminal.tables import in_columns, is_too_wide, rendered, stacked
+from identification.blocks import Block, TextTable, brief, lines
+from tunnel_lab.terminal.arguments import TableFormat, chosen, quiet
+from tunnel_lab.terminal.table_layout import in_columns, is_too_wide, rendered, stacked
 
 
 class _Console(Console):
@@ -40,16 +40,16 @@ def show(blocks: Iterable[Block]) -> None:
     """Print blocks without figures and details; an empty line stands before and after a table."""
     after_line = False
     for block in brief(blocks):
-        if isinstance(block, Table):
+        if isinstance(block, TextTable):
             if after_line:
                 say("")
             _show_table(block)
         for line in lines(block):
             say(line)
-        after_line = not isinstance(block, Table)
+        after_line = not isinstance(block, TextTable)
 
 
-def _show_table(table: Table) -> None:
+def _show_table(table: TextTable) -> None:
     """Print a table in the format of ``--format``; one of text that is wider than the terminal, row by row."""
     out, kind = console(), chosen.get()
     if kind is not TableFormat.TEXT:

@@ -16,9 +16,9 @@ from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, pa
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.dimensions import dimension, in_si
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import dimension, in_si
 
 if TYPE_CHECKING:
     pass
@@ -36,11 +36,11 @@ _TRIED = {"b": 0.5, "y": 0.5, "r": 10.0, "t": 20.0, "V": 40.0, "Kr": 100.0, "ome
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ExpressionParameter:
     """A parameter of an effect by expression.
 
     Args:
-        unit: as `tunnel_sim.vocabulary.units.dimension` reads it.
+        unit: as `tunnel_sim.vocabulary.dimensions.dimension` reads it.
         scale, lower, upper, default: a typical value, its bounds, and the value where none is given, in the unit.
     """
 
@@ -117,7 +117,7 @@ def expression_effect(
     name: str,
     *,
     channel: Channel,
-    parameters: Mapping[str, Quantity],
+    parameters: Mapping[str, ExpressionParameter],
     condition: Condition = "always",
     moment: str | None = None,
     reading: str | None = None,
@@ -195,7 +195,7 @@ def expression_effect(
     return make_dataclass(name, fields, bases=(base,), namespace=namespace, frozen=True)
 
 
-def _check_names(parameters: Mapping[str, Quantity]) -> None:
+def _check_names(parameters: Mapping[str, ExpressionParameter]) -> None:
     for name, quantity in parameters.items():
         if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
             raise TunnelError(f"{name!r} is not a parameter's name", remedy="use letters, digits and _")
@@ -231,13 +231,13 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
         if names.count(table.name) > 1:
             raise TunnelError("is given twice", where=where, remedy="give every effect its own name")
         try:
-            quantities: dict[str, Quantity] = {}
+            quantities: dict[str, ExpressionParameter] = {}
             for name, given in table.parameters.items():
                 usual = given.scale if quantities else 0.0  # the first one is the severity
                 default = usual if given.default is None else given.default
                 meaning = given.meaning or f"parameter {name}"
                 sizes = (given.scale, given.lower, given.upper, default)
-                quantities[name] = Quantity(given.unit, *sizes, meaning)
+                quantities[name] = ExpressionParameter(given.unit, *sizes, meaning)
             stated = {
                 key: getattr(table, key) for key in ("channel", "condition", "moment", "reading", "summary")
             }

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from tunnel_sim.vocabulary.dimensions import angle_power
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import angle_power
 
 SWING = 0.3
 """Least swing that the ranges of the parameters are meant for, rad: a release at 20 degrees stays above it."""

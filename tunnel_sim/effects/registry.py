@@ -14,8 +14,8 @@ from typing import Any, TypeVar, cast, get_args
 
 from tunnel_sim.effects.base import Effect, make_effect
 from tunnel_sim.effects.traits import Channel, Condition
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
-from tunnel_sim.vocabulary.units import dimension
 
 ENTRY_POINTS = "tunnel.effects"
 """Group of the entry points by which an installed package adds effects."""

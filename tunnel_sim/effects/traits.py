@@ -11,9 +11,9 @@ from typing import ClassVar, Literal, TypeAlias, cast
 
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import beside
 
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]

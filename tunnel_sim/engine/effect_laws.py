@@ -21,6 +21,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.physics.steps import follow_fastest
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.plan import (
     AeroDerivatives,
@@ -29,7 +30,6 @@ from tunnel_sim.vocabulary.plan import (
     aerodynamic_stiffness,
 )
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.units import beside
 
 INTEGRATION_TOLERANCE = 2e-5
 """Greatest error of the integration, rad: a twenty-fifth of the sensor's noise, as decision 0006 states it."""

@@ -21,11 +21,11 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
-from tunnel_sim.vocabulary.units import beside
 
 
 def simulate_campaign(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.simulate import STATE, RunBatch
 from tunnel_sim.envs import EnvError
-from tunnel_sim.envs.conditions import FreeDecayConfig
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 from tunnel_sim.physics.run_settings import RunSettings, sampling
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.record import Array

@@ -20,8 +20,8 @@ from tunnel_sim.effects import EffectChain
 from tunnel_sim.effects.chain import quantise
 from tunnel_sim.engine.virtual_campaign import stated_run
 from tunnel_sim.envs import EnvError, as_env_error
-from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
 from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, WindAnswer, check_plain, decode
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
 from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -12,8 +12,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from tunnel_sim.envs import EnvError, arguments_of
-from tunnel_sim.envs.conditions import WHERE, free_decay_config
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
+from tunnel_sim.envs.episode_conditions import WHERE, free_decay_config
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
 from tunnel_sim.vocabulary.arguments import COUNT, Number

@@ -23,7 +23,7 @@ _BEYOND = 1e6  # of the greatest moment: a soft limit is then reached to one par
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class InputSamples:
     """An input at increasing times: constant from each to the next, or linear between them.
 
     Args:
@@ -152,7 +152,7 @@ class Samples:
 class _Ramps:
     """The stretches in which an input is followed at the greatest rate, as nodes with lines in between."""
 
-    def __init__(self, given: Samples, rate: float) -> None:
+    def __init__(self, given: InputSamples, rate: float) -> None:
         self.given, self.rate = given, rate
         self.time: list[Array] = []
         self.values: list[Array] = []
@@ -208,14 +208,14 @@ class _Ramps:
 
 
 @dataclass(frozen=True)
-class Actuator:
+class ActuatorLimits:
     """The limits of an actuator on the demanded moment.
 
     Args:
         limit: greatest moment, N m; 0: none.
         rate: greatest rate of change of the moment, N m/s; 0: none.
         lag: time constant, s.
-        softness: of the limit's approach, dimensionless (`Samples.saturated`); 0: a hard limit.
+        softness: of the limit's approach, dimensionless (`InputSamples.saturated`); 0: a hard limit.
     """
 
     limit: float = 0.0
@@ -223,7 +223,7 @@ class Actuator:
     lag: float = 0.0
     softness: float = 0.0
 
-    def exerted(self, asked: Samples, scale: float) -> Samples:
+    def exerted(self, asked: InputSamples, scale: float) -> InputSamples:
         """The moment exerted for the demanded samples.
 
         Args:
@@ -237,7 +237,7 @@ class Actuator:
         return found.lagged(self.lag)
 
 
-DIRECT = Actuator()
+DIRECT = ActuatorLimits()
 """What exerts every moment as asked for."""
 
 

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.actuator import DIRECT, Actuator, Samples, recurrence
+from tunnel_sim.physics.actuator import DIRECT, ActuatorLimits, InputSamples, recurrence
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.quantities import (
     Moments,
@@ -64,7 +64,7 @@ class DriveMoment:
     delay: float = 0.0
     held: bool = False
     on_body: bool = True
-    actuator: Actuator = DIRECT
+    actuator: ActuatorLimits = DIRECT
     offset: float = 0.0
     by_actuator: bool = True
 
@@ -84,7 +84,7 @@ class DriveMoment:
         offset = self.offset if self.scale else 0.0
         if self.actuator == DIRECT and offset == self.offset:
             return self
-        given = self.actuator.exerted(Samples(self.time_s, self.values, self.held), self.scale)
+        given = self.actuator.exerted(InputSamples(self.time_s, self.values, self.held), self.scale)
         return DriveMoment(
             given.time_s, given.values, self.scale, self.delay, given.held, self.on_body, offset=offset
         )

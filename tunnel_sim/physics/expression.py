@@ -17,9 +17,9 @@ import numpy as np
 
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.dimensions import NUMBER, Dimension, in_si, product
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.units import NUMBER, Dimension, in_si, product
 
 #: A number, a name, or an operation and its operands.
 Node: TypeAlias = "float | str | tuple[Any, ...]"

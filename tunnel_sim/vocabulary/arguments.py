@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean
-from tunnel_sim.vocabulary.units import beside
 
 
 class EnvError(TunnelError, ValueError):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
-from benchmarks.causes.discrepancy import ETA, Discrepancy, Evidence, linear
+from benchmarks.causes.discrepancy import ETA, Discrepancy, ErrorEvidence, linear
 from benchmarks.causes.entry import UNKNOWN, About, answer_of, main
 
 SCALE, ODDS, LEFT = 0.05, 0.1, 0.2
@@ -65,7 +65,9 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def weigh(
-    nominal: Evidence, sets: Mapping[Names, Evidence], random: Mapping[Names, tuple[Evidence, float]]
+    nominal: ErrorEvidence,
+    sets: Mapping[Names, ErrorEvidence],
+    random: Mapping[Names, tuple[ErrorEvidence, float]],
 ) -> dict[Names, float]:
     """Probability of every set and of ``("unknown",)``.
 

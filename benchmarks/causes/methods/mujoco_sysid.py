@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.causes.entry import UNKNOWN, About, answer_of, main
 from benchmarks.causes.methods.forward_bic import bic, weighed
-from benchmarks.causes.mjcf import BOUNDS, FINER, NOMINAL, ROWS, SUBSTEPS, Fit, Rig
+from benchmarks.causes.mjcf import BOUNDS, FINER, NOMINAL, ROWS, SUBSTEPS, ToolboxFit, ToolboxRig
 from benchmarks.causes.moments import CLOSED, DETECTED, NOT_SEEN, Array
 
 MOST, FITTED = 3, 2
@@ -33,7 +33,7 @@ def answer(folder: Path) -> dict[str, Any]:
     Args:
         folder: of the campaign.
     """
-    rig = Rig(folder)
+    rig = ToolboxRig(folder)
     start = rig.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(rig.trials)))
     before, gap = coefficients(rig, start), start.chi2 / start.left.size
     if gap < DETECTED:
@@ -53,12 +53,12 @@ def answer(folder: Path) -> dict[str, Any]:
     return answer_of(best.causes, inclusion, sets, stated)
 
 
-def score(fit: Fit) -> float:
+def score(fit: ToolboxFit) -> float:
     """Bayesian information criterion of a fit."""
     return bic(fit.chi2, len(fit.names) - len(NOMINAL), fit.left.size)
 
 
-def ranked(rig: Rig, best: Fit) -> list[tuple[tuple[str, ...], tuple[str, ...], Array]]:
+def ranked(rig: ToolboxRig, best: ToolboxFit) -> list[tuple[tuple[str, ...], tuple[str, ...], Array]]:
     """Fits to make, in increasing order of the BIC that the linear model predicts.
 
     Args:
@@ -86,7 +86,7 @@ def ranked(rig: Rig, best: Fit) -> list[tuple[tuple[str, ...], tuple[str, ...], 
     return [one for _, one in sorted(found, key=lambda one: one[0])]
 
 
-def coefficients(rig: Rig, fit: Fit) -> dict[str, dict[str, float]]:
+def coefficients(rig: ToolboxRig, fit: ToolboxFit) -> dict[str, dict[str, float]]:
     """Cnβ and Cnr with the toolbox's standard deviations, 1/rad, where the wind was on.
 
     Args:

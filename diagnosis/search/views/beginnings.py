@@ -15,7 +15,7 @@ from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, converged, polish, restricted
 from diagnosis.search.prepared import Prepared
@@ -56,7 +56,7 @@ class Beginnings(WholeRuns):
     """The beginnings of runs with a long input, in which sets are found."""
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view of runs with a long input.
 
         None where their beginnings would be short, the nominal model has a second mode, or the runs differ by a
@@ -135,14 +135,14 @@ class AfterBeginnings(View):
     may_be_noise: ClassVar[bool] = True
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The view after that of the beginnings, where their answer holds in whole runs."""
         del prepared, clock
         if known is None or not isinstance(known.view, Beginnings) or not known.view.holds(known):
             return None
         return cls(known.view.prepared, known.view.prepared.nominal, known)
 
-    def sets(self, clock: Clock) -> Sets:
+    def sets(self, clock: StepClock) -> Sets:
         """The likely sets of the beginnings."""
         least, known = self.base.settings.search.compared_from, self.known
         likely = (known.fitted(one.effects) for one in known.weighed if one.probability > least)

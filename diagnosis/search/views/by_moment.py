@@ -13,7 +13,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.model.run_data import Data
 from diagnosis.model.run_noise import NoiseWithMoment
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
@@ -42,7 +42,7 @@ class ByMoment(View):
     caution: ClassVar[str] = "by moment"
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The view of a body without a restoring moment, where a set's share of the angle exceeds chance.
 
         None also where no set explains the angle, and none leaves a small moment.
@@ -65,7 +65,7 @@ class ByMoment(View):
             return None
         return cls(prepared, (small or bases)[0], known)
 
-    def sets(self, clock: Clock) -> Sets:
+    def sets(self, clock: StepClock) -> Sets:
         """The sets found here, beside those found by the angle, which are not grown again."""
         return replace(super().sets(clock), random=self.known.random, refused=self.known.refused)
 

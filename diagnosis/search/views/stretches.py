@@ -21,7 +21,7 @@ from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
-from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.prepared import Prepared, fit_nominal
@@ -155,7 +155,7 @@ class InStretches(View):
     long: Stretches
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view where the nominal model loses the phase of the motion; an input keeps the phase."""
         lost = prepared.ringing is None and misses_motion(prepared.nominal) and not prepared.campaign.driven
         if known is not None or not prepared.able or not lost:

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, gap_left
-from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.grow import grow, same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.prepared import Prepared
@@ -38,7 +38,7 @@ class View:
     caution: ClassVar[str] = ""
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The view of a campaign; None where it does not apply.
 
         Args:
@@ -105,7 +105,7 @@ class View:
                 kept.append(hypothesis)
         return kept[: self.base.settings.search.grown_from]
 
-    def sets(self, clock: Clock) -> Sets:
+    def sets(self, clock: StepClock) -> Sets:
         """The sets that are found in the view."""
         with clock.step("effects"):
             return Sets(self, tuple(grow(self, clock.progress)))

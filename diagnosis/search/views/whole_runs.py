@@ -13,7 +13,7 @@ from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, gap_left, misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.model.chance import Scatter
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, polish, with_forms
 from diagnosis.search.prepared import Prepared
@@ -47,7 +47,7 @@ class WholeRuns(View):
     may_be_noise: ClassVar[bool] = True
 
     @classmethod
-    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+    def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view, or one after a view whose answer does not hold in whole runs."""
         del clock
         if known is not None and known.view.holds(known):
@@ -90,7 +90,7 @@ class WholeRuns(View):
         """The set that all others contain."""
         return self.first or Hypothesis((), self.base, repeating=self.unscattered)
 
-    def sets(self, clock: Clock) -> Sets:
+    def sets(self, clock: StepClock) -> Sets:
         """The sets found, and the random moments that may act beside them.
 
         Where the runs differ by chance, sets are grown in runs that repeat until one explains every run by itself.
@@ -195,7 +195,7 @@ class WholeRuns(View):
         return beside.leaves_within(error_of_form(self._scattering_gap, self.base.settings.weighing))
 
     def _beside_scatter(
-        self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock
+        self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: StepClock
     ) -> Sets:
         """The sets beside chance differences between the runs.
 
@@ -260,7 +260,7 @@ class WholeRuns(View):
         return weighing.steepness * (without - left) > weighing.set_price
 
 
-def _with_moments(found: Sets, clock: Clock) -> Sets:
+def _with_moments(found: Sets, clock: StepClock) -> Sets:
     """Sets, and the random moments that may act beside them."""
     with clock.step("random moments"):
         random = weigh_random_moments(found.view, found.hypotheses)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification import policy
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.signal.noise import reading_noise
 from identification.status import Outcome, Remark
 
@@ -22,7 +22,7 @@ class AngleInDegrees(StatementSlip):
     The fewer runs are the wrong ones. Of as many large as small ones either may be wrong.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare amplitudes and, where they differ much, the noise, without the stated noise and resolution."""
         if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:
             return ()

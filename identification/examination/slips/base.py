@@ -19,7 +19,7 @@ class RecordSlip(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class SlipEvidence:
     """The statements of a campaign and the evidence of its records.
 
     Args:
@@ -37,5 +37,5 @@ class StatementSlip(ABC):
     """A statement that the measured oscillations contradict."""
 
     @abstractmethod
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """A remark for each contradicted statement; none where all may be right."""

@@ -13,7 +13,7 @@ from scipy.special import chdtri, fdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
@@ -51,7 +51,7 @@ class DriftingClock(StatementSlip):
     A single run whose phase may as well jump at one instant is not refused: it may have been disturbed.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
         phases = [phase for swing in seen.swings if (phase := _phase(swing)) is not None]
         still = {swing.run.id for swing in seen.swings if not swing.run.wind_on}

@@ -13,7 +13,7 @@ from scipy.special import fdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.signal.free_decay import Decay, response_rows
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
@@ -56,7 +56,7 @@ class _Decaying:
 class CoupledSensor(StatementSlip):
     """The centre decays to zero and the oscillation leads, by one time constant. Refused: it looks like a drift."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Fit a decaying centre to every free decay of an angle; most of those that have one must agree."""
         if seen.campaign.sensor.derivative or not seen.swings:
             return ()

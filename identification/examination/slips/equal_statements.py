@@ -9,7 +9,7 @@ import numpy as np
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import speed_groups
 
@@ -21,7 +21,7 @@ class EqualStatementsDiffer(StatementSlip):
     This includes labels copied from run to run. The values on which the runs would agree are not known.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the runs that state the same, with equal amplitudes."""
         groups: dict[tuple[float | None, ...], list[Swing]] = defaultdict(list)
         setting = speed_groups(swing.run.wind_speed for swing in seen.swings)

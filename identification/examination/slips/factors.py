@@ -14,14 +14,20 @@ import numpy as np
 from scipy.special import chdtri, fdtri
 
 from identification import policy
-from identification.examination.slips.base import Seen, StatementSlip
-from identification.examination.slips.motions import Conditions, Fitted, Motions, Trial, fitted
+from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.motions import (
+    ConditionsFit,
+    MeasuredMotions,
+    RunConditions,
+    TrialSlip,
+    fitted,
+)
 from identification.examination.slips.run_labels import mending_statements
 from identification.status import SYSTEMATIC, Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
 Places = tuple[int, ...]
-Changed = Callable[[Conditions, float], Conditions]
+Changed = Callable[[RunConditions, float], RunConditions]
 _FEWEST = 4  # runs
 _MOST_RUNS = 40  # that are tried one by one, and from which on groups begin
 _MOST_SAID = 3
@@ -41,12 +47,12 @@ class WrongFactor(StatementSlip):
     Refused; asked about where the evidence is weaker.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Try factors on every run, on groups and along the campaign; labels that agree as well go first."""
         swings = [s for s in seen.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
         if len(swings) < _FEWEST:
             return ()
-        motions = Motions.of(swings)
+        motions = MeasuredMotions.of(swings)
         found = _agreeing(motions)
         if not found or _labels_agree(seen, motions, found[0]):
             return ()
@@ -62,13 +68,13 @@ class _Found:
         refused: whether chance explains it less than once in a lifetime.
     """
 
-    trial: Trial
-    fit: Fitted
+    trial: TrialSlip
+    fit: ConditionsFit
     level: float
     refused: bool
 
 
-def _agreeing(m: Motions) -> list[_Found]:
+def _agreeing(m: MeasuredMotions) -> list[_Found]:
     """The slips that the runs agree with about equally well, the best first; none where they may agree without.
 
     Springs as stated come first; then springs that may be off.
@@ -90,7 +96,7 @@ def _agreeing(m: Motions) -> list[_Found]:
     return []
 
 
-def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted]) -> _Found | None:
+def _judged(trial: TrialSlip, fit: ConditionsFit, effects: Sequence[ConditionsFit]) -> _Found | None:
     """A trial that makes the runs agree; None where its number may be an effect's, chance, or none.
 
     The gain of one more number is tested by F with the scatter that remains, with this and the usual scatter of
@@ -112,7 +118,7 @@ def _judged(trial: Trial, fit: Fitted, effects: Sequence[Fitted]) -> _Found | No
     return None
 
 
-def _labels_agree(seen: Seen, m: Motions, best: _Found) -> bool:
+def _labels_agree(seen: SlipEvidence, m: MeasuredMotions, best: _Found) -> bool:
     """Whether another label of a run, or an exchange, agrees as well as the best factor."""
     limit = best.fit.squares(best.level) + float(chdtri(1, policy.DIFFERENCE_RATE))
     for labels in mending_statements(seen):
@@ -131,7 +137,7 @@ def _labels_agree(seen: Seen, m: Motions, best: _Found) -> bool:
 def _scaled(key: str, places: Places) -> Changed:
     """A factor 1 + e on a condition of some runs."""
 
-    def change(c: Conditions, number: float) -> Conditions:
+    def change(c: RunConditions, number: float) -> RunConditions:
         values = getattr(c, key).copy()
         values[list(places)] *= 1.0 + number
         return replace(c, **{key: values})
@@ -147,7 +153,7 @@ def _along(key: str, order: Array) -> Changed:
 def _blowing(places: Places, unit: float) -> Changed:
     """A wind in runs that state none, in units of the least stated wind."""
 
-    def change(c: Conditions, number: float) -> Conditions:
+    def change(c: RunConditions, number: float) -> RunConditions:
         speed = c.speed.copy()
         speed[list(places)] = abs(number) * unit
         return replace(c, speed=speed)
@@ -155,34 +161,34 @@ def _blowing(places: Places, unit: float) -> Changed:
     return change
 
 
-def _slips(m: Motions) -> Iterator[Trial]:
+def _slips(m: MeasuredMotions) -> Iterator[TrialSlip]:
     """All tried slips: of single runs, of groups, a wind in runs that state none, and along the campaign."""
     count, windy = m.stiffness.size, m.conditions.speed > 0.0
     on, off = (tuple(np.flatnonzero(some).tolist()) for some in (windy, ~windy))
     least = policy.LEAST_FACTOR
     for place in range(count) if count <= _MOST_RUNS else ():
         for key in ("speed", "density", "clock", "spring") if windy[place] else ("clock", "spring"):
-            yield Trial(_scaled(key, (place,)), (place,), _KINDS[key], least[_KINDS[key]])
+            yield TrialSlip(_scaled(key, (place,)), (place,), _KINDS[key], least[_KINDS[key]])
     groups = list(dict.fromkeys(_groups(m)))
     for group in groups:
         blown = tuple(place for place in group if windy[place])
         if 1 < len(blown) < len(on) - 1:
-            yield Trial(_scaled("density", blown), blown, "air_density", least["air_density of a group"])
-            yield Trial(_scaled("speed", blown), blown, "wind_speed", least["wind_speed"])
+            yield TrialSlip(_scaled("density", blown), blown, "air_density", least["air_density of a group"])
+            yield TrialSlip(_scaled("speed", blown), blown, "wind_speed", least["wind_speed"])
         if 1 < len(group) < count - 1:
-            yield Trial(_scaled("clock", group), group, "time_s", least["time_s"])
+            yield TrialSlip(_scaled("clock", group), group, "time_s", least["time_s"])
     if on and off:
         unit = float(m.conditions.speed[list(on)].min())
         for group in dict.fromkeys([off, *(tuple(p for p in group if not windy[p]) for group in groups)]):
             if group:
-                yield Trial(_blowing(group, unit), group, "idle", least["idle"], _IDLE)
+                yield TrialSlip(_blowing(group, unit), group, "idle", least["idle"], _IDLE)
     if len(on) > 2:
         order = np.arange(count) / max(count - 1, 1) - 0.5
         for key in ("density", "speed"):
-            yield Trial(_along(key, order), on, _KINDS[key] + _ALONG, least["along"])
+            yield TrialSlip(_along(key, order), on, _KINDS[key] + _ALONG, least["along"])
 
 
-def _groups(m: Motions) -> Iterator[Places]:
+def _groups(m: MeasuredMotions) -> Iterator[Places]:
     """The runs of each spring, of each stated density, and all runs up to one and from one on."""
     for values in (m.stated, m.conditions.density):
         for value in np.unique(values):
@@ -193,7 +199,7 @@ def _groups(m: Motions) -> Iterator[Places]:
         yield tuple(range(first))
 
 
-def _effects(m: Motions) -> Iterator[Trial]:
+def _effects(m: MeasuredMotions) -> Iterator[TrialSlip]:
     """Effects that change the runs of each wind speed alike: an offset, a dependence on the speed, and a lag."""
     on = m.conditions.speed > 0.0
     if not on.any():
@@ -203,13 +209,13 @@ def _effects(m: Motions) -> Iterator[Trial]:
     places = tuple(np.flatnonzero(on).tolist())
     logs = np.where(on, np.log(speeds / usual), 0.0)
     phase = np.where(on, usual / (omega * speeds), 0.0)
-    yield Trial(lambda c, e: replace(c, speed=c.speed + e * usual * on), places)
-    yield Trial(lambda c, e: replace(c, moment=c.moment + e * logs), places)
+    yield TrialSlip(lambda c, e: replace(c, speed=c.speed + e * usual * on), places)
+    yield TrialSlip(lambda c, e: replace(c, moment=c.moment + e * logs), places)
     for start in _LAGS:
-        yield Trial(lambda c, e: replace(c, lag=e * phase), places, start=start)
+        yield TrialSlip(lambda c, e: replace(c, lag=e * phase), places, start=start)
 
 
-def _said(m: Motions, found: Sequence[_Found]) -> tuple[Remark, ...]:
+def _said(m: MeasuredMotions, found: Sequence[_Found]) -> tuple[Remark, ...]:
     """The remark on the best slips."""
     best: dict[tuple[Places, str], _Found] = {}
     for one in found:
@@ -227,7 +233,7 @@ def _said(m: Motions, found: Sequence[_Found]) -> tuple[Remark, ...]:
     return (Remark(outcome, ids, what, remedy, figures),)
 
 
-def _words(m: Motions, trial: Trial, number: float) -> str:
+def _words(m: MeasuredMotions, trial: TrialSlip, number: float) -> str:
     """The slip with its size."""
     ids = ", ".join(m.swings[place].run.id for place in trial.places)
     percent = f"{100.0 * abs(number):.2g} %"

@@ -15,7 +15,7 @@ from scipy.special import chdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.record import Array
@@ -28,7 +28,7 @@ _NEAR = 0.25  # of the zero's size: greatest scatter of the zeros with right sig
 class MirroredRun(StatementSlip):
     """Some runs swing about the zero of the others with its sign inverted. Refused: it looks like an effect."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the zeros of all runs with those of some signs inverted."""
         swings = seen.swings
         if len(swings) < _FEWEST or seen.stated.sensor.zero == "per_run":
@@ -90,7 +90,7 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
 class ReleaseOnTheOtherSide(StatementSlip):
     """A stated release angle of the opposite sign to the record. Asked about: no answer depends on it."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare sides where the record begins at its turning point, and the angle is stated."""
         if seen.campaign.sensor.derivative:
             return ()

@@ -28,7 +28,7 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class RunConditions:
     """Stated conditions of the runs, or those that a trial puts in their place; each array of shape (n,).
 
     Args:
@@ -49,7 +49,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, eq=False)
-class Motions:
+class MeasuredMotions:
     """Measured frequency and damping of the runs.
 
     Args:
@@ -68,10 +68,10 @@ class Motions:
     stated: Array
     place: NDArray[np.intp]
     springs: int
-    conditions: Conditions
+    conditions: RunConditions
 
     @classmethod
-    def of(cls, swings: Sequence[Swing]) -> Motions:
+    def of(cls, swings: Sequence[Swing]) -> MeasuredMotions:
         """The runs, all of which state their spring and decay."""
         runs = [swing.run for swing in swings]
         stated = np.array([run.spring_stiffness or 1.0 for run in runs])
@@ -80,7 +80,7 @@ class Motions:
         usual = float(np.median(given)) if given else 1.2
         stiffness, rate = (np.array([getattr(s, key) for s in swings]) for key in ("stiffness", "rate"))
         ones = np.ones(len(runs))
-        conditions = Conditions(
+        conditions = RunConditions(
             spring=ones,
             speed=np.array([run.wind_speed for run in runs]),
             density=np.array([usual if run.air_density is None else run.air_density for run in runs]),
@@ -102,7 +102,7 @@ class Motions:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class TrialSlip:
     """Conditions with one more number.
 
     Args:
@@ -113,7 +113,7 @@ class Trial:
         start: of the number, dimensionless.
     """
 
-    change: Callable[[Conditions, float], Conditions]
+    change: Callable[[RunConditions, float], RunConditions]
     places: tuple[int, ...]
     kind: str = ""
     least: float = 0.0
@@ -121,7 +121,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ConditionsFit:
     """A fit of the runs to conditions.
 
     Args:
@@ -155,7 +155,7 @@ class Fitted:
         return high
 
 
-def fitted(motions: Motions, trial: Trial | None = None, *, wide: bool = False) -> Fitted:
+def fitted(motions: MeasuredMotions, trial: TrialSlip | None = None, *, wide: bool = False) -> ConditionsFit:
     """Fit the springs, g, n, c and m to the runs, and the number of a trial.
 
     Args:
@@ -184,10 +184,10 @@ def fitted(motions: Motions, trial: Trial | None = None, *, wide: bool = False) 
             break
     windy = bool(np.any(m.conditions.speed > 0.0))
     freedom = 2 * (m.stiffness.size - m.springs - int(windy)) - int(trial is not None)
-    return Fitted(number, left, std, chance, freedom)
+    return ConditionsFit(number, left, std, chance, freedom)
 
 
-def _matrix(m: Motions, c: Conditions) -> Array:
+def _matrix(m: MeasuredMotions, c: RunConditions) -> Array:
     """Rows of k and a by the recorded times, then of every spring's stiffness and damping beside the common ones.
 
     The unknowns are s of every spring, g, n, c of every spring, the common c, and m.
@@ -210,7 +210,7 @@ def _matrix(m: Motions, c: Conditions) -> Array:
 
 
 def _tolerances(
-    m: Motions, air: float, damping: float, air_damping: float, *, wide: bool
+    m: MeasuredMotions, air: float, damping: float, air_damping: float, *, wide: bool
 ) -> tuple[Vector, Vector]:
     """Standard deviations of the rows, by the noise and the springs, and by the usual scatter between runs.
 

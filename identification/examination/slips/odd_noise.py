@@ -9,7 +9,7 @@ import numpy as np
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.printing import significant
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
@@ -29,7 +29,7 @@ class OddNoise(StatementSlip):
     A run with far less noise is refused: a filter smooths its start, which looks like other oscillations.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
 
         The wind may add noise: a run is compared with others of as much wind, or as little.

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from identification import policy
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
@@ -230,7 +230,7 @@ class WrongLabel(StatementSlip):
 
     labels: tuple[Label, ...] = LABELS
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Try every label of every run."""
         return _found(seen, self.trials)
 
@@ -247,7 +247,7 @@ class WrongLabels(StatementSlip):
 
     labels: tuple[Label, ...] = LABELS
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Try all exchanges, and every label of every setting and of every pair."""
         return _found(seen, self.trials)
 
@@ -281,13 +281,13 @@ def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(values == value).tolist()) for value in np.unique(values)]
 
 
-def mending_statements(seen: Seen) -> list[Statements]:
+def mending_statements(seen: SlipEvidence) -> list[Statements]:
     """Statements with other labels that the frequencies agree with, of the runs that state a spring."""
     slips = (WrongLabel(), WrongLabels())
     return [trial.labels for slip in slips for trial, _ in _mended(seen, slip.trials)[1]]
 
 
-def _mended(seen: Seen, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:
+def _mended(seen: SlipEvidence, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:
     """The stated labels, and the trials that agree, each with its sum of squares."""
     swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
     if len(swings) < _FEWEST:
@@ -309,7 +309,7 @@ def _mended(seen: Seen, trials: Trials) -> tuple[Statements | None, list[tuple[_
     return statements, mended
 
 
-def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
+def _found(seen: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
     """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
     statements, mended = _mended(seen, trials)
     if statements is None or not mended:

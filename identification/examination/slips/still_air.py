@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import speed_groups
@@ -57,7 +57,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
 class WindNotSeen(StatementSlip):
     """No wind-on run differs from the wind-off runs of its spring, though records would show it. Asked about."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare frequency and decay rate with the wind on and off."""
         changes = _changes(seen.swings)
         if not changes:
@@ -89,7 +89,7 @@ class WindExchanged(StatementSlip):
     Refused where the springs agree after an exchange: either sign alone may be an effect.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Exchange wind on and off in all runs, where there is one speed."""
         swings = tuple(s for s in seen.swings if s.run.spring_stiffness)
         speeds = set(speed_groups(s.run.wind_speed for s in swings if s.run.wind_on).values())

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.examination.slips.angle_unit import AngleInDegrees
-from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
-from identification.examination.slips.between_runs import (
-    InertiaOffTheSprings,
-    LabelsExchanged,
-    MotionGrows,
-    SpringOffTheLine,
-    SpringsRenumbered,
-)
+from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
 from identification.examination.slips.clock import DriftingClock
 from identification.examination.slips.coupling import CoupledSensor
 from identification.examination.slips.equal_statements import EqualStatementsDiffer
@@ -20,6 +13,13 @@ from identification.examination.slips.factors import WrongFactor
 from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
 from identification.examination.slips.odd_noise import OddNoise
 from identification.examination.slips.resolution import ResolutionTooCoarse
+from identification.examination.slips.run_comparisons import (
+    InertiaOffTheSprings,
+    LabelsExchanged,
+    MotionGrows,
+    SpringOffTheLine,
+    SpringsRenumbered,
+)
 from identification.examination.slips.run_labels import WrongLabel, WrongLabels
 from identification.examination.slips.spoilt import ClockJumps, StandingForMissing
 from identification.examination.slips.still_air import WindExchanged, WindNotSeen
@@ -77,7 +77,7 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     return campaign, remarks
 
 
-def found_in(seen: Seen) -> tuple[Remark, ...]:
+def found_in(seen: SlipEvidence) -> tuple[Remark, ...]:
     """Remarks on the statements that the measured oscillations contradict; only the refusal where there is one."""
     remarks: tuple[Remark, ...] = ()
     with np.errstate(all="ignore"):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification import policy
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import WITHHOLDS, Outcome, Remark
 
@@ -32,7 +32,7 @@ _OF_DENSITY = {
 class YawMomentTooLarge(StatementSlip):
     """|Cnβ| too large for any body: a stiffness, a speed or a size in a wrong unit. Asked about."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare Cnβ of the runs with the greatest."""
         area, length = seen.campaign.rig.frontal_area, seen.campaign.rig.reference_length
         swings = [s for s in seen.swings if s.run.spring_stiffness]
@@ -64,7 +64,7 @@ class InertiaOfNoBody(StatementSlip):
     A stated inertia is compared instead where there is one: it is closer.
     """
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare 12 Izz/(A l³), the density of a uniform rod of these sizes, with those of bodies."""
         area, length = seen.campaign.rig.frontal_area, seen.campaign.rig.reference_length
         still = [s for s in seen.swings if s.run.spring_stiffness and not s.run.wind_on]
@@ -86,6 +86,6 @@ class InertiaOfNoBody(StatementSlip):
         return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, {WITHHOLDS: True}),)
 
 
-def _judged(seen: Seen) -> bool:
+def _judged(seen: SlipEvidence) -> bool:
     """Whether sizes are judged: not where the campaign states that they are right, or the joint slides."""
     return seen.campaign.sensor.plausible is not False and seen.campaign.law is None

@@ -16,10 +16,10 @@ import pytest
 from benchmarks.causes import make as making
 from benchmarks.causes.__main__ import main
 from benchmarks.causes.entry import NAMES, About, answer_all, answer_of, schema
+from benchmarks.causes.entry_score import figures, likely_sets, read_answers, score
 from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
 from benchmarks.causes.methods import METHODS
 from benchmarks.causes.page import page_text
-from benchmarks.causes.score import figures, likely_sets, read_answers, score
 from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
 from tests.reference.rigs import rig
@@ -226,7 +226,7 @@ def test_independent_causes_make_sets():
 
 
 def test_coefficients_count_within_two_standard_deviations(small):
-    from benchmarks.causes.score import as_case
+    from benchmarks.causes.entry_score import as_case
 
     truth = next(t for t in check(small)["truths"].values() if not t["effects"])
     near = {"value": truth["cn_beta"] * 1.01, "std": truth["cn_beta"] * 0.006}
@@ -302,9 +302,9 @@ def test_each_cause_in_mjcf_is_its_equation(small):
     """Moments of the compiled model at one state, against the equations of docs/reference/effects.md."""
     import mujoco
 
-    from benchmarks.causes.mjcf import _XML, BOUNDS, NOMINAL, Rig
+    from benchmarks.causes.mjcf import _XML, BOUNDS, NOMINAL, ToolboxRig
 
-    c0001 = Rig(small / CAMPAIGNS / "c0001")
+    c0001 = ToolboxRig(small / CAMPAIGNS / "c0001")
     trial = next(t for t in c0001.trials if t.speed)
     angle, rate, share = 0.2, -1.5, 0.25
     swing, inertia, omega = c0001.swing, c0001.inertia, c0001.omega
@@ -353,11 +353,11 @@ def test_each_cause_in_mjcf_is_its_equation(small):
 
 def test_the_toolbox_fits_the_nominal_model_within_the_noise(small):
     from benchmarks.causes.methods.mujoco_sysid import coefficients
-    from benchmarks.causes.mjcf import NOMINAL, Rig
+    from benchmarks.causes.mjcf import NOMINAL, ToolboxRig
 
     truths = check(small)["truths"]
     name = next(n for n, t in truths.items() if t["track"] == "none")
-    found = Rig(small / CAMPAIGNS / name)
+    found = ToolboxRig(small / CAMPAIGNS / name)
     fit = found.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(found.trials)))
     assert fit.chi2 / fit.left.size < 1.15
     for which, given in coefficients(found, fit).items():

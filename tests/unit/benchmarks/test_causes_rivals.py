@@ -10,10 +10,16 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from benchmarks.causes import neural_training
-from benchmarks.causes.discrepancy import ETA, Discrepancy, Evidence, Linear
+from benchmarks.causes.discrepancy import ETA, Discrepancy, ErrorEvidence, Linear
 from benchmarks.causes.methods.discrepancy_evidence import LEFT, ODDS, SCALE, weigh
 from benchmarks.causes.neural_network import LABELS, Classifier, read_classifier
-from benchmarks.causes.neural_training import Samples, Setting, make_campaigns, read_samples, trained
+from benchmarks.causes.neural_training import (
+    NetworkSetting,
+    TrainingCampaigns,
+    make_campaigns,
+    read_samples,
+    trained,
+)
 from benchmarks.causes.summaries import mirrored, summaries
 from tests.reference.rigs import rig
 from tunnel_reference import draw, severity
@@ -57,12 +63,12 @@ def test_weights_are_evidences_times_prior_odds_and_large_errors_are_unknown():
     small, large = np.zeros(ETA.size), np.where(ETA > 0.3, 1.0, 0.0)
     flat = np.zeros(ETA.size)
     found = weigh(
-        Evidence(flat - 50.0, small, 0.0, 0.0),
+        ErrorEvidence(flat - 50.0, small, 0.0, 0.0),
         {
-            ("a",): Evidence(flat, large, 0.0, 0.0),
-            ("a", "b"): Evidence(flat + np.log(3.0), small, 20.0, -1.0),
+            ("a",): ErrorEvidence(flat, large, 0.0, 0.0),
+            ("a", "b"): ErrorEvidence(flat + np.log(3.0), small, 20.0, -1.0),
         },
-        {("a", "b", "c"): (Evidence(flat, small, 20.0, -1.0), 16.0)},
+        {("a", "b", "c"): (ErrorEvidence(flat, small, 20.0, -1.0), 16.0)},
     )
     inside = float(hyper[large <= LEFT].sum())
     weights = {
@@ -137,8 +143,8 @@ def test_the_network_learns_a_label_and_is_read_back(tmp_path):
     acts[:, 0] = runs[:, :, 80].sum(axis=1) > 0.0
     asked = np.zeros_like(acts)
     asked[:, 0] = 1.0
-    samples = Samples(runs, there, rng.standard_normal((count, 4)), acts, asked)
-    found = trained(samples, 5, [Setting(16, 1e-2, 0.1)], epochs=25)
+    samples = TrainingCampaigns(runs, there, rng.standard_normal((count, 4)), acts, asked)
+    found = trained(samples, 5, [NetworkSetting(16, 1e-2, 0.1)], epochs=25)
     assert found.facts["held_out"] < 0.5  # nats; 0.7 without the statistic
     replace(found, facts=found.facts | {"simulation_s": 1.0}).save(tmp_path / "w.safetensors")
     again = read_classifier(tmp_path / "w.safetensors")

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.words.verdict import headline
 from tests.marks import slow
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
@@ -124,11 +124,11 @@ def test_a_small_delay_changes_stiffness_and_damping_as_the_page_says() -> None:
 def test_it_is_left_out_without_a_word_where_no_run_is_driven() -> None:
     driven = campaign()
     free = replace(driven, runs=tuple(replace(run, drive=None) for run in driven.runs))
-    assert kinds_for(free, ALL_EFFECTS, Rig()) == (
+    assert kinds_for(free, ALL_EFFECTS, SpringModel()) == (
         tuple(kind for kind in ALL_EFFECTS if not kind.driven),
         (),
     )
-    assert DELAY in kinds_for(driven, ALL_EFFECTS, Rig())[0]
+    assert DELAY in kinds_for(driven, ALL_EFFECTS, SpringModel())[0]
 
 
 def test_a_plan_of_free_decays_refuses_it_in_one_line() -> None:

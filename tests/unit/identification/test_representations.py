@@ -16,7 +16,7 @@ from identification.blocks import (
     Detail,
     Figure,
     Paragraph,
-    Table,
+    TextTable,
     as_html,
     as_notebook,
     as_text,
@@ -190,7 +190,7 @@ def test_a_diagnosis_as_frames(diagnosis: Diagnosis) -> None:
 
 
 def test_a_cell_of_several_lines_keeps_its_column() -> None:
-    table = Table("t", ("a", "b"), (("x", "1\n22"), ("longer", "3")), right=("b",))
+    table = TextTable("t", ("a", "b"), (("x", "1\n22"), ("longer", "3")), right=("b",))
     assert as_text([table]).splitlines() == [
         "t",
         "a        b",
@@ -203,14 +203,14 @@ def test_a_cell_of_several_lines_keeps_its_column() -> None:
 
 
 def test_cells_stand_apart_in_a_notebook() -> None:
-    page = as_notebook([Table("t", ("a", "b"), (("x", "1"),), right=("b",))])
+    page = as_notebook([TextTable("t", ("a", "b"), (("x", "1"),), right=("b",))])
     (side,) = re.findall(r"<style[^>]*>.*td.*padding: [\d.]+em ([\d.]+)em.*</style>", page)
     assert float(side) >= 0.5
     assert '<td data-head="b" class="n">' in page
 
 
 def test_details_are_for_pages_only() -> None:
-    table = Table(
+    table = TextTable(
         "t", ("effect", "run", "more"), (("dry_friction", "run_1", "2"),), names=("effect",), detail=("more",)
     )
     blocks = (table, Figure("drawn", "what it shows"), Detail((Paragraph("a detail"),), "fold"))
@@ -224,7 +224,7 @@ def test_details_are_for_pages_only() -> None:
     ):
         assert part.lower() in page.lower()
     (kept,) = brief(blocks)
-    assert isinstance(kept, Table)
+    assert isinstance(kept, TextTable)
     assert (kept.columns, kept.rows) == (("effect", "run"), (("dry_friction", "run_1"),))
     assert "drawn" not in as_html(blocks)
 
@@ -236,7 +236,7 @@ def test_minus_signs_powers_of_ten_and_values_that_stay_together() -> None:
 
 
 def test_tables_without_rows_and_empty_paragraphs_are_left_out() -> None:
-    blocks = (Paragraph(""), Table("t", ("a",), ()), Paragraph("said", "Label"))
+    blocks = (Paragraph(""), TextTable("t", ("a",), ()), Paragraph("said", "Label"))
     assert as_text(blocks) == "Label: said"
     assert as_html(blocks) == "<p><b>Label:</b> said</p>"
     assert as_html(blocks, titled=True) == "<p>said</p>"

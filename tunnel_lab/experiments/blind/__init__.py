@@ -5,15 +5,15 @@ in the fits), `answer_set` diagnoses them without the key, `score_set` checks al
 """
 
 from tunnel_lab.experiments.blind.answers import answer_set, answers_folder
-from tunnel_lab.experiments.blind.score import Score, score_set
+from tunnel_lab.experiments.blind.set_score import BlindScore, score_set
 from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_reference.make import parse_shares
 
 __all__ = [
     "DEFAULT_SHARES",
+    "BlindScore",
     "Mixture",
-    "Score",
     "answer_set",
     "answers_folder",
     "make_blind",

@@ -355,7 +355,7 @@ GROUPS: dict[str, Callable[[Case], bool]] = {
 
 
 @dataclass(frozen=True)
-class Found:
+class CausesFound:
     """Success in finding the causes of some campaigns.
 
     Args:
@@ -383,7 +383,7 @@ class Found:
         return found | {"credible_size": self.credible_size}
 
 
-def found_by_group(cases: Sequence[Case]) -> list[Found]:
+def found_by_group(cases: Sequence[Case]) -> list[CausesFound]:
     """Causes found by group of campaigns, in the order of ``GROUPS``."""
     result = []
     for group, belongs in GROUPS.items():
@@ -393,7 +393,7 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
             wrong = [name not in c.truth for c in inside for name in c.named if name not in c.small]
             covered = [c.covered for c in inside if c.covered is not None]
             sizes = [len(c.decision.credible) for c in inside if c.decision is not None]
-            found = Found(
+            found = CausesFound(
                 group,
                 exact=Proportion.of([c.right for c in inside]),
                 found=Proportion.of(hits),

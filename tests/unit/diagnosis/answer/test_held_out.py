@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data, RunData, folds
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.patch.patched_model import native_closure
@@ -36,7 +36,7 @@ RUNS = st.lists(st.tuples(st.sampled_from([16.0, 21.0, 45.0]), st.sampled_from([
 @settings(max_examples=300)
 def test_what_is_kept_has_every_spring_and_both_winds(conditions, count):
     runs = tuple(one_run(f"r{i}", *condition) for i, condition in enumerate(conditions))
-    groups = folds(Data(runs, 1.0, 1.0, 0.0, Rig()), count)
+    groups = folds(Data(runs, 1.0, 1.0, 0.0, SpringModel()), count)
     left_out = [name for group in groups for name in group]
     assert len(left_out) == len(set(left_out))
     assert len(groups) <= count
@@ -50,14 +50,14 @@ def test_every_run_of_a_full_plan_is_left_out_once():
     conditions = [(spring, speed) for spring in (16.0, 21.0, 45.0) for speed in (0.0, 15.0, 25.0)] + [
         (16.0, 0.0), (16.0, 25.0), (21.0, 20.0)]  # fmt: skip
     runs = tuple(one_run(f"r{i}", *condition) for i, condition in enumerate(conditions))
-    groups = folds(Data(runs, 1.0, 1.0, 0.0, Rig()))
+    groups = folds(Data(runs, 1.0, 1.0, 0.0, SpringModel()))
     assert sorted(name for group in groups for name in group) == sorted(run.id for run in runs)
     assert [len(group) for group in groups] == [4, 4, 4]
 
 
 def test_one_run_of_each_spring_leaves_nothing_to_hold_out():
     runs = (one_run("a", 16.0, 0.0), one_run("b", 21.0, 15.0))
-    assert folds(Data(runs, 1.0, 1.0, 0.0, Rig())) == []
+    assert folds(Data(runs, 1.0, 1.0, 0.0, SpringModel())) == []
 
 
 @pytest.fixture(scope="module")

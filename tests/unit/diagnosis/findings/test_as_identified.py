@@ -1,12 +1,13 @@
 """Without a cause, or with scatter alone, a diagnosis states the numbers of `identify`, to the last digit."""
 
 import pytest
-from tests.unit.diagnosis.answer.test_hidden import SCATTERED, scattered
 
 from diagnosis import diagnose
+from diagnosis.search.scatter import scattered
 from identification import identify
 from tests.support.gap_campaigns import campaign
 from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 KINDS = [effect_class(name) for name in (*SCATTERED, "coulomb_friction", "cubic_stiffness")]
 

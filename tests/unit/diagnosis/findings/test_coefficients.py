@@ -15,7 +15,7 @@ from diagnosis.answer.linear_theory import beside, starts_beside
 from diagnosis.findings.coefficients import (
     Answers,
     Central,
-    Mixture,
+    NormalMixture,
     Possible,
     before_the_causes,
     coefficients,
@@ -60,7 +60,7 @@ def best(base):
 @settings(max_examples=50)
 def test_a_mixture_has_the_moments_of_its_samples_and_the_quantiles_of_its_distribution(parts):
     weights, means, variances = np.array(parts).T
-    found = Mixture(weights / weights.sum(), means, variances)
+    found = NormalMixture(weights / weights.sum(), means, variances)
     second = float(found.weights @ (variances + means**2))
     assert found.std == pytest.approx(np.sqrt(second - found.mean**2), rel=1e-6)
     for share in (0.025, 0.5, 0.975):
@@ -93,7 +93,7 @@ def test_two_probable_answers_have_the_quantiles_of_their_mixture(data, base, be
     answers = Answers((Possible(0.7, best), Possible(0.3, base)), 0.0, base)
     found = coefficients(answers, precise(data))["cn_r"]
     one, two = (only(fitted, precise(data))["cn_r"] for fitted in (best, base))
-    whole = Mixture(np.array([0.7, 0.3]), *np.array([(r.value, r.std**2) for r in (one, two)]).T)
+    whole = NormalMixture(np.array([0.7, 0.3]), *np.array([(r.value, r.std**2) for r in (one, two)]).T)
     low, high = (whole.quantile(share) for share in (0.025, 0.975))
     x = np.linspace(low, high, 200_001)
     density = whole.weights @ norm.pdf(x, whole.means[:, None], np.sqrt(whole.variances)[:, None])
@@ -112,7 +112,7 @@ def test_a_rival_outside_the_interval_does_not_widen_it(data, base, best):
     answers = Answers((Possible(0.985, best), Possible(0.015, base)), 0.0, base)
     found = coefficients(answers, precise(data))["cn_r"]
     alone = only(best, precise(data))["cn_r"]
-    whole = Mixture(
+    whole = NormalMixture(
         np.array([0.985, 0.015]), *np.array([(f.value("cn_r"), f.std("cn_r") ** 2) for f in (best, base)]).T
     )
     assert whole.std > 3.0 * alone.std
@@ -124,7 +124,7 @@ def test_a_rival_outside_the_interval_does_not_widen_it(data, base, best):
 @settings(max_examples=50)
 def test_the_interval_stated_or_meant_holds_95_per_cent_from_both_sides(parts):
     weights, means, variances = np.array(parts).T
-    whole = Mixture(weights / weights.sum(), means, variances)
+    whole = NormalMixture(weights / weights.sum(), means, variances)
     found = Central.of(whole, AnswerSettings())
     low, high = found.interval or (found.value - 1.96 * found.std, found.value + 1.96 * found.std)
     assert high - low == pytest.approx(2.0 * 1.96 * found.std, rel=1e-4)
@@ -145,7 +145,7 @@ def test_an_unlikely_rival_makes_the_interval_one_sided(data, base, best):
 def test_unknown_leaves_the_value_and_adds_half_the_change_from_the_nominal_model(data, base, best):
     found = coefficients(Answers((Possible(0.9, best),), 0.1, base), precise(data))["cn_r"]
     change = Settings().answer.unknown_std * (best.value("cn_r") - base.value("cn_r"))
-    whole = Mixture(
+    whole = NormalMixture(
         np.array([0.9, 0.1]),
         np.full(2, best.value("cn_r")),
         best.std("cn_r") ** 2 + np.array([0.0, change**2]),

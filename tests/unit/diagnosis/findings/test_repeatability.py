@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.judgements import zeros_apart
-from diagnosis.findings.repeatability import Repeatability, ScatterLimits, repeatability
+from diagnosis.findings.repeatability import RunRepeatability, ScatterLimits, repeatability
 from diagnosis.findings.units import own_repeatability
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered
@@ -33,7 +33,7 @@ def with_speeds(errors: np.ndarray) -> Campaign:
     return replace(campaign(duration=1.0), runs=tuple(runs))
 
 
-def found(errors: np.ndarray) -> Repeatability:
+def found(errors: np.ndarray) -> RunRepeatability:
     base = nominal(with_speeds(errors))
     layered = scattered(base, ALL_EFFECTS)
     assert layered is not None

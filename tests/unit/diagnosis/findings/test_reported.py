@@ -16,7 +16,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import Data, RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.sensor_noise import campaign_noise
@@ -39,7 +39,7 @@ def problem(*names, block=4, duration=4.0, **held):
         for i, (spring, speed) in enumerate(((16.12, 0.0), (21.02, 20.0)), 1)
     )
     kinds = tuple(effect_class(name) for name in names)
-    return Problem(Data(runs, 0.036, 0.625, 0.225, Rig().among(runs)), kinds, tuple(held.items()))
+    return Problem(Data(runs, 0.036, 0.625, 0.225, SpringModel().among(runs)), kinds, tuple(held.items()))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
             settings=Settings(),
         )
         runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
-        model = Rig().among(runs)
+        model = SpringModel().among(runs)
         spots = model.blind_spots(dataclasses.replace(problem().data, runs=runs, model=model))
         found[speed] = (said, " ".join(spots))
     assert found[0.0][0].figures == {"runs": 1, "driven": False, "windy": False}

@@ -18,7 +18,7 @@ from tests.reference.free_decays import AREA, LENGTH, Setting
 from tests.support import gap_campaigns
 from tunnel_sim.effects import ALL_EFFECTS, effect_from
 from tunnel_sim.vocabulary.campaign import RigProperties
-from tunnel_sim.vocabulary.units import dimension
+from tunnel_sim.vocabulary.dimensions import dimension
 
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {

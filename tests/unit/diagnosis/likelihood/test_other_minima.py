@@ -16,12 +16,12 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference.rigs import rig
-from tunnel_reference.conditions import Conditions, Input, Rod
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import Simulated
+from tunnel_reference.true_conditions import DrivenInput, TrueConditions, TwistingRod
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.physics.run_settings import RodTwist
 
@@ -29,16 +29,16 @@ ROD = effect_class("rod_flexibility")
 COMPLIANCE, SHARE = "rod_flexibility.compliance", "rod_flexibility.inertia_share"
 
 
-def conditions(compliance: float, share: float, *, driven: bool, noise: float) -> Conditions:
+def conditions(compliance: float, share: float, *, driven: bool, noise: float) -> TrueConditions:
     """Three springs in still air, released, or driven by a square motion of their roots."""
-    rod = Rod(compliance, share, held_body=True)
+    rod = TwistingRod(compliance, share, held_body=True)
     free = rig((16.12, 35.02, 67.98), (0.0, 0.0, 0.0), (0.35, 0.35, 0.35), 2.0, rod=rod, noise_std=noise)
     if not driven:
         return free
     time = np.arange(free.samples) / free.sample_rate
     square = np.sign(np.sin(2.0 * np.pi * 1.7 * time + 0.3))
     values, no = np.outer(square, [0.15, 0.12, 0.1]), np.zeros(3)
-    drive = Input("base_rad", values, np.ones(3, np.bool_), np.full(3, 0.3), 1.0, stated=True)
+    drive = DrivenInput("base_rad", values, np.ones(3, np.bool_), np.full(3, 0.3), 1.0, stated=True)
     return replace(free, drive=drive, start_angle=no, start_rate=no)
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from tests.support.gap_campaigns import campaign, nominal
 
 SPRING = 16.12
@@ -18,5 +18,5 @@ SPRING = 16.12
 def test_as_many_numbers_as_coefficients_show_no_scatter(conditions, tested):
     """Two runs give two frequencies and two dampings, which Izz, Cr, Cnβ and Cnr fit exactly."""
     data = nominal(campaign(conditions=conditions, duration=2.0)).problem.data
-    said = Rig().among(data.runs).blind_spots(data)
+    said = SpringModel().among(data.runs).blind_spots(data)
     assert any(spot.startswith("how well runs repeat") for spot in said) != tested

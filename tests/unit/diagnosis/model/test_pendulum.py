@@ -25,8 +25,8 @@ from diagnosis.settings import Settings
 from identification import identify
 from tests.support.gap_campaigns import campaign, nominal, whole_runs
 from tunnel_reference import moments
-from tunnel_reference.conditions import Conditions
-from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.integrator import BoundLaw, Phase, integrate
+from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -34,8 +34,8 @@ from tunnel_sim.vocabulary.record import Record
 GRAVITY, DRY, QUADRATIC, VISCOUS, SLIDE = 30.9, 0.2, 0.02, 0.02, 0.012  # per unit inertia; slide: rad
 ONE = np.ones(1)
 FRICTION = {
-    "sign": Term(moments.coulomb_level, Phase.FRICTION, {"moment": DRY * ONE}),
-    "dahl": Term(
+    "sign": BoundLaw(moments.coulomb_level, Phase.FRICTION, {"moment": DRY * ONE}),
+    "dahl": BoundLaw(
         moments.dahl_friction, Phase.MOMENT, {"moment": DRY * ONE, "slide": SLIDE * ONE}, np.zeros((1, 1))
     ),
 }  # fmt: skip
@@ -44,13 +44,17 @@ FRICTION = {
 @cache
 def pendulum(amplitude=2.5, duration=40.0, noise=1e-3, friction="sign", quadratic=QUADRATIC):
     """A heavy pendulum with dry and quadratic damping, integrated by the reference simulator."""
-    conditions = Conditions(
+    conditions = TrueConditions(
         1e-9 * ONE, 0.0 * ONE, amplitude * ONE, amplitude * ONE, 1.2, duration, 1.0, VISCOUS, 0.0, 0.0, noise,
         sample_rate=100.0,
     )  # fmt: skip
     terms = [
-        Term(moments.gravity, Phase.MOMENT, {"stiffness": GRAVITY * ONE, "angle": 0.0 * ONE, "second": 0.0 * ONE}),
-        Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": quadratic * ONE}),
+        BoundLaw(
+            moments.gravity,
+            Phase.MOMENT,
+            {"stiffness": GRAVITY * ONE, "angle": 0.0 * ONE, "second": 0.0 * ONE},
+        ),
+        BoundLaw(moments.quadratic_damping, Phase.MOMENT, {"coefficient": quadratic * ONE}),
         FRICTION[friction],
     ]  # fmt: skip
     substeps = 10 if friction == "dahl" else 2  # presliding is stiff

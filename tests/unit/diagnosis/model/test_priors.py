@@ -14,8 +14,8 @@ from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
-from diagnosis.model.parameters import Parameter, Point, Prior
-from diagnosis.model.rig import Rig
+from diagnosis.model.parameters import Parameter, Point, RunParameterPrior
+from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -33,14 +33,14 @@ SCATTER = 1e-3  # of the springs, relative
 
 
 @dataclass(frozen=True)
-class ClampedAgain(Rig):
+class ClampedAgain(SpringModel):
     """Springs whose stiffness differs a little each time that they are clamped."""
 
     scatter: float = SCATTER
 
     def parameters(self, data: Data) -> tuple[Parameter, ...]:
         deviation = Parameter(
-            "spring_deviation", "1", size=self.scatter, owner="per_run", prior=Prior(self.scatter)
+            "spring_deviation", "1", size=self.scatter, owner="per_run", prior=RunParameterPrior(self.scatter)
         )
         return *super().parameters(data), deviation
 
@@ -62,7 +62,7 @@ def campaign(scatter: float, seed: int) -> tuple[Campaign, np.ndarray]:
     return Campaign("clamped", RigProperties(), SensorProperties(RATE), tuple(runs)), deviations
 
 
-def fitted(model: Rig, scatter: float, seed: int):  # type: ignore[no-untyped-def]
+def fitted(model: SpringModel, scatter: float, seed: int):  # type: ignore[no-untyped-def]
     data, deviations = campaign(scatter, seed)
     prepared = prepare(data, {run.id: NOISE**2 for run in data.runs}, model=model.of(data))
     return fit(Problem(prepared), nominal_start(prepared), tolerance=1e-9), deviations
@@ -91,7 +91,7 @@ def test_deviations_and_inertia_are_within_their_standard_deviations() -> None:
 
 
 def test_a_narrow_prior_holds_and_a_wide_one_does_not() -> None:
-    base = fitted(Rig(), 0.0, 3)[0]
+    base = fitted(SpringModel(), 0.0, 3)[0]
     held = fitted(ClampedAgain(scatter=1e-9), 0.0, 3)[0]
     assert held.total == pytest.approx(base.total, rel=1e-6)
     assert held.std("yaw_inertia") == pytest.approx(base.std("yaw_inertia"), rel=1e-3)
@@ -120,4 +120,4 @@ def test_a_prior_is_a_part_of_chi2() -> None:
     own = found.point.release[:, parameters.own_names.index("spring_deviation")]
     assert found.total - found.chi2.sum() == pytest.approx(np.sum((own / SCATTER) ** 2))
     assert parameters.surprise(found.point) == pytest.approx(np.sum((own / SCATTER) ** 2))
-    assert Problem(replace(found.problem.data, model=Rig())).parameters.surprise(found.point) == 0.0
+    assert Problem(replace(found.problem.data, model=SpringModel())).parameters.surprise(found.point) == 0.0

@@ -10,7 +10,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import Colour
-from diagnosis.noise.kinds import Estimated, Floor, Stated
+from diagnosis.noise.kinds import Estimated, Floor, StatedNoise
 from diagnosis.noise.rounding import Rounded
 from diagnosis.noise.sensor_noise import NoiseTrend
 from diagnosis.settings import Settings
@@ -77,8 +77,8 @@ def test_a_stated_noise_a_little_too_small_raises_no_alarm(fitted):
     """Residuals in units of a noise whose variance is stated a tenth too small, as few records may bear out."""
     residuals = [np.sqrt(1.1) * r for r in white(fitted, np.random.default_rng(14)).residuals]
     louder = replace(fitted, residuals=residuals)
-    assert not verdict(louder, noise=noise_of(Stated, 1.0, 1.0, 1.1)).detected
-    assert verdict(louder, noise=noise_of(Stated, 1.0, 1.0, 1.0)).detected
+    assert not verdict(louder, noise=noise_of(StatedNoise, 1.0, 1.0, 1.1)).detected
+    assert verdict(louder, noise=noise_of(StatedNoise, 1.0, 1.0, 1.0)).detected
 
 
 @pytest.mark.parametrize(("band", "multiple"), [("below", 0.25), ("f0", 1.0), ("2f0", 2.0), ("3f0", 3.0),
@@ -127,7 +127,7 @@ FLAT = Colour(np.array([1.0, 10.0]), np.log(np.array([2.0, 2.0])), np.array([0.1
 def test_every_kind_of_noise_says_how_it_was_found(fitted):
     """Noise of twice the power of the white noise assumed, in all frequencies."""
     data = fitted.problem.data
-    for kind, source in ((Stated, "stated"), (Estimated, "estimated"), (Floor, "floor")):
+    for kind, source in ((StatedNoise, "stated"), (Estimated, "estimated"), (Floor, "floor")):
         noise = noise_of(kind, 1.6e-7, 1.6e-7, 1.76e-7).rounded(fitted, 4.0 * NOISE.std)
         assert (noise.source, noise.shown, noise.colour) == (source, source != "floor", None)
         assert (noise.margin, noise.std, noise.spread(np.ones(3))) == (pytest.approx(1.1), NOISE.std, 0.0)

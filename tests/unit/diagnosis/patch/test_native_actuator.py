@@ -29,7 +29,7 @@ from tunnel_sim.engine.joint_patch import (
     patched_xml,
     simulate_joint,
 )
-from tunnel_sim.physics.actuator import Actuator
+from tunnel_sim.physics.actuator import ActuatorLimits
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -53,11 +53,11 @@ def moved(model: JointModel, patch: ActuatorPatch | None, drive: DriveMoment) ->
 @pytest.mark.parametrize(
     ("made", "delay"),
     [
-        (Actuator(limit=3.0), 0.0),
-        (Actuator(lag=0.03), 0.0),
-        (Actuator(), 0.013),
-        (Actuator(), 0.0135),  # between two steps
-        (Actuator(limit=3.0, lag=0.03), 0.013),
+        (ActuatorLimits(limit=3.0), 0.0),
+        (ActuatorLimits(lag=0.03), 0.0),
+        (ActuatorLimits(), 0.013),
+        (ActuatorLimits(), 0.0135),  # between two steps
+        (ActuatorLimits(limit=3.0, lag=0.03), 0.013),
     ],
 )
 @pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
@@ -65,7 +65,7 @@ def moved(model: JointModel, patch: ActuatorPatch | None, drive: DriveMoment) ->
 def test_a_native_actuator_moves_the_joint_as_its_law(
     tmp_path: Path,
     swung: Campaign,
-    made: Actuator,
+    made: ActuatorLimits,
     delay: float,
     integrator: str,
     actuators: str,

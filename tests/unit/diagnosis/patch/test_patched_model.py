@@ -16,7 +16,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.patched_model import engine_residual, found_law
 from tunnel_sim.effects import Effect, effect_class
-from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -34,9 +34,9 @@ DETENT = expression_effect(
     channel="stiffness",
     moment="-k*(b*exp(-(b/w)^2)*(1+0.1*sin(omega*t))+c*r*abs(b))",
     parameters={
-        "k": Quantity("N m/rad", 0.1, 0.0, 50.0, 0.0, "depth"),
-        "w": Quantity("rad", 0.3, 0.01, 1.0, 0.3, "width"),
-        "c": Quantity("s", 0.01, 0.0, 1.0, 0.01, "loss"),
+        "k": ExpressionParameter("N m/rad", 0.1, 0.0, 50.0, 0.0, "depth"),
+        "w": ExpressionParameter("rad", 0.3, 0.01, 1.0, 0.3, "width"),
+        "c": ExpressionParameter("s", 0.01, 0.0, 1.0, 0.01, "loss"),
     },
 )
 

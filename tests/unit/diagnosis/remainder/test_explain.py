@@ -28,7 +28,7 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.remainder import ways
 from diagnosis.remainder.explain import chosen_kind, closable, steady_line
-from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
+from diagnosis.remainder.formula import Formula, FormulaTerm, choose, effect_of, effect_table, terms
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
@@ -46,7 +46,7 @@ from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.units import dimension, dimension_text
+from tunnel_sim.vocabulary.dimensions import dimension, dimension_text
 
 RUNS = rig(
     stiffness=(21.02, 21.02, 45.0, 45.0, 21.02, 45.0),
@@ -139,7 +139,7 @@ def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
 def test_a_term_about_zero_is_an_effect_of_a_file():
     """Its centre may be fitted, which needs a typical value other than 0."""
     centred = Formula(
-        (Term("max(b-c,0)", {"c": 0.0}),), (-2.0,), of_reading=False, delta=np.zeros(5), gained=9.0
+        (FormulaTerm("max(b-c,0)", {"c": 0.0}),), (-2.0,), of_reading=False, delta=np.zeros(5), gained=9.0
     )
     kind = effect_of(effect_table(centred, "beyond_the_centre"))
     assert [(info.default, info.scale != 0.0) for info in kind.parameters()] == [(0.0, True), (0.0, True)]

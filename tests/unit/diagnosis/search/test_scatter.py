@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.findings.next_run import separation
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.study import Study
@@ -104,7 +104,7 @@ def test_scatter_hides_no_cause() -> None:
 def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
     """In runs that repeat a wrong spring explains some of the differences; beside them it explains nothing."""
     cubic, spring = effect_class("cubic_stiffness"), effect_class("spring_miscalibration")
-    view = WholeRuns.after(nominal_study(campaign(cubic=0.1), FEW).prepared, None, Clock())
+    view = WholeRuns.after(nominal_study(campaign(cubic=0.1), FEW).prepared, None, StepClock())
     assert view is not None
     (alone,) = sets_with_one_more([view.smallest], [cubic])
     (both,) = sets_with_one_more([alone], [spring])

@@ -12,7 +12,7 @@ import pytest
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
-from diagnosis.search.clock import Clock
+from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.sets import Sets, resolved
@@ -201,5 +201,5 @@ def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leav
     known = SimpleNamespace(
         view=SimpleNamespace(prepared=prepared), best=best, fitted=sets.get, weighed=weighed
     )
-    view = moments.ByMoment.after(prepared, known, Clock())
+    view = moments.ByMoment.after(prepared, known, StepClock())
     assert (None if view is None else view.base.name) == taken

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood import least_squares
-from diagnosis.likelihood.between_runs import width_prior
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point

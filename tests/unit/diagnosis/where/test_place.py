@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.findings.assemble import localise
+from diagnosis.compose import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients

@@ -21,7 +21,7 @@ from diagnosis.words import sections, tables
 from diagnosis.words.cards import cause_cards, effect_cards, key_figures
 from diagnosis.words.numbers import left_over, probability
 from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
-from identification.blocks import Block, Heading, Paragraph, Table, lines
+from identification.blocks import Block, Heading, Paragraph, TextTable, lines
 from tests.support.diagnosis_document import (
     CAUSE,
     CONDITIONS,
@@ -42,14 +42,14 @@ Answer = dict[str, tuple[Block, ...]]
 
 def row(blocks: Iterable[Block], label: str) -> str:
     """What stands beside a label in a table of a section."""
-    rows = [cells for block in blocks if isinstance(block, Table) for cells in block.rows]
+    rows = [cells for block in blocks if isinstance(block, TextTable) for cells in block.rows]
     (found,) = (others for first, *others in rows if first == label)
     return " ; ".join(found)
 
 
 def text(blocks: Iterable[Block]) -> str:
     """The cells and sentences of a section."""
-    rows = [block.rows if isinstance(block, Table) else (lines(block),) for block in blocks]
+    rows = [block.rows if isinstance(block, TextTable) else (lines(block),) for block in blocks]
     return " ".join(" ".join(cells) for cells in chain(*rows))
 
 
@@ -64,7 +64,7 @@ def answer(given: Document) -> Answer:
 
 
 def test_every_number_of_a_table_has_a_unit_and_an_estimate_its_uncertainty(answer: Answer) -> None:
-    for table in (block for blocks in answer.values() for block in blocks if isinstance(block, Table)):
+    for table in (block for blocks in answer.values() for block in blocks if isinstance(block, TextTable)):
         assert_units(table)
 
 

@@ -24,7 +24,7 @@ from diagnosis.words.tables import (
     waterfall_table,
 )
 from diagnosis.words.verdict import rival_lines, run_words
-from identification.blocks import Paragraph, Table
+from identification.blocks import Paragraph, TextTable
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs
@@ -43,7 +43,7 @@ def given() -> Document:
     return document()
 
 
-def rows(table: Table) -> list[list[str]]:
+def rows(table: TextTable) -> list[list[str]]:
     """The cells of a table without its details, units and brackets of units left out."""
     return [[Y_UNIT.sub("", cell) for cell in row] for row in table.without_detail().rows]
 
@@ -307,7 +307,7 @@ def test_coefficients_of_an_estimate() -> None:
 def test_every_number_of_an_estimate_has_a_unit() -> None:
     conditions = {run.id: (run.spring_stiffness, run.wind_speed) for run in campaign().runs}
     blocks = estimate_blocks(estimate().to_json_dict(), conditions, windows=True)
-    shown = [block for block in blocks if isinstance(block, Table)]
+    shown = [block for block in blocks if isinstance(block, TextTable)]
     assert len(shown) == 2 + len(IDS)
     for table in shown:
         assert_units(table)

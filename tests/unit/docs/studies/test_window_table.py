@@ -12,7 +12,7 @@ from docs.studies.window_table import Columns, read_table, rig_state, simulate_w
 from identification.datasets import WindowRow, paper_windows
 from tunnel_lab.paper.networks import infer_springs
 from tunnel_sim.effects import effect_from
-from tunnel_sim.effects.friction import CoulombFriction
+from tunnel_sim.effects.friction_laws import CoulombFriction
 from tunnel_sim.effects.mechanics import CubicStiffness, QuadraticDamping
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -14,7 +14,7 @@ from identification.campaign.belief import (
     update_belief,
 )
 from identification.estimate import PARAMETERS
-from identification.signal.decay_fit import Prior, Reading, fit_decays
+from identification.signal.decay_fit import Reading, SharedPrior, fit_decays
 from identification.signal.run_fit import identify_run
 from identification.uncertainty.cramer_rao import campaign_bound
 from tests.reference.free_decays import Setting, Truth, angle_of, campaign
@@ -139,7 +139,11 @@ def test_the_prior_of_a_fit_is_worth_its_information():
     known = information[:2, :2]
     away = np.linalg.cholesky(np.linalg.inv(known)) @ np.array([NOISE, -NOISE])
     pulled = fit_decays(
-        [reading], [np.eye(2)], free.parameters, zero=free.zero, prior=Prior(free.parameters + away, known)
+        [reading],
+        [np.eye(2)],
+        free.parameters,
+        zero=free.zero,
+        prior=SharedPrior(free.parameters + away, known),
     )
     np.testing.assert_allclose(pulled.parameters - free.parameters, 0.5 * away, rtol=0.05)
     assert pulled.converged

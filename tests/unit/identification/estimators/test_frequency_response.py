@@ -22,10 +22,10 @@ from identification.signal.free_decay import Decay
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.conditions import Input
 from tunnel_reference.draw import CampaignDraw
 from tunnel_reference.integrator import integrate
 from tunnel_reference.severity import Simulated
+from tunnel_reference.true_conditions import DrivenInput
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 
@@ -58,7 +58,7 @@ def driven(kind: str, column: str = "moment_nm", *, held: bool = False) -> Campa
     rng = np.random.default_rng(2)
     values = np.stack([WAVES[kind](rng) for _ in range(4)], axis=1)
     values *= {"moment_nm": 0.3, "base_rad": 0.01}[column] / values.std()
-    given = Input(column, values, np.full(4, held), np.full(4, 0.1))
+    given = DrivenInput(column, values, np.full(4, held), np.full(4, 0.1))
     c = replace(RIG, drive=given)
     (motion,) = integrate([c], [[]], substeps=8)
     draw = CampaignDraw("none", c, (), 0)

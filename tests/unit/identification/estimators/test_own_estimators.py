@@ -15,7 +15,7 @@ from identification.datasets import measured_campaign
 from identification.estimate import WindowEstimate
 from identification.estimators import ENTRY_POINTS, SUMMARIES, known_estimators, make_estimator
 from identification.returned import WrongReturn
-from tunnel_lab.terminal.inputs import chosen_estimator
+from tunnel_lab.terminal.arguments import chosen_estimator
 from tunnel_sim import Campaign, TunnelError
 
 

@@ -26,8 +26,8 @@ from identification.neural.three_cycles import network_inputs, response_points
 from identification.neural.train import (
     Checkpoint,
     Hyperparameters,
-    Problem,
-    Progress,
+    TrainingPairs,
+    TrainingProgress,
     TrainingSpec,
     advance_training,
     first_weights,
@@ -123,8 +123,8 @@ def test_the_weight_of_the_errors_stays_above_zero_where_every_pair_is_used_up()
 
 
 def test_every_step_lowers_the_cost_it_was_taken_for():
-    problem = Problem.of(training_pairs(SHORT.data, DAMPING), SIZES[DAMPING], unit_deviation=False)
-    progress = Progress(first_weights(problem.sizes, np.random.default_rng(1)))
+    problem = TrainingPairs.of(training_pairs(SHORT.data, DAMPING), SIZES[DAMPING], unit_deviation=False)
+    progress = TrainingProgress(first_weights(problem.sizes, np.random.default_rng(1)))
 
     def cost(weights, held):
         import torch

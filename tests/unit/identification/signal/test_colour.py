@@ -12,7 +12,7 @@ from scipy.stats import binom
 from identification import Status, identify
 from identification.campaign.derivatives import noise_statuses
 from identification.signal.colour import Autoregression, Periodogram, levinson
-from identification.signal.noise import Noise, PeakNoise, Residual, noise_of
+from identification.signal.noise import PeakNoise, ReadingNoise, Residual, noise_of
 from identification.statistics import inverse, sandwich_covariance
 from tests.reference.free_decays import SIX, campaign, with_records
 from tunnel_sim.vocabulary.campaign import SensorProperties
@@ -35,7 +35,7 @@ def density(pole: float, frequency: Array | float) -> Array:
     return np.asarray((1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2)
 
 
-def judged(values: Array, sensor: SensorProperties = SILENT) -> Noise:
+def judged(values: Array, sensor: SensorProperties = SILENT) -> ReadingNoise:
     return noise_of([Residual(values, CYCLE, 5, 300.0)], sensor)
 
 

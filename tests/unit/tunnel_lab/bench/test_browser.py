@@ -20,7 +20,7 @@ from tests.support.import_files import decay
 from tests.support.served import SETTLED, Bench, bench, tab
 from tests.unit.tunnel_lab.bench.test_refusals import FULL_DISK
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.terminal.inputs import file_hashes
+from tunnel_lab.terminal.arguments import file_hashes
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import read_recipe

@@ -16,7 +16,7 @@ from nicegui import Client, ui
 from starlette.requests import Request
 
 from diagnosis.words.verdict import next_steps, run_to_make
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tests.support.diagnosis_document import document
 from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work
@@ -49,7 +49,10 @@ def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
     lines += ["9.0 s: predicting held-out runs"]
     assert diagnosis.progress_of(lines).tried == ""
     assert diagnosis.progress_of(lines).reached == Reached("explained share", 9.0)
-    assert diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"]) == diagnosis.Progress()
+    assert (
+        diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"])
+        == diagnosis.DiagnosisProgress()
+    )
 
 
 @pytest.mark.parametrize(("every", "sets"), [(None, 0), (0.0, 3), (1e6, 0)])
@@ -100,7 +103,7 @@ def test_effects_are_words_on_the_page_and_runs_are_as_they_are_named(tmp_path: 
     (shown,) = [
         text
         for text in texts(
-            lambda *_: parts.show_blocks([Table("", ("effect", "run"), rows, names=("effect",))]),
+            lambda *_: parts.show_blocks([TextTable("", ("effect", "run"), rows, names=("effect",))]),
             session(tmp_path),
         )
         if "table" in text

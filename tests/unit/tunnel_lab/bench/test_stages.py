@@ -14,7 +14,7 @@ from tests.support.diagnosis_document import document
 from tests.support.import_files import decay
 from tunnel_lab.bench import work
 from tunnel_lab.bench.workspace import STAGES, Session, closed
-from tunnel_lab.terminal.inputs import file_hashes
+from tunnel_lab.terminal.arguments import file_hashes
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tunnel_lab.bench.try_it import RigTrial, chosen_effect, effect_words, plan_text, said, simulate
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError

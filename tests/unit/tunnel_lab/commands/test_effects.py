@@ -11,7 +11,7 @@ import pytest
 from tests.reference.effect_cases import VOCABULARY
 from tests.support.command import Tunnel
 from tunnel_lab.commands.effects import example, reference_page
-from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import EffectSetting

@@ -7,7 +7,7 @@ import pytest
 from tests.marks import slow
 from tunnel_lab.envs.excitation import Resonant
 from tunnel_sim.envs import EnvError
-from tunnel_sim.envs.conditions import FreeDecayConfig
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 
 AMPLITUDE, INERTIA = 0.3, 0.1
 MAKE = {"duration": 12.0, "sample_rate": 100.0, "noise_std": 0.005}

@@ -13,7 +13,7 @@ from tests.reference.free_decays import damped_cosine
 from tunnel_lab.experiments import experiment
 from tunnel_lab.experiments import score as score_trials
 from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.score import Unit, read_trials, write_trials
+from tunnel_lab.experiments.score import TrialBatch, read_trials, write_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, effects_of, load_grid, packaged_grid
 from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -118,7 +118,7 @@ def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little
     monkeypatch.setattr(score_trials, "score_unit", lambda *given: done.append(given[-1]) or real(*given))
     again, _ = score_trials.score_grid(small, NAMES, processes(0), parts=tmp_path / "parts")
     assert timeless(again) == timeless(here)
-    assert done == [Unit(1, 0, 4)]
+    assert done == [TrialBatch(1, 0, 4)]
     with pytest.raises(TunnelError, match=r"another score, whose seed differs; .* add --overwrite"):
         score_trials.score_grid(replace(small, seed=2), NAMES, processes(0), parts=tmp_path / "parts")
     monkeypatch.setattr(experiment, "_code", lambda: "changed")

@@ -19,7 +19,7 @@ from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_view
 from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.sweep import Sweep, read_sweep
-from tunnel_lab.experiments.sweep_view import Line, lines_of, summarise
+from tunnel_lab.experiments.sweep_view import ScoreLine, lines_of, summarise
 from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS, SCATTER_COLUMNS
 from tunnel_lab.plotting.style import styled
 
@@ -301,7 +301,7 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
 
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:
-    lines: list[Line] = [*lines_of(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
+    lines: list[ScoreLine] = [*lines_of(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
     assert sweep_view.error_figure(lines[1:]) is None
     assert "noise_std" in RESULT_COLUMNS
 

@@ -122,13 +122,13 @@ def test_the_flexible_rod_moves_as_the_reference_integrator_says():
     from dataclasses import replace
 
     from tunnel_lab.experiments.training_samples import flexible_motion
-    from tunnel_reference.conditions import Rod
     from tunnel_reference.draw import draw_conditions, with_defaults
     from tunnel_reference.integrator import integrate
+    from tunnel_reference.true_conditions import TwistingRod
 
     stated = with_defaults(replace(draw_conditions(np.random.default_rng(1)), duration=0.3))
     for held in (True, False):
-        c = replace(stated, rod=Rod(1e-4, 0.15, 0.01, 0.0, held))
+        c = replace(stated, rod=TwistingRod(1e-4, 0.15, 0.01, 0.0, held))
         exact, stepped = flexible_motion(c), integrate([c], [[]], substeps=20)[0]
         assert np.abs(exact.angle - stepped.angle).max() < 1e-7
         assert np.abs(exact.rate - stepped.rate).max() < 1e-4

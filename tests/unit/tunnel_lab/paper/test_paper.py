@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tunnel_lab.paper import page, rig
-from tunnel_lab.paper.page import Picture, Section, signed
-from tunnel_lab.paper.rig import Oscillation, eq7, eq8, known_run, printed_transfer_function
+from tunnel_lab.paper import paper_page, rig_tables
+from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
+from tunnel_lab.paper.rig_tables import Oscillation, eq7, eq8, known_run, printed_transfer_function
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -46,13 +46,13 @@ def test_an_oscillation_is_halved_in_its_half_time() -> None:
 
 
 def test_the_rig_has_the_sizes_of_table_1_and_the_inertia_of_table_2(tmp_path: Path) -> None:
-    *sizes, inertia = rig.table_1(tmp_path).rows
+    *sizes, inertia = rig_tables.table_1(tmp_path).rows
     assert all(theirs == ours for _, _, theirs, ours in sizes)
     assert inertia[2:] == ("0.11", "0.1014")
 
 
 def test_the_equations_say_what_is_printed_and_what_it_gives(tmp_path: Path) -> None:
-    rows = {row[0]: row[3] for row in rig.equations(tmp_path).rows}
+    rows = {row[0]: row[3] for row in rig_tables.equations(tmp_path).rows}
     assert set(rows) == {"text after 6", "7", "8", "9", "12", "16"}
     assert rows["8"] == "Cnr +0.0842; corrected: −0.1033"
     assert "no damping" in rows["12"]
@@ -63,30 +63,30 @@ def test_numbers_with_signs(value: float, text: str) -> None:
     assert signed(value, 3) == text
 
 
-def section(title: str, *files: str) -> Section:
+def section(title: str, *files: str) -> PaperSection:
     pictures = tuple(Picture(file=file, caption="<b>") for file in files)
-    return Section(
+    return PaperSection(
         title=title, about="a", theirs="<1>", ours="2", outcome="reproduced", words=(), pictures=pictures
     )
 
 
-class Parts(dict[str, page.Part]):
+class Parts(dict[str, paper_page.Part]):
     """Three parts, and which were computed; the second draws a picture, the third is interrupted at first."""
 
     def __init__(self) -> None:
         super().__init__(one=self._one, two=self._two, three=self._three)
         self.called: list[str] = []
 
-    def _one(self, _: Path) -> Section:
+    def _one(self, _: Path) -> PaperSection:
         self.called.append("one")
         return section("One")
 
-    def _two(self, folder: Path) -> Section:
+    def _two(self, folder: Path) -> PaperSection:
         (folder / "b.png").write_bytes(b"x")
         self.called.append("two")
         return section("Two", "b.png")
 
-    def _three(self, _: Path) -> Section:
+    def _three(self, _: Path) -> PaperSection:
         self.called.append("three")
         if self.called.count("three") == 1:
             raise KeyboardInterrupt
@@ -103,47 +103,47 @@ NAMES = ("one", "two", "three")
 
 def test_an_interrupted_page_goes_on_where_it_stopped(tmp_path: Path, parts: Parts) -> None:
     with pytest.raises(KeyboardInterrupt):
-        page.write_paper(tmp_path, parts, NAMES)
-    assert not (tmp_path / page.PAGE).exists()
-    written, sections = page.write_paper(tmp_path, parts, NAMES)
+        paper_page.write_paper(tmp_path, parts, NAMES)
+    assert not (tmp_path / paper_page.PAGE).exists()
+    written, sections = paper_page.write_paper(tmp_path, parts, NAMES)
     assert parts.called == ["one", "two", "three", "three"]
     assert list(sections) == list(NAMES)
     text = written.read_text(encoding="utf-8")
     assert "&lt;1&gt;" in text
     assert "<b>" not in text
     (tmp_path / "b.png").unlink()
-    page.write_paper(tmp_path, parts, NAMES)
+    paper_page.write_paper(tmp_path, parts, NAMES)
     assert parts.called[4:] == ["two"]  # only the part whose picture is gone
 
 
 def test_a_part_of_another_version_is_computed_again(tmp_path: Path, parts: Parts) -> None:
-    page.write_paper(tmp_path, parts, ("one",))
+    paper_page.write_paper(tmp_path, parts, ("one",))
     kept = tmp_path / "parts" / "one.json"
     kept.write_text(json.dumps(json.loads(kept.read_text()) | {"version": "0.0.0"}))
-    _, sections = page.write_paper(tmp_path, parts, ("one",))
+    _, sections = paper_page.write_paper(tmp_path, parts, ("one",))
     assert parts.called == ["one", "one"]
     assert list(sections) == ["one"]
 
 
 @pytest.mark.parametrize("damage", ["{", '{"version": 1}', None])
 def test_a_damaged_part_is_one_line(tmp_path: Path, parts: Parts, damage: str | None) -> None:
-    page.write_paper(tmp_path, parts, ("one",))
+    paper_page.write_paper(tmp_path, parts, ("one",))
     kept = tmp_path / "parts" / "one.json"
     document = json.loads(kept.read_text())
     document["section"]["outcome"] = "splendid"
     kept.write_text(damage or json.dumps(document))
     if damage == '{"version": 1}':
-        page.write_paper(tmp_path, parts, ("one",))
+        paper_page.write_paper(tmp_path, parts, ("one",))
         assert parts.called == ["one", "one"]
         return
     with pytest.raises(TunnelError, match=r"one\.json"):
-        page.write_paper(tmp_path, parts, ("one",))
+        paper_page.write_paper(tmp_path, parts, ("one",))
 
 
 def test_a_picture_stays_in_its_folder(tmp_path: Path, parts: Parts) -> None:
-    page.write_paper(tmp_path, parts, ("two",))
+    paper_page.write_paper(tmp_path, parts, ("two",))
     kept = tmp_path / "parts" / "two.json"
     kept.write_text(kept.read_text().replace("b.png", "../b.png"))
     with pytest.raises(TunnelError, match="pattern"):
-        page.write_paper(tmp_path, parts, ("two",))
+        paper_page.write_paper(tmp_path, parts, ("two",))
     assert parts.called == ["two"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.findings.assemble import localise
+from diagnosis.compose import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from tests.support.gap_campaigns import campaign, nominal, studied

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
-from diagnosis.findings.assemble import localise
+from diagnosis.compose import localise
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
 from diagnosis.findings.coefficients import Coefficients

@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.words.cards import key_figures
 from diagnosis.words.sections import printed, sections
-from identification.blocks import Figure, Table, as_html, as_text, lines, typeset
+from identification.blocks import Figure, TextTable, as_html, as_text, lines, typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.shown_numbers import all_blocks
 from tunnel_lab.report import render_report
@@ -39,6 +39,8 @@ def test_terminal_and_text_have_every_cell_and_sentence(
     for shown in (capsys.readouterr().out, as_text(blocks)):
         words = " ".join(shown.split())
         for block in blocks:
-            cells = [cell for row in block.rows for cell in row] if isinstance(block, Table) else lines(block)
+            cells = (
+                [cell for row in block.rows for cell in row] if isinstance(block, TextTable) else lines(block)
+            )
             for part in (line for cell in cells for line in cell.split("\n")):
                 assert " ".join(part.split()) in words

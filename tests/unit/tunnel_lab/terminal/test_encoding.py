@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tunnel_lab.cli import main
-from tunnel_lab.terminal.inputs import TableFormat
-from tunnel_lab.terminal.tables import rendered
+from tunnel_lab.terminal.arguments import TableFormat
+from tunnel_lab.terminal.table_layout import rendered
 
 ROOT = Path(__file__).parents[4]
 ENCODINGS = {
@@ -75,7 +75,7 @@ def test_json_holds_the_same_document_in_any_encoding(tiny_campaign: Path) -> No
 
 
 def shown(kind: TableFormat, *cells: str) -> str:
-    plain = Table("t <b>", tuple(f"c{i}" for i in range(len(cells))), (cells,))
+    plain = TextTable("t <b>", tuple(f"c{i}" for i in range(len(cells))), (cells,))
     return rendered(plain, kind).splitlines()[-1]
 
 
@@ -94,4 +94,4 @@ def test_a_negative_number_stays_a_number_in_csv(cell: str) -> None:
 def test_markdown_holds_no_markup_of_a_cell() -> None:
     line = shown(TableFormat.MD, "<script>&x", "a|b\\|c", "[x](javascript:1)", "ωn [rad/s]")
     assert line == r"| &lt;script&gt;&amp;x | a\|b\\\|c | [x]\(javascript:1) | ωn [rad/s] |"
-    assert rendered(Table("t <b>", ("c",), ()), TableFormat.MD).startswith("**t &lt;b&gt;**")
+    assert rendered(TextTable("t <b>", ("c",), ()), TableFormat.MD).startswith("**t &lt;b&gt;**")

@@ -11,16 +11,16 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from identification.blocks import Table
+from identification.blocks import TextTable
 from tests.support.command import Tunnel
 from tunnel_lab.terminal import progress
-from tunnel_lab.terminal.tables import is_too_wide, stacked
+from tunnel_lab.terminal.table_layout import is_too_wide, stacked
 from tunnel_sim.files.reading import inside, nearest
 
 
 def two_columns():
     second = ("second", "3", "a remark of more than thirty characters is a sentence")
-    return Table("Title", ("run", "value\n[N m]", "remark"), (("first", "12.5 ± 0.1", ""), second))
+    return TextTable("Title", ("run", "value\n[N m]", "remark"), (("first", "12.5 ± 0.1", ""), second))
 
 
 def test_a_table_is_stacked_where_a_cell_would_be_broken() -> None:
@@ -42,7 +42,7 @@ def test_a_stacked_table_has_every_cell_with_its_heading_and_wraps_sentences() -
 
 def test_a_stacked_table_of_two_columns_has_a_line_for_each_row() -> None:
     row = ("plugin", "/a/path/that/is/longer/than/the/terminal/is/wide")
-    assert stacked(Table("Title", ("part", "found"), (row,)), 20).splitlines() == [
+    assert stacked(TextTable("Title", ("part", "found"), (row,)), 20).splitlines() == [
         "Title",
         " plugin:",
         " /a/path/that/is/longer/than/the/terminal/is/wide",

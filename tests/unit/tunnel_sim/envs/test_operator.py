@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.support.env_episodes import episode, make
-from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.engines import WindAnswer
+from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 from tunnel_sim.files.rig_file import load_rig
 
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.0}

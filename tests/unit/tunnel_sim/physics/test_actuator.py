@@ -12,13 +12,13 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
-from diagnosis.model.rig import Rig
+from diagnosis.model.rig import SpringModel
 from tests.marks import slow
 from tests.reference.robot_joints import GEAR, robot, robot_campaign
 from tests.support.robots import TRUE, own_model
 from tests.unit.diagnosis.test_input_delay import DAMPING, DELAY, INERTIA, NOISE, RATE, SPRING, campaign
-from tunnel_reference.conditions import Actuator as Reference
-from tunnel_reference.inputs import exerted, finer
+from tunnel_reference.driven_inputs import exerted, finer
+from tunnel_reference.true_conditions import Actuation as Reference
 from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_class, effect_from
 from tunnel_sim.engine.effect_laws import DRIVE, INTEGRATION_TOLERANCE, WIND_ON
 from tunnel_sim.engine.model import build_model
@@ -26,7 +26,7 @@ from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.actuator import Actuator, Samples
+from tunnel_sim.physics.actuator import ActuatorLimits, InputSamples
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -45,7 +45,7 @@ SQUARE = np.sign(np.sin(np.arange(40.0)))
 NULL = {"actuator_lag": "lag", "actuator_saturation": "limit", "actuator_rate_limit": "rate"}
 
 
-def at(given: Samples, time: np.ndarray) -> np.ndarray:
+def at(given: InputSamples, time: np.ndarray) -> np.ndarray:
     """The value of samples at times."""
     if given.held:
         return given.values[np.maximum(np.searchsorted(given.time_s, time, side="right") - 1, 0)]
@@ -66,7 +66,7 @@ each_clock = pytest.mark.parametrize("time", [TIME, UNEVEN], ids=["even", "uneve
 def test_a_rate_limit_follows_its_equation(
     values: np.ndarray, held: bool, time: np.ndarray, rate: float
 ) -> None:
-    asked, short = Samples(time, values, held), 2e-5
+    asked, short = InputSamples(time, values, held), 2e-5
     fine = np.arange(time[0], time[-1], short)
     wanted = at(asked, fine + 0.5 * short)
     exact = np.empty_like(fine)
@@ -90,7 +90,7 @@ def test_a_rate_limit_follows_its_equation(
 def test_a_greatest_moment_clips_at_every_time(
     values: np.ndarray, held: bool, time: np.ndarray, limit: float
 ) -> None:
-    asked, fine = Samples(time, values, held), np.linspace(time[0], time[-1], 5001)
+    asked, fine = InputSamples(time, values, held), np.linspace(time[0], time[-1], 5001)
     assert at(asked.clipped(limit), fine) == pytest.approx(np.clip(at(asked, fine), -limit, limit), abs=1e-9)
 
 
@@ -101,7 +101,7 @@ def test_a_greatest_moment_clips_at_every_time(
 def test_a_soft_limit_follows_its_equation(
     values: np.ndarray, held: bool, time: np.ndarray, softness: float
 ) -> None:
-    asked, fine = Samples(time, values, held), np.linspace(time[0], time[-1], 5001)
+    asked, fine = InputSamples(time, values, held), np.linspace(time[0], time[-1], 5001)
     found, wanted = asked.saturated(0.9, softness), at(asked, fine)
     exact = wanted / (1.0 + np.abs(wanted / 0.9) ** (1.0 / softness)) ** softness
     assert np.max(np.abs(at(found, fine) - exact)) < (1e-12 if held else 1e-3)
@@ -110,7 +110,7 @@ def test_a_soft_limit_follows_its_equation(
 
 @each_hold
 def test_a_soft_limit_tends_to_a_hard_one(held: bool) -> None:
-    asked, fine = Samples(TIME, 1e3 * VALUES, held), np.linspace(TIME[0], TIME[-1], 5001)
+    asked, fine = InputSamples(TIME, 1e3 * VALUES, held), np.linspace(TIME[0], TIME[-1], 5001)
     hard = at(asked.clipped(300.0), fine)
     away = [float(np.max(np.abs(at(asked.saturated(300.0, s), fine) - hard))) for s in (0.1, 0.05, 0.025)]
     assert away[0] > 1.5 * away[1] > 2.25 * away[2] > 0.0
@@ -120,21 +120,21 @@ def test_a_soft_limit_tends_to_a_hard_one(held: bool) -> None:
 @pytest.mark.parametrize("limit", [0.5, 1e-3, 1e-9])
 def test_a_soft_limit_far_below_the_input_adds_samples_at_its_zeros_alone(limit: float) -> None:
     time = np.arange(5000) / 1000.0
-    found = Samples(time, np.sin(4.0 * np.pi * time), held=False).saturated(limit, 0.4)
+    found = InputSamples(time, np.sin(4.0 * np.pi * time), held=False).saturated(limit, 0.4)
     assert np.all(np.diff(found.time_s) > 0.0)
     assert found.time_s.size < 6 * time.size
 
 
 def test_a_soft_limit_contains_a_hyperbolic_tangent() -> None:
     asked = np.linspace(-1.0, 1.0, 401)
-    found = Samples(np.arange(401.0), asked, True).saturated(1.133, 0.4755).values
+    found = InputSamples(np.arange(401.0), asked, True).saturated(1.133, 0.4755).values
     assert np.max(np.abs(found - np.tanh(asked))) < 1e-3
 
 
 @pytest.mark.parametrize("limited", [{"limit": 4.0}, {"rate": 1e6}, {}])
 def test_a_limit_that_is_not_reached_changes_no_bit(limited: dict[str, float]) -> None:
-    asked = Samples(TIME, VALUES, held=False)
-    assert Actuator(**limited).exerted(asked, 1.0) is asked
+    asked = InputSamples(TIME, VALUES, held=False)
+    assert ActuatorLimits(**limited).exerted(asked, 1.0) is asked
 
 
 @each_hold
@@ -144,7 +144,7 @@ def test_a_lagged_rig_moves_as_scipy_says(held: bool, lag: float) -> None:
     run = replace(WIND_ON, duration=0.35, drive=DriveMoment(TIME, 3.0 * VALUES, held=held))
     chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
     found = forward_motion(load_rig(), chain.physics(), 1000.0)
-    asked, law = Samples(TIME, 3.0 * VALUES, held), run.law(load_rig())
+    asked, law = InputSamples(TIME, 3.0 * VALUES, held), run.law(load_rig())
     flow = load_rig().body.flow(run.air_density, run.wind_speed)
     pressure = (
         0.5 * flow["air_density"] * flow["wind_speed"] * flow["frontal_area"] * flow["reference_length"]
@@ -187,7 +187,7 @@ def test_the_line_that_takes_the_place_of_an_exponential_is_of_third_order(held:
     angles = []
     for parts in (1, 2, 8):
         times = np.linspace(0.0, TIME[-1], parts * (TIME.size - 1) + 1)
-        values = at(Samples(TIME, 3.0 * VALUES, held), times + (1e-9 if held else 0.0))
+        values = at(InputSamples(TIME, 3.0 * VALUES, held), times + (1e-9 if held else 0.0))
         run = replace(WIND_ON, duration=0.35, drive=DriveMoment(times, values, held=held))
         chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
         angles.append(forward_motion(load_rig(), chain.physics(), 1000.0).angle)
@@ -211,17 +211,23 @@ def test_a_motion_is_continuous_where_the_lag_vanishes(held: bool) -> None:
 
 @each_hold
 @pytest.mark.parametrize(
-    "actuator", [Actuator(limit=0.8), Actuator(rate=60.0), Actuator(lag=0.02), Actuator(0.8, 60.0, 0.02)],
+    "actuator",
+    [
+        ActuatorLimits(limit=0.8),
+        ActuatorLimits(rate=60.0),
+        ActuatorLimits(lag=0.02),
+        ActuatorLimits(0.8, 60.0, 0.02),
+    ],
     ids=["saturation", "rate limit", "lag", "all"],
-)  # fmt: skip
-def test_the_reference_simulator_agrees(actuator: Actuator, held: bool) -> None:
+)
+def test_the_reference_simulator_agrees(actuator: ActuatorLimits, held: bool) -> None:
     holds = np.array([held])
     other = Reference(
         actuator.limit or np.inf, rate=actuator.rate or np.inf, lags=(actuator.lag,) if actuator.lag else ()
     )
     short = STEP / 64
     expected, _ = exerted(finer(finer(VALUES[:, None], holds), holds), other, short, holds)
-    found = actuator.exerted(Samples(TIME, VALUES, held), 1.0)
+    found = actuator.exerted(InputSamples(TIME, VALUES, held), 1.0)
     time = short * np.arange(len(expected))
     until = time < TIME[-1] - STEP
     means = np.abs(np.cumsum(at(found, time + 0.5 * short) - expected[:, 0])[until]) * short
@@ -254,9 +260,9 @@ def test_a_campaign_tries_them_where_a_moment_moves_the_body() -> None:
         driven, runs=tuple(replace(run, drive=replace(run.drive, column="base_rad")) for run in driven.runs)
     )
     own = {effect_class(name) for name in NULL}
-    assert own <= set(kinds_for(driven, ALL_EFFECTS, Rig())[0])
+    assert own <= set(kinds_for(driven, ALL_EFFECTS, SpringModel())[0])
     for other in (free, by_root):
-        assert not own & set(kinds_for(other, ALL_EFFECTS, Rig())[0])
+        assert not own & set(kinds_for(other, ALL_EFFECTS, SpringModel())[0])
 
 
 def test_a_plan_whose_drive_moves_the_root_refuses_them_in_one_line() -> None:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.moment_law import forward_library, operation_names
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import dimension
 
 NAMES = frozenset({"b", "r", "t", "V", "k", "w"})
 INPUTS = {"b": "angle", "r": "rate", "t": "time", "V": "speed"}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from identification.statistics import Proportion
-from tests.unit.tunnel_lab.experiments.blind.test_score import document
-from tunnel_lab.experiments.blind import page as blind
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
-from tunnel_lab.experiments.blind.page import calibration_figure, confusion_figure
-from tunnel_lab.experiments.blind.score import Score, smooth_calibration
+from tunnel_lab.experiments.blind.score_page import calibration_figure, confusion_figure
+from tunnel_lab.experiments.blind.set_score import BlindScore, smooth_calibration
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 
@@ -68,7 +68,7 @@ def test_an_undecided_answer_states_no_set_and_may_cover_the_true_one():
 
 
 def test_kinds_go_up_to_four():
-    exact = Score(CASES, (), "", "", {}, False).exact()
+    exact = BlindScore(CASES, (), "", "", {}, False).exact()
     assert (exact["three"], exact["four"]) == (Proportion(1, 3), Proportion(0, 1))
 
 
@@ -136,7 +136,7 @@ ANSWERED = tuple(
 
 
 def test_the_calibration_of_the_answers_is_drawn_in_bins_with_wilsons_intervals():
-    score = Score(ANSWERED, (), "", "", {}, False)
+    score = BlindScore(ANSWERED, (), "", "", {}, False)
     (axes,) = calibration_figure(score).axes
     (container,) = axes.containers
     line, _, (bars,) = container.lines
@@ -149,7 +149,7 @@ def test_the_calibration_of_the_answers_is_drawn_in_bins_with_wilsons_intervals(
 
 
 def test_the_confusion_is_drawn_as_counted():
-    score = Score((*ANSWERED, CASES[0], CASES[6]), (), "", "", {}, False)
+    score = BlindScore((*ANSWERED, CASES[0], CASES[6]), (), "", "", {}, False)
     (axes,) = confusion_figure(score).axes
     names = ["free play  1", "mains hum  2", "two or more  3", "none  4"]
     assert [label.get_text() for label in axes.get_yticklabels()] == names
@@ -165,7 +165,7 @@ def test_the_confusion_is_drawn_as_counted():
 
 def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
     cases = tuple(made(["free_play"], ["free_play"], inclusion={"free_play": 0.9}) for _ in range(5))
-    score = Score(cases, (), "", "", {}, False)
+    score = BlindScore(cases, (), "", "", {}, False)
     page = blind.markdown(score, "set", ("inclusion.png", "confusion.png"))
     assert "## Calibration of inclusion" in page
     assert page.index("](inclusion.png)") < page.index("](confusion.png)")
@@ -173,4 +173,4 @@ def test_the_page_and_the_figure_show_the_calibration_of_inclusion():
     title = calibration_figure(score).axes[1].get_title("left")
     assert title == f"5 effects: smooth calibration error {score.inclusion().error:.3f}"
     assert score.to_json_dict()["inclusion_calibration"]["statements"] == 5
-    assert "Calibration of inclusion" not in blind.markdown(Score(CASES, (), "", "", {}, False), "set")
+    assert "Calibration of inclusion" not in blind.markdown(BlindScore(CASES, (), "", "", {}, False), "set")

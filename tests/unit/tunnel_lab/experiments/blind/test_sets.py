@@ -14,7 +14,7 @@ import pytest
 from identification.statistics import Proportion
 from tests.reference.rigs import rig
 from tests.support.gone_reader import unheard
-from tests.unit.tunnel_lab.experiments.blind.test_score import document
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
 from tunnel_lab.cli import main
 from tunnel_lab.experiments.blind import answer_set, answers_folder, make_blind, score_set, sets
 from tunnel_lab.experiments.blind import answers as answer

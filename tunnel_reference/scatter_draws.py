@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_reference.catalogue import Group
-from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.true_conditions import Array, TrueConditions
 
 USUAL: Mapping[str, float] = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
 """Usual standard deviations between runs, relative."""
@@ -143,7 +143,7 @@ def draw_scatter(
     return ScatterDraw(of, form, widths, FORMS[form][1](rng, widths, runs), known)
 
 
-def scattered(conditions: Conditions, drawn: ScatterDraw | None) -> Conditions:
+def scattered(conditions: TrueConditions, drawn: ScatterDraw | None) -> TrueConditions:
     """The conditions of a campaign whose runs differ; unchanged without scatter."""
     if drawn is None:
         return conditions

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.vocabulary.dimensions import angle_power, beside, dimension, in_si
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.units import angle_power, beside, dimension, in_si
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Chance differences between runs in a fit: their widths, their cost and their gain in likelihood.
 
 A run's other parameters, such as its release, are projected out run by run, and the deviations of the runs
-are integrated out (`identification.campaign.between_runs`).
+are integrated out (`identification.campaign.random_effects`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from identification.campaign.between_runs import (
+from identification.campaign.random_effects import (
     Marginal,
     RunProducts,
     UsualWidths,
@@ -50,7 +50,7 @@ def width_prior(problem: Problem) -> WidthPrior:
 
 
 @dataclass(frozen=True, eq=False)
-class RunColumns:
+class ScatterColumns:
     """The columns of a fit with chance differences between runs, the run's other parameters projected out.
 
     Args:
@@ -68,7 +68,7 @@ class RunColumns:
     @classmethod
     def of(
         cls, problem: Problem, point: Point, residuals: list[Array], jacobian: list[tuple[Array, Array]]
-    ) -> RunColumns:
+    ) -> ScatterColumns:
         """The columns at a point.
 
         Args:
@@ -93,7 +93,7 @@ class RunColumns:
         """Their products."""
         return RunProducts.of(self.deviations, self.common, self.seen)
 
-    def with_column(self, change: Sequence[Array]) -> tuple[RunColumns, float]:
+    def with_column(self, change: Sequence[Array]) -> tuple[ScatterColumns, float]:
         """Add a common column; also returns its norm, by which it is scaled.
 
         Args:
@@ -103,14 +103,14 @@ class RunColumns:
         column = _inside(self.deviations, column)
         size = float(np.sqrt(sum(float(one @ one) for one in column))) or 1.0
         common = [np.column_stack([c, one / size]) for c, one in zip(self.common, column, strict=True)]
-        return RunColumns(self.bases, self.deviations, common, self.seen), size
+        return ScatterColumns(self.bases, self.deviations, common, self.seen), size
 
     def left(self, found: Marginal) -> list[Array]:
         """Residuals at the likeliest parameters and deviations by linear theory, by run, shape (n,)."""
         rows = zip(self.seen, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
-    def with_drift(self, place: int, along: PerRun | None = None) -> tuple[RunColumns, float]:
+    def with_drift(self, place: int, along: PerRun | None = None) -> tuple[ScatterColumns, float]:
         """Add a drift of one parameter, whose deviation is proportional to a run's place in the campaign.
 
         Args:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.blocks import Block, Figure, Heading, Paragraph, Table, as_markdown
-from tunnel_lab.experiments.view import View
+from identification.blocks import Block, Figure, Heading, Paragraph, TextTable, as_markdown
+from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 from tunnel_sim.vocabulary.errors import counted
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from identification.statistics import Proportion
-    from tunnel_lab.experiments.blind import Score
+    from tunnel_lab.experiments.blind import BlindScore
 
 
 CALIBRATION = "Calibration"
@@ -45,7 +45,7 @@ _DARK = 0.55  # share of the colour above which white text is legible
 
 
 @dataclass(frozen=True)
-class ScoreSection(Table):
+class ScoreSection(TextTable):
     """A table with a line below it.
 
     Args:
@@ -55,7 +55,7 @@ class ScoreSection(Table):
     note: str = ""
 
 
-def sections(score: Score) -> list[ScoreSection]:
+def sections(score: BlindScore) -> list[ScoreSection]:
     """The sections of a score, in order; those without rows are left out."""
     return [one for one in (*_answer_sections(score), *_other_sections(score)) if one.rows]
 
@@ -66,7 +66,7 @@ def _section(
     return ScoreSection(title, headings, tuple(rows), headings[1:-1], note=note)
 
 
-def _answer_sections(score: Score) -> list[ScoreSection]:
+def _answer_sections(score: BlindScore) -> list[ScoreSection]:
     """Correctness of the answers, and calibration of their probabilities."""
     alarms = {
         "a cause named where none acts": score.false_alarms(),
@@ -139,7 +139,7 @@ _OF_SCATTER = {
 }
 
 
-def _scatter_sections(score: Score) -> list[ScoreSection]:
+def _scatter_sections(score: BlindScore) -> list[ScoreSection]:
     """Findings on the scatter between runs; empty where there are none."""
     scatter = score.scatter()
     if scatter is None:
@@ -175,7 +175,7 @@ def _scatter_sections(score: Score) -> list[ScoreSection]:
     ]
 
 
-def _other_sections(score: Score) -> list[ScoreSection]:
+def _other_sections(score: BlindScore) -> list[ScoreSection]:
     """The explained parts of the gaps, the coefficients, the answers by truth, and the time taken."""
     closed, median, low = score.closure()
     pairs, (middle, high, longest) = score.pairs(), score.seconds()
@@ -239,15 +239,15 @@ def _other_sections(score: Score) -> list[ScoreSection]:
     ]
 
 
-def blind_view(score: Score) -> View:
+def blind_view(score: BlindScore) -> ExperimentView:
     """The view of a score, each table with its note."""
     blocks: list[Block] = [Paragraph(line) for line in origin_lines(score)]
     for section in sections(score):
         blocks += [section, Paragraph(section.note)]
-    return View("Blind check", blocks)
+    return ExperimentView("Blind check", blocks)
 
 
-def origin_lines(score: Score) -> list[str]:
+def origin_lines(score: BlindScore) -> list[str]:
     """The scored set, and its sealing hashes."""
     lines = [counted(len(score.cases), "campaign")]
     if score.excluded:
@@ -260,7 +260,7 @@ def origin_lines(score: Score) -> list[str]:
     return lines
 
 
-def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> str:
+def markdown(score: BlindScore, folder: str, figures: Sequence[str] = ("", "")) -> str:
     """The page in Markdown, with all tables and the full confusion matrix.
 
     Args:
@@ -307,7 +307,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         Heading("Confusion matrix"),
         Paragraph("True causes in rows, answers in columns; `two or more` counts any set of effects."),
         *([Figure(figures[1], "Answers in columns by true causes in rows")] if figures[1] else []),
-        Table("", ("truth", "", *numbers.values()), cells, ("", *numbers.values())),
+        TextTable("", ("truth", "", *numbers.values()), cells, ("", *numbers.values())),
         Paragraph(f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}."),
     ]
     return "\n".join(head) + "\n\n" + as_markdown(blocks)
@@ -330,7 +330,7 @@ Causes are counted without that scatter, which has a table of its own.
 """
 
 
-def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
+def confusion(score: BlindScore) -> tuple[list[str], list[str], NDArray[np.int_]]:
     """True causes in rows, answers in columns, and the counts, shape (rows, columns)."""
     by_truth = score.confusion()
     names = sorted({*by_truth, *(name for row in by_truth.values() for name in row)}, key=_order)
@@ -362,7 +362,7 @@ def _share(share: Proportion) -> tuple[str, str, str, str]:
 
 
 @styled
-def calibration_figure(score: Score) -> Drawing:
+def calibration_figure(score: BlindScore) -> Drawing:
     """The share of correct statements against their stated probability.
 
     One panel shows the answers, in bins with Wilson's intervals of 95 %. Another shows the probabilities of each
@@ -406,7 +406,7 @@ def calibration_figure(score: Score) -> Drawing:
 
 
 @styled
-def confusion_figure(score: Score) -> Drawing:
+def confusion_figure(score: BlindScore) -> Drawing:
     """The answers by true causes: truths in rows and answers in columns, numbered alike.
 
     The colour is the share of the row and the number a count. Correct answers are on the diagonal, in blue.

@@ -17,7 +17,7 @@ RESOLUTION = 2.0 * np.pi / 3.0 / 4096.0
 
 
 @dataclass(frozen=True)
-class Rod:
+class TwistingRod:
     """A rod that twists between its upper end, with spring and sensor, and the body below.
 
     Args:
@@ -36,7 +36,7 @@ class Rod:
 
 
 @dataclass(frozen=True)
-class Actuator:
+class Actuation:
     """Limits and lags between the input as written and the moment on the body.
 
     Args:
@@ -53,7 +53,7 @@ class Actuator:
 
 
 @dataclass(frozen=True, eq=False)
-class Input:
+class DrivenInput:
     """The input of a campaign's runs; zero in its free decays.
 
     Args:
@@ -75,7 +75,7 @@ class Input:
     gain: float = 1.0
     stated: bool = False
     delay: Array = field(default_factory=lambda: np.zeros(1))
-    actuator: Actuator | None = None
+    actuator: Actuation | None = None
 
     @property
     def driven(self) -> NDArray[np.bool_]:
@@ -94,7 +94,7 @@ class Input:
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class TrueConditions:
     """One campaign's runs and truth; arrays have shape (runs,).
 
     Args:
@@ -156,7 +156,7 @@ class Conditions:
     sample_rate: float = 1000.0
     stiffness_scale: Array = field(default_factory=lambda: np.ones(1))
     speed_offset: Array = field(default_factory=lambda: np.zeros(1))
-    rod: Rod | None = None
+    rod: TwistingRod | None = None
     noise_corner: float = 10.0
     coloured_share: float = 0.0
     clock_jitter: float = 0.0
@@ -164,7 +164,7 @@ class Conditions:
     stamp_step: float = 0.0
     time_scale: float = 1.0
     moment_scale: float = 1.0
-    drive: Input | None = None
+    drive: DrivenInput | None = None
     start_rate: Array = field(default_factory=lambda: np.zeros(1))
     noise_scale: Array = field(default_factory=lambda: np.ones(1))
     noise_tails: float = 0.0

@@ -8,7 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Actuator, Array, Conditions, Input
+from tunnel_reference.true_conditions import (
+    FRONTAL_AREA,
+    REFERENCE_LENGTH,
+    Actuation,
+    Array,
+    DrivenInput,
+    TrueConditions,
+)
 
 _MIXED = 0.3  # probability of free decays among driven runs
 _FREE = 0.4  # share of free decays in that case
@@ -19,7 +26,7 @@ _FINER = 8  # samples of an actuator's moment for each one of the input
 WAVEFORMS = ("multisine", "chirp", "square", "random")
 
 
-def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True) -> Conditions:
+def draw_inputs(rng: np.random.Generator, c: TrueConditions, *, by_root: bool = True) -> TrueConditions:
     """Drive all runs of a campaign, or some.
 
     Args:
@@ -66,7 +73,7 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
         waves.append(np.asarray(wave))
     held = np.full(c.runs, rng.random() < 0.5)
     peak = np.where(driven, c.release_angle * rng.uniform(0.5, 1.0, c.runs), 0.0)
-    unit = Input(column, np.stack(waves, axis=1), held, peak, gain, bool(rng.random() < 0.5))
+    unit = DrivenInput(column, np.stack(waves, axis=1), held, peak, gain, bool(rng.random() < 0.5))
     parameters = np.array([c.yaw_inertia, c.mechanical_damping, c.cn_beta, c.cn_r])
     reached = np.max(np.abs(linear_response(replace(c, drive=unit), parameters)), axis=1)
     start = peak * rng.uniform(-0.3, 0.3, c.runs)
@@ -78,7 +85,7 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
     )
 
 
-def linear_response(c: Conditions, parameters: Array) -> Array:
+def linear_response(c: TrueConditions, parameters: Array) -> Array:
     """The nominal rig's response to its input from rest at zero, exact for both holds.
 
     Args:
@@ -99,7 +106,7 @@ def linear_response(c: Conditions, parameters: Array) -> Array:
     return np.asarray(out * (c.drive.gain * per / inertia)[:, None])
 
 
-def oscillator_response(c: Conditions, pole: np.ndarray) -> Array:
+def oscillator_response(c: TrueConditions, pole: np.ndarray) -> Array:
     """The response of q̈ − 2 Re λ q̇ + |λ|² q = u from rest to the input as written, exact for both holds.
 
     Args:
@@ -138,7 +145,7 @@ def finer(values: Array, held: NDArray[np.bool_]) -> Array:
 
 
 def exerted(
-    asked: Array, actuator: Actuator, step: float, held: NDArray[np.bool_]
+    asked: Array, actuator: Actuation, step: float, held: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_]]:
     """The moment of an actuator that starts at the first demand.
 
@@ -187,7 +194,7 @@ class Inputs:
     rate: float
 
     @classmethod
-    def of(cls, conditions: Sequence[Conditions]) -> Inputs | None:
+    def of(cls, conditions: Sequence[TrueConditions]) -> Inputs | None:
         """The inputs of these campaigns, zero in free decays; None if no run is driven."""
         if all(c.drive is None for c in conditions):
             return None

@@ -8,11 +8,11 @@ import pytest
 
 from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
-from tests.unit.tunnel_lab.experiments.blind.test_score import TRUTH, document
-from tunnel_lab.experiments.blind import page as blind
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import TRUTH, document
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
-from tunnel_lab.experiments.blind.scatter import scatter_score
-from tunnel_lab.experiments.blind.score import Score
+from tunnel_lab.experiments.blind.scatter_score import scatter_score
+from tunnel_lab.experiments.blind.set_score import BlindScore
 
 SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
@@ -102,7 +102,7 @@ def test_the_causes_are_counted_without_scatter():
 
 
 def test_scatter_has_tables_and_figures_of_its_own():
-    score = Score(CASES, (), "k", "a", {}, True)
+    score = BlindScore(CASES, (), "k", "a", {}, True)
     titles = [section.title for section in blind.sections(score)]
     assert {"Scatter between runs", "Widths of the scatter"} <= set(titles)
     page = blind.markdown(score, "set")
@@ -114,7 +114,7 @@ def test_scatter_has_tables_and_figures_of_its_own():
 
 
 def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
-    score = Score((made([], []), made(["free_play"], ["free_play"])), (), "k", "a", {}, True)
+    score = BlindScore((made([], []), made(["free_play"], ["free_play"])), (), "k", "a", {}, True)
     assert score.scatter() is None
     assert "catter" not in blind.markdown(score, "set").replace("runs that repeat", "")
     assert score.to_json_dict()["scatter"] is None
@@ -136,9 +136,11 @@ def test_a_malformed_scatter_is_refused(said):
 
 def test_where_no_width_is_asked_for_none_are_shown():
     drifting = made([], ["unknown"], widths=SPEED, form="drifting")  # another form counts for the causes only
-    titles = [one.title for one in blind.sections(Score((drifting, made([], [])), (), "k", "a", {}, True))]
+    titles = [
+        one.title for one in blind.sections(BlindScore((drifting, made([], [])), (), "k", "a", {}, True))
+    ]
     assert "Scatter between runs" in titles
     assert "Widths of the scatter" not in titles
-    every = blind.sections(Score(CASES, (), "k", "a", {}, True))
+    every = blind.sections(BlindScore(CASES, (), "k", "a", {}, True))
     (widths,) = (one for one in every if one.title == "Widths of the scatter")
     assert [row[0] for row in widths.rows] == ["wind speed", "spring stiffness", "mechanical damping", "all"]

@@ -1,7 +1,8 @@
 """A sweep from end to end against the bare simulation of its runs, processes against threads, and memory.
 
-Run as ``python -m benchmarks.sweep``; see README.md beside it. Every sweep runs in a separate process, including
-its start. The bare rate is for ``mujoco.batch`` stepping the same runs without recording, on as many threads.
+Run as ``python -m benchmarks.sweep_cost``; see README.md beside it. Every sweep runs in a separate process,
+including its start. The bare rate is for ``mujoco.batch`` stepping the same runs without
+recording, on as many threads.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
 def apart(*words: str | int | Path) -> dict[str, float]:
     """One measurement in a separate process."""
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.sweep", *map(str, words)],
+        [sys.executable, "-m", "benchmarks.sweep_cost", *map(str, words)],
         stdout=subprocess.PIPE,
         text=True,
         check=True,
@@ -183,7 +184,9 @@ def grow(folder: Path, options: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.sweep", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.sweep_cost", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--small", type=int, default=400, help="runs of each sweep that is compared in turn")
     parser.add_argument("--turns", type=int, default=3, help="turns")
     parser.add_argument("--large", type=int, default=10_000, help="runs of the largest sweep")

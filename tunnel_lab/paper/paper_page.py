@@ -36,7 +36,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
+class PaperSection:
     """A table or figure of the paper and our result: theirs and ours in a line each."""
 
     __pydantic_config__ = _STRICT
@@ -72,7 +72,7 @@ def scaled(quantity: Quantity | None, factor: float) -> Quantity | None:
     return None if quantity is None else Quantity(factor * quantity.value, factor * quantity.known_std, "")
 
 
-Part = Callable[[Path], Section]
+Part = Callable[[Path], PaperSection]
 """Computes a part, with its pictures in a folder."""
 
 
@@ -82,7 +82,7 @@ def write_paper(
     names: Sequence[str],
     *,
     progress: Callable[[int, int, str], None] = lambda *_: None,
-) -> tuple[Path, dict[str, Section]]:
+) -> tuple[Path, dict[str, PaperSection]]:
     """Compute the missing parts, and write the page.
 
     Args:
@@ -97,14 +97,14 @@ def write_paper(
     kept = output_folder(output_folder(folder) / _PARTS)
     for place in (folder, kept):
         clear_leftovers(place)
-    sections: dict[str, Section] = {}
+    sections: dict[str, PaperSection] = {}
     for name, part in parts.items():
         path = kept / f"{name}.json"
         section = None
         document = read_json(path, remedy=_REMEDY) if path.exists() else {}
         if document.get("version") == version(_PACKAGE):
             try:
-                section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
+                section = TypeAdapter(PaperSection).validate_json(json.dumps(document.get("section")))
             except ValidationError as error:
                 what = f"is not a part of the page ({error.errors()[0]['msg']})"
                 raise TunnelError(what, where=str(path), remedy=_REMEDY) from None
@@ -121,7 +121,7 @@ def write_paper(
     return page, sections
 
 
-def render(sections: Mapping[str, Section]) -> str:
+def render(sections: Mapping[str, PaperSection]) -> str:
     """The page as HTML, with its pictures in the same folder."""
     from jinja2 import Environment, StrictUndefined
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import chi2
 
 from identification import identify
-from identification.campaign.between_runs import UsualWidths
-from identification.campaign.repeatability import ratio_limit
+from identification.campaign.random_effects import UsualWidths
+from identification.campaign.run_scatter import ratio_limit
 from identification.estimate import Estimate
 from identification.printing import repeatability_lines
 from identification.statistics import student_factor

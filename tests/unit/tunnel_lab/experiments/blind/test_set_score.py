@@ -7,26 +7,32 @@ import math
 
 import numpy as np
 import pytest
-from diagnosis.facts import closure
 
-from diagnosis import result
+from diagnosis import Diagnosis, Settings
 from diagnosis.answer.held_out import ON_RUNS
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.decision import Predictions, decision
+from diagnosis.where.described import Where
+from identification.estimate import Quantity
 from identification.statistics import Proportion
-from tunnel_lab.experiments.blind import page as blind
+from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case
-from tunnel_lab.experiments.blind.score import Score, calibration
+from tunnel_lab.experiments.blind.set_score import BlindScore, calibration
 
 
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
     """A diagnosis with given causes, as its JSON."""
     name = " + ".join(causes) or "none"
-    values = {k: result.Quantity(v, s, "1/rad") for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)}
-    return result.Diagnosis(
+    values = {k: Quantity(v, s, "1/rad") for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)}
+    return Diagnosis(
         "c", tuple(causes),
-        result.GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
-        result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        result.Coefficients(values, values), closure.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
-        closure.NoiseSummary(5e-4, None, "estimated", ""),
+        GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
+        Where(None, None), (Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
+        Coefficients(values, values), Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        NoiseSummary(5e-4, None, "estimated", ""),
+        decision([(name, probability)], Settings().answer, Predictions(held_out=closed)),
     ).to_json_dict()  # fmt: skip
 
 
@@ -51,7 +57,7 @@ def score():
         case(f"c{i}", {**TRUTH, "effects": truth}, document(said, probability=p))
         for i, (truth, said, p) in enumerate(SAID)
     )
-    return Score(cases, (), "k", "a", {}, True)
+    return BlindScore(cases, (), "k", "a", {}, True)
 
 
 def test_counts_are_those_made_by_hand(score):
@@ -106,7 +112,7 @@ def test_errors_of_coefficients_are_in_standard_deviations():
     beta, rate = one.error("cn_beta", "after"), one.error("cn_r", "before")
     assert (beta.stds, beta.share) == pytest.approx((2.5, 0.0025 / 0.45))
     assert (rate.stds, rate.share) == pytest.approx((-4.0, -0.004 / 0.12))
-    found = {(e.group, e.name, e.when): e for e in Score((one,), (), "", "", {}, False).coefficients()}
+    found = {(e.group, e.name, e.when): e for e in BlindScore((one,), (), "", "", {}, False).coefficients()}
     assert found["named rightly", "cn_beta", "after"].covered == Proportion(0, 1)
     assert found["named rightly", "cn_beta", "after"].spread == pytest.approx(2.5)
     said["coefficients"]["after"]["cn_beta"]["interval"] = [0.4499, 0.46]
@@ -156,7 +162,7 @@ def test_times_are_on_the_page_where_they_are_known(score):
     timed = tuple(
         case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
     )
-    (found,) = [s for s in blind.sections(Score(timed, (), "", "", {}, False)) if s.title == title]
+    (found,) = [s for s in blind.sections(BlindScore(timed, (), "", "", {}, False)) if s.title == title]
     assert found.rows == (("6.0", "10.0", "11.0"),)
 
 

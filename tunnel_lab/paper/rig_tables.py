@@ -16,7 +16,7 @@ from identification.datasets import SpringRow, paper_springs
 from identification.printing import concise, with_std
 from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan
-from tunnel_lab.paper.page import Picture, Section, scaled, signed
+from tunnel_lab.paper.paper_page import PaperSection, Picture, scaled, signed
 from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -38,7 +38,7 @@ _PRINTED_ZETA = 0.1
 LN2 = log(2.0)
 
 
-def table_1(_: Path) -> Section:
+def table_1(_: Path) -> PaperSection:
     """The model's sizes."""
     rig = load_rig()
     rows = [
@@ -46,7 +46,7 @@ def table_1(_: Path) -> Section:
         for name, unit, theirs in TABLE_I
     ]
     rows.append(("yaw inertia Izz", "kg m²", f"{TABLE_I_INERTIA:g}", f"{rig.dynamics.yaw_inertia:g}"))
-    return Section(
+    return PaperSection(
         title="Table I",
         about="sizes of the model",
         theirs="Izz 0.11 kg m²",
@@ -63,7 +63,7 @@ def table_1(_: Path) -> Section:
     )
 
 
-def table_2(folder: Path) -> Section:
+def table_2(folder: Path) -> PaperSection:
     """Springs, frequencies and the inertia; ours from wind-off runs of the virtual rig."""
     from tunnel_sim import simulate_campaign
 
@@ -98,7 +98,7 @@ def table_2(folder: Path) -> Section:
     )  # fmt: skip
     save_both(springs_figure(springs, theirs, TABLE_I_INERTIA), folder / "springs.png")
     odd = ", ".join(str(spring.number) for spring, flag in zip(springs, theirs.flagged, strict=True) if flag)
-    return Section(
+    return PaperSection(
         title="Table II",
         about="springs and wind-off frequencies; the inertia (eq. 1)",
         theirs=f"gradient {with_std(theirs.inertia.value, theirs.inertia.std)} kg m²; Table I says 0.11",
@@ -127,7 +127,7 @@ def table_2(folder: Path) -> Section:
     )
 
 
-def equations(_: Path) -> Section:
+def equations(_: Path) -> PaperSection:
     """The slips of the printed equations, and their results where the truth is known."""
     known = known_run()
     beta = known.cn_beta_of(eq7(known.on, known.off))
@@ -147,7 +147,7 @@ def equations(_: Path) -> Section:
         ("12", "2ζωn in the denominator", "2ζωn s", undamped),
         ("16", "2ζωn in the denominator", "2ζωn s in the denominator; the numerator is right", undamped),
     )  # fmt: skip
-    return Section(
+    return PaperSection(
         title="Equations 6 to 18",
         about="slips of the printed equations",
         theirs="eqs 8, 9, 12 and 16 and the text after eq. 6 as printed",
@@ -165,7 +165,7 @@ def equations(_: Path) -> Section:
     )
 
 
-def figure_1(folder: Path) -> Section:
+def figure_1(folder: Path) -> PaperSection:
     """The rig."""
     from tunnel_lab.show.film import Look, Request, write_film
 
@@ -178,7 +178,7 @@ def figure_1(folder: Path) -> Section:
         )
     except TunnelError as error:
         words += f" It could not be drawn here: {error}."
-    return Section(
+    return PaperSection(
         title="Fig. 1",
         about="the model in the working section",
         theirs="a photograph",
@@ -189,10 +189,10 @@ def figure_1(folder: Path) -> Section:
     )
 
 
-def figure_2(folder: Path) -> Section:
+def figure_2(folder: Path) -> PaperSection:
     """Impulse responses."""
     save_both(impulse_figure(), folder / "impulse.png")
-    return Section(
+    return PaperSection(
         title="Fig. 2",
         about="impulse response over ωn t, and the three cycles that the first network gets",
         theirs="one curve",

@@ -13,8 +13,16 @@ from scipy.optimize import brentq
 from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.answers import answers_folder
-from tunnel_lab.experiments.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
-from tunnel_lab.experiments.blind.scatter import ScatterScore, scatter_score
+from tunnel_lab.experiments.blind.cases import (
+    NAMES,
+    Case,
+    CausesFound,
+    case,
+    found_by_group,
+    inclusions,
+    label,
+)
+from tunnel_lab.experiments.blind.scatter_score import ScatterScore, scatter_score
 from tunnel_lab.experiments.blind.sets import (
     KEY,
     SEAL,
@@ -191,7 +199,7 @@ class CoefficientErrors:
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class BlindScore:
     """The score of a set.
 
     Args:
@@ -267,7 +275,7 @@ class Score:
         known = [(p, right) for p, right in given if p is not None]
         return calibration([p for p, _ in known], [right for _, right in known])
 
-    def found(self) -> list[Found]:
+    def found(self) -> list[CausesFound]:
         """True causes found and false ones named, by number of causes and by circumstances."""
         return found_by_group(self.cases)
 
@@ -374,7 +382,7 @@ class Score:
 
 def score_set(
     folder: Path, *, excluded: Sequence[str] = (), key: Path | None = None, effects_file: Path | None = None
-) -> Score:
+) -> BlindScore:
     """Check a set and its answers against their hashes, open the key and combine them.
 
     A folder without a seal, but with ``truth.json`` in every campaign, is scored as an open set.
@@ -437,7 +445,7 @@ def score_set(
         where, remedy = shown(path), "answer the set again, or name the right key"
         with as_described("truth or answer is malformed", where, remedy):
             cases.append(case(path.name, truths[path.name], answers[path.name], excluded))
-    return Score(
+    return BlindScore(
         tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
     )
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.between_runs import RunColumns
-from identification.campaign.between_runs import WidthPrior
+from diagnosis.likelihood.scatter_widths import ScatterColumns
+from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.vocabulary.record import Array
 
 RUNS, SAMPLES, WIDTH = 12, 40, 3e-3
 PRIOR = WidthPrior(np.array([WIDTH]), np.array([0.5]), np.array([1e-3 * WIDTH]), np.array([20.0 * WIDTH]))
 
 
-def columns(accuracy: float, seed: int = 3, *, within: bool = False) -> RunColumns:
+def columns(accuracy: float, seed: int = 3, *, within: bool = False) -> ScatterColumns:
     """Runs with a deviation each and one common parameter, of unit noise.
 
     Args:
@@ -28,10 +28,10 @@ def columns(accuracy: float, seed: int = 3, *, within: bool = False) -> RunColum
     noise = rng.standard_normal((RUNS, SAMPLES))
     deviations = WIDTH * rng.standard_normal(RUNS)
     seen = [d[:, 0] * e + n for d, e, n in zip(own, deviations, noise, strict=True)]
-    return RunColumns([np.zeros((SAMPLES, 0))] * RUNS, own, common, seen)
+    return ScatterColumns([np.zeros((SAMPLES, 0))] * RUNS, own, common, seen)
 
 
-def cost(found: RunColumns, known: Array) -> float:
+def cost(found: ScatterColumns, known: Array) -> float:
     return found.likeliest(PRIOR).cost(known)
 
 
@@ -46,7 +46,7 @@ def test_what_a_set_knows_better_neither_costs_nor_pays() -> None:
 
 def test_runs_that_repeat_better_cost_less() -> None:
     rough, fine = columns(0.03 * WIDTH), columns(0.03 * WIDTH)
-    close = RunColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.seen])
+    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.seen])
     known = rough.products.own
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
@@ -79,7 +79,7 @@ def test_parameters_that_the_runs_do_not_determine_cost_nothing_when_given() -> 
     one = columns(0.03 * WIDTH)
     none = [np.zeros_like(part) for part in one.common]
     common = [np.hstack([part, part, zero]) for part, zero in zip(one.common, none, strict=True)]
-    found = RunColumns(one.bases, one.deviations, common, one.seen).likeliest(PRIOR)
+    found = ScatterColumns(one.bases, one.deviations, common, one.seen).likeliest(PRIOR)
     known, both = one.products.own, np.array([True, True, True])
     assert found.cost(known, both) == pytest.approx(
         one.likeliest(PRIOR).cost(known, np.array([True])), abs=0.5

@@ -14,9 +14,9 @@ from rich.cells import cell_len
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from identification.blocks import Table, as_markdown
+from identification.blocks import TextTable, as_markdown
+from tunnel_lab.terminal.arguments import TableFormat
 from tunnel_lab.terminal.encoding import printable_json
-from tunnel_lab.terminal.inputs import TableFormat
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 PROSE = 30
@@ -25,7 +25,7 @@ _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
-def rendered(table: Table, kind: TableFormat) -> str:
+def rendered(table: TextTable, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
     if kind is TableFormat.MD:
         return as_markdown([table])
@@ -53,7 +53,7 @@ def _on_one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def in_columns(table: Table) -> RichTable:
+def in_columns(table: TextTable) -> RichTable:
     """A table in columns, wide enough that only headings and sentences are wrapped."""
     result = RichTable(
         title=Text(table.title),
@@ -77,13 +77,13 @@ def in_columns(table: Table) -> RichTable:
     return result
 
 
-def is_too_wide(table: Table, width: int) -> bool:
+def is_too_wide(table: TextTable, width: int) -> bool:
     """Whether cells other than sentences, or words of a heading, would be broken at this width."""
     needed = sum(least + _PADDING for least in _least_widths(table))
     return needed + _BETWEEN * (len(table.columns) - 1) > width
 
 
-def _least_widths(table: Table) -> list[int]:
+def _least_widths(table: TextTable) -> list[int]:
     """Least width of each column: the longest word of its heading, line of a cell or word of a sentence."""
     return [
         max(
@@ -103,7 +103,7 @@ def _unbroken(cell: str) -> list[str]:
     return cell.split() if is_prose else cell.splitlines()
 
 
-def stacked(table: Table, width: int) -> str:
+def stacked(table: TextTable, width: int) -> str:
     """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
 
     Sentences are wrapped to the width of the terminal; words are never broken.

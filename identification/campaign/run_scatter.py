@@ -5,7 +5,7 @@ With Ka ~ V² and Ca ~ V they change its decay rate a and its stiffness k, per u
 
     δk = Kr g e_K − 2 Ka g e_V,    2 δa = Cr g e_C + Ca g e_V.
 
-The deviations are integrated out (`identification.campaign.between_runs`). Stated widths are used unchanged.
+The deviations are integrated out (`identification.campaign.random_effects`). Stated widths are used unchanged.
 Otherwise the widths maximise restricted likelihood times prior, and they count only where a likelihood ratio
 shows scatter beyond the runs' noise. Zero is at the end of their range, so the ratio is at most a mixture of
 two χ² (Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472).
@@ -23,7 +23,8 @@ import numpy as np
 from scipy.special import chdtrc, chdtri, ndtri
 
 from identification import policy
-from identification.campaign.between_runs import (
+from identification.campaign.derivatives import Design
+from identification.campaign.random_effects import (
     Marginal,
     RunProducts,
     UsualWidths,
@@ -31,7 +32,6 @@ from identification.campaign.between_runs import (
     likeliest_widths,
     marginal,
 )
-from identification.campaign.derivatives import Design
 from identification.estimate import Quantity, RunScatter
 from identification.statistics import inverse, student_factor
 from tunnel_sim.vocabulary.between_runs import SCATTERED
@@ -139,7 +139,7 @@ class MeasuredRuns:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class ScatterFit:
     """Scatter between runs, and the common parameters of greatest likelihood under it.
 
     Args:
@@ -247,7 +247,7 @@ def scatter_between(
     measured: MeasuredRuns,
     start: Array,
     repeatability: Repeatability | None,
-) -> Scatter | None:
+) -> ScatterFit | None:
     """The scatter between runs; None where none is stated and the runs show none beyond their noise.
 
     Args:
@@ -281,7 +281,7 @@ def scatter_between(
     found = marginal(runs, widths)
     moves = [move[:, used] * widths for move in measured.moves]
     gains, noise = _gains(measured, moves, found)
-    return Scatter(
+    return ScatterFit(
         tuple(names[place] for place in kept),
         widths,
         _uncertainty(runs, widths, prior),

@@ -20,8 +20,8 @@ from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
 from tunnel_lab.experiments.blind.cases import Case, case, found_by_group, inclusions
-from tunnel_lab.experiments.blind.scatter import scatter_score
-from tunnel_lab.experiments.blind.score import calibration, smooth_calibration
+from tunnel_lab.experiments.blind.scatter_score import scatter_score
+from tunnel_lab.experiments.blind.set_score import calibration, smooth_calibration
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError

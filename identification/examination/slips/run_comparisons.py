@@ -11,7 +11,7 @@ from identification.examination.labels import (
     springs_renumbered,
 )
 from identification.examination.self_excited import growing_runs
-from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.status import Remark
 from tunnel_sim.files.rig_file import load_rig
 
@@ -20,7 +20,7 @@ from tunnel_sim.files.rig_file import load_rig
 class MotionGrows(StatementSlip):
     """Motion that grows with the wind off. Refused."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """As `growing_runs`."""
         return growing_runs(seen.swings)
 
@@ -29,7 +29,7 @@ class MotionGrows(StatementSlip):
 class LabelsExchanged(StatementSlip):
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """As `exchanged_labels`."""
         return exchanged_labels(seen.swings)
 
@@ -38,7 +38,7 @@ class LabelsExchanged(StatementSlip):
 class SpringsRenumbered(StatementSlip):
     """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """As `springs_renumbered`; not where the campaign states that its values are right."""
         if seen.campaign.sensor.plausible is False:
             return ()
@@ -49,7 +49,7 @@ class SpringsRenumbered(StatementSlip):
 class SpringOffTheLine(StatementSlip):
     """A spring that, according to the others, is not as stiff as stated. Noted."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """As `springs_off_the_line`."""
         return springs_off_the_line(seen.swings)
 
@@ -58,6 +58,6 @@ class SpringOffTheLine(StatementSlip):
 class InertiaOffTheSprings(StatementSlip):
     """A stated inertia that the springs contradict. Noted."""
 
-    def find(self, seen: Seen) -> tuple[Remark, ...]:
+    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """As `inertia_off_the_springs`."""
         return inertia_off_the_springs(seen.swings, seen.campaign)
