@@ -20,8 +20,12 @@ else:
         __name__,
         {
             "._diagnose": "diagnose read_model vocabulary",
-            ".result": "Candidate Coefficients Diagnosis GapSummary RunGap Where",
+            ".findings.candidates": "Candidate",
+            ".findings.closure": "GapSummary RunGap",
+            ".findings.coefficients": "Coefficients",
+            ".result": "Diagnosis",
             ".settings": "Settings",
+            ".where.described": "Where",
         },
     )
 

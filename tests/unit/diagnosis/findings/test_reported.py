@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.answer import reported as module
+from diagnosis.findings import reported as module
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.findings.judgements import cautions
 from diagnosis.findings.reported import Comparison, compare, confirm, report_fits
