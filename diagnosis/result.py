@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import polars as pl
@@ -32,7 +32,7 @@ class Diagnosis(Findings):
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""
-        said = sentences(self.to_json_dict())
+        said = sentences(self)
         return replace(
             self,
             verdict=said.verdict,
@@ -46,17 +46,21 @@ class Diagnosis(Findings):
             model=self.model and replace(self.model, notes=said.patch),
         )
 
+    def with_hashes(self, hashes: Mapping[str, str]) -> Self:
+        """The answer with the SHA-256 of each file of its records, by name."""
+        return replace(self, provenance={**self.provenance, "sha256": dict(hashes)})
+
     def __str__(self) -> str:
         """The verdict, short tables of the answers, gaps and coefficients, the caveats and the next steps."""
-        return as_text(printed(self.to_json_dict()))
+        return as_text(printed(self))
 
     def __repr__(self) -> str:
         """The answer, the gap, and the next step, in three lines."""
-        return diagnosis_brief(self.to_json_dict())
+        return diagnosis_brief(self)
 
     def _repr_html_(self) -> str:
         """The same as `__str__` for notebooks."""
-        return as_notebook(printed(self.to_json_dict()))
+        return as_notebook(printed(self))
 
     def plot(self, what: str = "fit", runs: Sequence[str] = ()) -> Figure:
         """Draw one figure of the report.
@@ -74,7 +78,7 @@ class Diagnosis(Findings):
         """
         from tunnel_lab.report import draw  # the one upward import (decision 0001); matplotlib is slow
 
-        return draw(self.to_json_dict(), what, runs)
+        return draw(self, what, runs)
 
     def write_report(self, path: Path | str, *, author: str = "", notes: str = "") -> Path:
         """Write the report, one HTML page, which replaces an older one.
@@ -91,7 +95,7 @@ class Diagnosis(Findings):
         if self.data is None:
             raise TunnelError("the answer does not hold its runs", remedy="diagnose the campaign again")
         today = datetime.now().astimezone().date().isoformat()
-        return write_report(self.to_json_dict(), self.data, Path(path), Byline(today, author, notes))
+        return write_report(self, self.data, Path(path), Byline(today, author, notes))
 
     def to_frame(self) -> pl.DataFrame:
         """The answer in one table: a row for each size of the gap, parameter and coefficient.

@@ -12,6 +12,7 @@ from typing import Any
 
 from identification.blocks import Block, Paragraph, TextTable
 from identification.status import SYSTEMATIC, Remark, Status
+from identification.trade_off import Combination, TradeOff
 from tunnel_sim.vocabulary.errors import counted
 
 SYMBOLS: Mapping[str, str] = {
@@ -225,7 +226,10 @@ def estimate_blocks(
 def notes(document: Document) -> list[str]:
     """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
     remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-    beside = [*repeatability_lines(document), *filter(None, [trade_off_line(document, SYMBOLS)])]
+    beside = [
+        *repeatability_lines(document),
+        *filter(None, [trade_off_line(TradeOff.from_json_dict(document["trade_off"]), SYMBOLS)]),
+    ]
     return [*beside, *(f"Note: {note}" for note in (*remarks, *status_lines(document)))]
 
 
@@ -238,38 +242,35 @@ BRACKETS = (
 """Stands below tables in the short notation."""
 
 
-def trade_off_line(document: Document, symbols: Mapping[str, str]) -> str:
+def trade_off_line(found: TradeOff | None, symbols: Mapping[str, str]) -> str:
     """The two parameters that the runs separate least, and the run that would; empty if there are none.
 
     Args:
-        document: of an estimate or a diagnosis.
         symbols: of the parameters, by name, where they have one.
     """
-    found = document.get("trade_off")
     if found is None:
         return ""
-    first, second = (_parameter_label(name, symbols) for name in found["parameters"])
-    return _together(found, second, symbols) + (
+    first, second = (_parameter_label(name, symbols) for name in found.parameters)
+    return _together(found.together, second, symbols) + (
         f"What trades off: {first} and {second} are poorly separable in these runs (correlation "
-        f"{_correlation(found['correlation'])}): {found['remedy']}."
+        f"{_correlation(found.correlation)}): {found.remedy}."
     )
 
 
-def _together(found: Document, second: str, symbols: Mapping[str, str]) -> str:
+def _together(given: Combination | None, second: str, symbols: Mapping[str, str]) -> str:
     """The combination of two parameters that the runs determine, and its split, in a sentence; else empty."""
-    given = found.get("together")
     if given is None:
         return ""
-    label = _parameter_label(given["quantity"], symbols)
-    whole = f"the whole damping ratio, {label}" if given["quantity"] == "zeta" else label
-    ends = given["of_second"]
+    label = _parameter_label(given.quantity, symbols)
+    whole = f"the whole damping ratio, {label}" if given.quantity == "zeta" else label
+    ends = given.of_second
     apart = max(ends[1] - ends[0], 1e-6 * abs(ends[1])) or 1.0
     digits = 2 + max(math.floor(math.log10(max(abs(ends[1]), apart) / apart)), 0)
     low, high = (significant(end, digits) for end in ends)
-    unit = "" if given["unit"] == "1" else f" {given['unit']}"
-    size = f"{with_std(given['value'], given['std'])}{unit}"
+    unit = "" if given.unit == "1" else f" {given.unit}"
+    size = f"{with_std(given.value, given.std)}{unit}"
     return (
-        f"What the runs determine: {whole} + {significant(given['factor'], 3)} × {second} = {size}; of it "
+        f"What the runs determine: {whole} + {significant(given.factor, 3)} × {second} = {size}; of it "
         f"{second} contributes {low} to {high}{unit}. "
     )
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,16 @@ class TradeOff:
     correlation: float
     remedy: str
     together: Combination | None = None
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any] | None) -> TradeOff | None:
+        """The value that a document holds; None where it has none."""
+        if data is None:
+            return None
+        first, second = data["parameters"]
+        given = data.get("together")
+        both = None if given is None else Combination(**{**given, "of_second": tuple(given["of_second"])})
+        return cls((first, second), data["correlation"], data["remedy"], both)
 
 
 @dataclass(frozen=True)

@@ -124,18 +124,18 @@ class Confirmation:
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, with units in their names."""
-        written = {_WITH_UNIT.get(name, name): value for name, value in vars(self).items()}
+        written = {WITH_UNIT.get(name, name): value for name, value in vars(self).items()}
         return {"model": "mujoco", **written}
 
     @from_json_fields
     @staticmethod
     def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
         """The fields, without units in their names."""
-        own = {written: name for name, written in _WITH_UNIT.items()}
+        own = {written: name for name, written in WITH_UNIT.items()}
         return {own.get(key, key): value for key, value in data.items()}
 
 
-_WITH_UNIT = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
+WITH_UNIT = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
 
 
 @dataclass(frozen=True)

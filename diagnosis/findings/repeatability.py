@@ -102,6 +102,12 @@ class RunRepeat:
     damping_band: float
     p_value: float
 
+    def deviation(self, name: str) -> tuple[float, float, float]:
+        """The deviation of ``frequency`` or ``damping``, its deviation by noise, and its scatter between runs."""
+        if name == "frequency":
+            return self.frequency, self.frequency_std, self.frequency_band
+        return self.damping, self.damping_std, self.damping_band
+
 
 @dataclass(frozen=True)
 class ScatterLimits:

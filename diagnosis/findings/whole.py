@@ -22,6 +22,8 @@ from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
 from diagnosis.search.disturbance import Disturbance
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from diagnosis.where.described import Where
 from identification.status import Remark
 from identification.trade_off import TradeOff
@@ -99,6 +101,26 @@ class Findings:
     found: Found = field(default_factory=Found)
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
+    @property
+    def settings(self) -> Settings:
+        """The settings with which the diagnosis was made."""
+        return Settings().changed(self.provenance.get("settings", {}))
+
+    @property
+    def names_effects(self) -> bool:
+        """Whether the answer names effects: there is a gap, and its cause is not unknown."""
+        return self.causes not in ((), UNKNOWN)
+
+    @property
+    def figure_data(self) -> Mapping[str, Any]:
+        """The data of the figures, in JSON's types; empty for an answer without them."""
+        return self.maps or {}
+
+    @property
+    def rest_is_material(self) -> bool:
+        """Whether the remaining gap may move a coefficient."""
+        return self.rest is not None and self.rest.material
+
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
         return {
@@ -116,16 +138,23 @@ class Findings:
         }
 
     @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> Self:
+    def from_json_dict(
+        cls,
+        data: Mapping[str, Any],
+        *,
+        where: str = "the diagnosis as JSON",
+        remedy: str = "write it again with tunnel diagnose --json",
+    ) -> Self:
         """The inverse of `to_json_dict`.
 
         Args:
             data: the document; further keys are ignored.
+            where: it is from, in an error.
+            remedy: in an error.
 
         Raises:
             TunnelError: when it is not a diagnosis: a key is missing, or a value has the wrong type.
         """
-        where, remedy = "the diagnosis as JSON", "write it again with tunnel diagnose --json"
         check_shape(data, where, remedy)
         with as_described("is not a diagnosis", where, remedy):
             found = _adapter(cast(Any, cls)).validate_json(

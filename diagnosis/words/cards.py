@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+from diagnosis.findings.whole import Findings
+from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
 from diagnosis.words.numbers import (
@@ -30,7 +32,6 @@ from diagnosis.words.scatter import (
 )
 from diagnosis.words.verdict import size_words
 from identification.blocks import Card, Heading, Paragraph
-from identification.printing import Document
 from tunnel_sim.effects import known_effects
 
 WITHIN_THE_NOISE = "within the noise"
@@ -46,39 +47,39 @@ class KeyFigure:
     note: str = ""
 
 
-def key_figures(document: Document) -> list[KeyFigure]:
+def key_figures(answer: Findings) -> list[KeyFigure]:
     """The figures at the head of a page, each in the form in which the verdict states it."""
-    gap, causes = document["gap"], document["causes"]
-    decided = document.get("decided", True)
-    before, after = gap["excess_before"], gap["excess_after"]
+    gap, causes = answer.gap, answer.causes
+    decided = answer.decision.decided
+    before, after = gap.excess_before, gap.excess_after
     label = "Misfit of the nominal model"
     if causes:
-        shown = [_misfit_figure(document, label, before, times_noise(before))]
+        shown = [_misfit_figure(answer, label, before, times_noise(before))]
     else:
         shown = [KeyFigure(label, WITHIN_THE_NOISE, f"residual {beside_noise(before)}, root mean square")]
-    if causes and causes != ["unknown"]:
-        label = f"With {'the causes' if decided else f'the {set_out(document)}'} added"
-        if _calm(document):
+    if causes and causes != UNKNOWN:
+        label = f"With {'the causes' if decided else f'the {set_out(answer)}'} added"
+        if _calm(answer):
             shown.append(KeyFigure(label, WITHIN_THE_NOISE, left_over(after)))
         else:
-            shown.append(_misfit_figure(document, label, after, left_over(after)))
-        shown.append(KeyFigure("Share of the gap explained", share(gap["closed"]), gap["closed_on"]))
-    if document["candidates"]:
-        rivals = decided and document["ambiguous_with"]
-        whose = "likeliest of these sets" if rivals else set_out(document)
-        first = document["candidates"][0]["probability"]
+            shown.append(_misfit_figure(answer, label, after, left_over(after)))
+        shown.append(KeyFigure("Share of the gap explained", share(gap.closed), gap.closed_on))
+    if answer.candidates:
+        rivals = decided and answer.ambiguous_with
+        whose = "likeliest of these sets" if rivals else set_out(answer)
+        first = answer.candidates[0].probability
         shown.append(KeyFigure(f"Probability of the {whose}", probability(first)))
     return shown
 
 
-def _calm(document: Document) -> bool:
+def _calm(answer: Findings) -> bool:
     """Whether the residual gap is stated to be within the noise."""
-    return (document.get("rest") or {}).get("significant") is False
+    return answer.rest is not None and not answer.rest.significant
 
 
-def _misfit_figure(document: Document, label: str, value: float, powers: str) -> KeyFigure:
+def _misfit_figure(answer: Findings, label: str, value: float, powers: str) -> KeyFigure:
     """A gap in customary units, with its power."""
-    misfit = misfit_of(document)
+    misfit = misfit_of(answer)
     if misfit is None:
         return KeyFigure(label, powers)
     return KeyFigure(
@@ -86,52 +87,52 @@ def _misfit_figure(document: Document, label: str, value: float, powers: str) ->
     )
 
 
-def effect_cards(document: Document) -> list[Card]:
+def effect_cards(answer: Findings) -> list[Card]:
     """The vocabulary's description of every cause and its rivals."""
     known = {kind.name: kind for kind in known_effects()}
     return [
         Card(
             (
-                Heading(plain(name), acts_on(document, name)),
+                Heading(plain(name), acts_on(answer, name)),
                 Paragraph(f"{(known[name].__doc__ or '').splitlines()[0]} It adds: {known[name].equation}"),
                 Paragraph(known[name].signature),
                 *(Paragraph(reference, kind="small") for reference in known[name].references),
             )
         )
-        for name in [*document["causes"], *document["ambiguous_with"]]
+        for name in [*answer.causes, *answer.ambiguous_with]
         if name in known
     ]
 
 
-def cause_cards(document: Document) -> list[Card]:
+def cause_cards(answer: Findings) -> list[Card]:
     """Every cause of the answer with its size and its effects; the scatter between runs last."""
-    if document["causes"] in ([], ["unknown"]):
+    if not answer.names_effects:
         return []
-    answer = document["candidates"][0]
-    names = answer["effect"].split(" + ")
-    does = {size["effect"]: size_words(document, size) for size in document.get("sizes", ())}
-    steps = document.get("waterfall", ())
-    gaps = [misfit_shown(document, step["excess"]) for step in steps]
-    if steps and _calm(document):
+    first = answer.candidates[0]
+    names = first.effect.split(" + ")
+    does = {size.effect: size_words(answer, size) for size in answer.sizes}
+    steps = answer.waterfall.steps
+    gaps = [misfit_shown(answer, step.excess) for step in steps]
+    if steps and _calm(answer):
         gaps[-1] = WITHIN_THE_NOISE
     closes: dict[str, str] = {}
     for step, (before, after) in zip(steps[1:], pairwise(gaps), strict=True):
-        added = step["effect"].split(" + ")
+        added = str(step.effect).split(" + ")
         together = ", all together" if len(added) > 1 else ""
         closes |= dict.fromkeys(added, f"Its addition takes the misfit from {before} to {after}{together}.")
     cards = [
         _cause(
             plain(name),
-            acts_on(document, name),
-            said_size(document, answer, name),
+            acts_on(answer, name),
+            said_size(answer, first, name),
             does.get(name, ""),
             closes.get(name, ""),
         )
         for name in without_scatter(names)
     ]
     if scatter := scattering(names):
-        spreads = [one for one in spreads_of(document) if one["effect"] in scatter]
-        widths = "; ".join(f"{plain(SCATTERS[one['effect']])} {width_text(one)}" for one in spreads)
+        spreads = [one for one in spreads_of(answer) if one.effect in scatter]
+        widths = "; ".join(f"{plain(SCATTERS[one.effect])} {width_text(one)}" for one in spreads)
         cards.append(
             _cause(
                 BETWEEN_RUNS,

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
 
-from diagnosis.settings import settings_of
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.whole import Findings
+from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.numbers import for_people, listed, plain, probability
 from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
-from identification.printing import COEFFICIENTS, Document, estimated, significant, unit_mark
+from identification.estimate import Quantity
+from identification.printing import COEFFICIENTS, estimated, significant, unit_mark
 from tunnel_sim.effects import known_effects
 
 
-def known_and_open(document: Document, *, sized: bool = True) -> str:
+def known_and_open(answer: Findings, *, sized: bool = True) -> str:
     """The causes common to the likely answers, each with its probability, and the alternatives beside them.
 
     Args:
@@ -23,10 +26,10 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
         Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
         stated (59 %) or gravity stiffness (40 %)``.
     """
-    certain, alternatives = _parted(document, sized)
-    scatter = [BETWEEN_RUNS] if scattering(document["causes"]) else []
+    certain, alternatives = _parted(answer, sized)
+    scatter = [BETWEEN_RUNS] if scattering(answer.causes) else []
     known = (
-        listed([*(f"{plain(name)} ({_of(document, name)})" for name in certain), *scatter]) if certain else ""
+        listed([*(f"{plain(name)} ({_of(answer, name)})" for name in certain), *scatter]) if certain else ""
     )
     if known and len(alternatives) == 1:
         return known
@@ -38,166 +41,166 @@ def known_and_open(document: Document, *, sized: bool = True) -> str:
     return f"{known}, and {one_of}" if known else one_of
 
 
-def _parted(document: Document, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
+def _parted(answer: Findings, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
     """Effects common to all likely answers, and the further effects of each answer with its probability.
 
     Causes detected in the records before the fits are part of every answer.
     """
-    least = settings_of(document).answer.rivals_from
-    first, *others = document["candidates"]
-    causes = without_scatter(document["causes"])
-    named = {*document["causes"], *document["ambiguous_with"]}
-    read_off = [name for name in causes if name not in first["effect"].split(" + ")]
-    likely = [one for one in others if one["probability"] >= least and _effects(one) <= named]
+    least = answer.settings.answer.rivals_from
+    first, *others = answer.candidates
+    causes = without_scatter(answer.causes)
+    named = {*answer.causes, *answer.ambiguous_with}
+    read_off = [name for name in causes if name not in first.effect.split(" + ")]
+    likely = [one for one in others if one.probability >= least and _effects(one) <= named]
     sets = [(first, causes)]
     sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
     certain = [name for name in causes if all(name in names for _, names in sets)]
     alternatives = []
     for one, names in sets:
-        own = [_called(document, one, name, sized) for name in names if name not in certain]
-        alternatives.append((listed(own) if own else "nothing else", one["probability"]))
+        own = [_called(answer, one, name, sized) for name in names if name not in certain]
+        alternatives.append((listed(own) if own else "nothing else", one.probability))
     return certain, alternatives
 
 
-def _effects(answer: Mapping[str, Any]) -> set[str]:
-    return set(answer["effect"].split(" + "))
+def _effects(candidate: Candidate) -> set[str]:
+    return set(candidate.effect.split(" + "))
 
 
-def _called(document: Document, answer: Mapping[str, Any], name: str, sized: bool) -> str:
+def _called(answer: Findings, candidate: Candidate, name: str, sized: bool) -> str:
     """An effect by its name; a spring error by the spring and its relative error, which the name does not give."""
     kind = {kind.name: kind for kind in known_effects()}.get(name)
     if kind is None or not kind.chosen_spring():
         return plain(name)
-    if document["found"]["choices"]:
-        each = f", {_choices_of_spring(document)}" if sized else ""
-        return f"an error of one of the {_count_of_springs(document)} springs{each}"
-    return said_size(document, answer, name).partition(" (")[0] or plain(name)
+    if answer.found.choices:
+        each = f", {_choices_of_spring(answer)}" if sized else ""
+        return f"an error of one of the {_count_of_springs(answer)} springs{each}"
+    return said_size(answer, candidate, name).partition(" (")[0] or plain(name)
 
 
-def _of(document: Document, name: str) -> str:
+def _of(answer: Findings, name: str) -> str:
     """The probability that an effect is among the causes, in any combination."""
-    return probability(document.get("inclusion", {}).get(name, document["candidates"][0]["probability"]))
+    return probability(answer.inclusion.get(name, answer.candidates[0].probability))
 
 
-def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
+def said_size(answer: Findings, candidate: Candidate, name: str) -> str:
     """The size of an effect of an answer in words; empty for an effect without a phrase.
 
     Args:
-        answer: one of the candidates.
+        candidate: of the answer.
         name: of the effect.
     """
     kind = {kind.name: kind for kind in known_effects()}.get(name)
-    given = _parameters(answer, name)
+    given = _parameters(candidate, name)
     if kind is None or not given:
         return ""
-    if kind.chosen_spring() and document["found"]["choices"]:
-        return f"{one_of_springs(document)}, {_choices_of_spring(document)}"
-    values = {full: one["value"] for full, one in given.items()}
-    said = {info.unit: given[info.name]["unit"] for info in kind.parameters() if info.name in given}
+    if kind.chosen_spring() and answer.found.choices:
+        return f"{one_of_springs(answer)}, {_choices_of_spring(answer)}"
+    values = {full: one.value for full, one in given.items()}
+    said = {info.unit: given[info.name].unit for info in kind.parameters() if info.name in given}
 
     def text(value: float, std: float | None, unit: str) -> str:
         return for_people(
             value, std, said.get(unit, unit)
         )  # moments are per unit inertia where no inertia is stated
 
-    return kind.phrase(values, {full: one["std"] for full, one in given.items()}, text)
+    return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
 
 
-def hold_words(document: Document) -> str:
+def hold_words(answer: Findings) -> str:
     """Sentences on a delay of the input that may be a wrong hold between samples; empty where it may not."""
-    found = document["found"].get("hold")
+    found = answer.found.hold
     if found is None:
         return ""
     held = "keeps its value between samples, as a controller's command does"
     linear = "is linear between samples"
-    other, taken = (held, "linear") if found["taken"] == "linear" else (linear, "held")
-    why = "as the campaign states" if found["stated"] else "since drive_hold is not stated"
-    alike = "better" if found["better"] else "as well"
-    when = "later" if found["delay_s"] > 0.0 else "earlier"
-    delay = 1e3 * abs(found["delay_s"])
+    other, taken = (held, "linear") if found.taken == "linear" else (linear, "held")
+    why = "as the campaign states" if found.stated else "since drive_hold is not stated"
+    alike = "better" if found.better else "as well"
+    when = "later" if found.delay_s > 0.0 else "earlier"
+    delay = 1e3 * abs(found.delay_s)
     return (
         f"One cause has two interpretations. Either the input acts {delay:.3g} ms {when} than recorded, about half "
-        f"a sample ({1e3 * found['half_sample_s']:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
+        f"a sample ({1e3 * found.half_sample_s:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
         f"The second interpretation explains the records {alike}, without a delay."
     )
 
 
-def hold_step(document: Document) -> str:
+def hold_step(answer: Findings) -> str:
     """How to distinguish a delay of the input from a wrong hold, without a full stop; empty where not needed."""
-    found = document["found"].get("hold")
+    found = answer.found.hold
     if found is None:
         return ""
-    other, how = ("zero", "is held") if found["taken"] == "linear" else ("linear", "is linear")
+    other, how = ("zero", "is held") if found.taken == "linear" else ("linear", "is linear")
     return (
         f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
     )
 
 
-def one_of_springs(document: Document) -> str:
+def one_of_springs(answer: Findings) -> str:
     """The statement that one of several indistinguishable springs is off."""
-    return f"one of the {_count_of_springs(document)} springs is off"
+    return f"one of the {_count_of_springs(answer)} springs is off"
 
 
-def _count_of_springs(document: Document) -> str:
-    count = len(document["found"]["choices"])
+def _count_of_springs(answer: Findings) -> str:
+    count = len(answer.found.choices)
     return "two" if count == 2 else str(count)
 
 
-def _choices_of_spring(document: Document) -> str:
+def _choices_of_spring(answer: Findings) -> str:
     """The alternative errors of springs: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
     each = (
-        f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
-        for one in document["found"]["choices"]
+        f"{one.stiffness:.4g} N m/rad by {for_people(100.0 * one.error, 100.0 * one.std, '%')}"
+        for one in answer.found.choices
     )
     return " or ".join(each)
 
 
-def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:
+def _parameters(candidate: Candidate, name: str) -> dict[str, Quantity]:
     """The parameters of one effect of an answer, without the effect's name."""
-    alone = answer["effect"] == name
+    alone = candidate.effect == name
     return {
         full.rpartition(".")[2]: given
-        for full, given in answer["parameters"].items()
+        for full, given in candidate.parameters.items()
         if full.partition(".")[0] == name or (alone and "." not in full)
     }
 
 
-def advice(document: Document, name: str) -> str:
+def advice(answer: Findings, name: str) -> str:
     """What to do about a cause, with the values that it names, without a full stop."""
-    robot = bool(document["found"].get("robot"))
+    robot = bool(answer.found.robot)
     said = {kind.name: (robot and kind.advice_for_joint) or kind.advice for kind in known_effects()}.get(name)
     if not said:
         return f"Repair or model the cause of {plain(name)}"
-    values = _parameters(document["candidates"][0], name)
-    shown = {full: f"{one['value']:.4g} {unit_mark(one['unit'])}" for full, one in values.items()}
+    values = _parameters(answer.candidates[0], name)
+    shown = {full: f"{one.value:.4g} {unit_mark(one.unit)}" for full, one in values.items()}
     for full, text in shown.items():
         said = said.replace(f"{{{full}}}", text)
     return said
 
 
-def consequence(document: Document) -> str:
+def consequence(answer: Findings) -> str:
     """Change of the coefficients by the causes, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
 
     Empty where no coefficient is known before and after, or no cause is named.
     """
-    given, clauses = document["coefficients"], []
-    if not document["causes"] or document["causes"] == ["unknown"]:
+    given, clauses = answer.coefficients, []
+    if not answer.causes or answer.causes == UNKNOWN:
         return ""
-    phase = given.get("in_phase", {})
-    for name, one in given["before"].items():
-        two = {**given["after"], **phase}.get(name)
-        if two is None or not one["value"] or not all(g.get("determined", True) for g in (one, two)):
+    phase = given.in_phase
+    for name, one in given.before.items():
+        two = {**given.after, **phase}.get(name)
+        if two is None or not one.value or not (one.determined and two.determined):
             continue
         label = COEFFICIENTS.get(name, name)
-        if two["std"] is not None and two["std"] > _OPEN * abs(two["value"]):
+        if two.std is not None and two.std > _OPEN * abs(two.value):
             clauses.append(
-                f"{label} remains uncertain ({for_people(two['value'], two['std'], unit_mark(two['unit']))})"
+                f"{label} remains uncertain ({for_people(two.value, two.std, unit_mark(two.unit))})"
             )
             continue
-        label = f"the size of {label}" if one["value"] < 0.0 and two["value"] < 0.0 else label
-        share = 100.0 * (abs(two["value"]) / abs(one["value"]) - 1.0)
-        values = _apart(one["value"], two["value"])
-        if one["value"] * two["value"] < 0.0:
+        label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
+        share = 100.0 * (abs(two.value) / abs(one.value) - 1.0)
+        values = _apart(one.value, two.value)
+        if one.value * two.value < 0.0:
             clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
             clauses.append(f"{label} changes by less than 1 %")
@@ -210,12 +213,12 @@ def consequence(document: Document) -> str:
     return f"{first}{text[1:]}.{_of_the_rate(given) if phase else ''}"
 
 
-def _of_the_rate(given: Document) -> str:
+def _of_the_rate(given: Coefficients) -> str:
     """The two parts of Cnr in phase with the rate, in a sentence."""
-    name = next(name for name in given["in_phase"] if name.startswith("cn_r"))
-    whole, own = given["in_phase"][name], given["after"][name]
-    lag = _digits(whole["value"] - own["value"], 3)
-    both = (estimated({**one, "interval": None}).replace("-", "−") for one in (whole, own))
+    name = next(name for name in given.in_phase if name.startswith("cn_r"))
+    whole, own = given.in_phase[name], given.after[name]
+    lag = _digits(whole.value - own.value, 3)
+    both = (estimated(replace(one, interval=None).to_json_dict()).replace("-", "−") for one in (whole, own))
     return " Of Cnr in phase with the rate, {}, the lag contributes {lag} and the rate itself {}.".format(
         *both, lag=lag
     )

@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from diagnosis.findings.whole import Findings
+from diagnosis.model.fact import Fact, Noted
 from diagnosis.words.numbers import part, plain, reading_shown, share
-from identification.printing import Document
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 
@@ -248,36 +249,38 @@ class _Reading:
         return reading_shown(self.value, int(digits), self.unit)
 
 
-def said(sentences: Mapping[str, Sentence], given: Figures, unit: str = "rad") -> str:
+def said(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad") -> str:
     """The sentence of a fact of the document.
 
     Args:
         given: the fact; figures whose names end in ``_rad`` are readings.
         unit: of the readings: rad, rad/s or rad/s².
     """
-    sentence = sentences[given["kind"]]
-    shown = {name: _Reading(one, unit) if name.endswith("_rad") else one for name, one in given.items()}
+    sentence = sentences[given.kind]
+    shown = {
+        name: _Reading(one, unit) if name.endswith("_rad") else one for name, one in given.figures.items()
+    }
     if callable(sentence):
         return sentence(shown)
-    listed = {name: ", ".join(one) if isinstance(one, list) else one for name, one in shown.items()}
+    listed = {name: ", ".join(one) if isinstance(one, list | tuple) else one for name, one in shown.items()}
     return sentence.format(**listed)
 
 
-def remark(given: Figures, unit: str = "rad") -> Remark:
+def remark(given: Noted, unit: str = "rad") -> Remark:
     """The remark of a fact about the noise, as in `said`."""
-    what, remedy = REMARKS[given["kind"]]
-    return Remark(Outcome.NOTED, tuple(given["runs"]), said({given["kind"]: what}, given, unit), remedy)
+    what, remedy = REMARKS[given.fact.kind]
+    return Remark(Outcome.NOTED, given.runs, said({given.fact.kind: what}, given.fact, unit), remedy)
 
 
 _NO_DECAY = "no damping ratio and no derivative is stated, since no run is a free decay"
 
 
-def coefficient_note(document: Document) -> str:
+def coefficient_note(answer: Findings) -> str:
     """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
-    if document["found"]["limit_cycles"]:
+    if answer.found.limit_cycles:
         return _NO_DECAY
-    before = document["coefficients"]["before"]
-    caveats = [effect_class(name).caveat for name in document["causes"] if name != "unknown"]
+    before = answer.coefficients.before
+    caveats = [effect_class(name).caveat for name in answer.causes if name != "unknown"]
     beta = next((name for name in before if name.startswith("cn_beta")), "")
     return " ".join(filter(None, (*caveats, size_note(beta))))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.settings import settings_of
+from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import set_out
 from diagnosis.words.numbers import (
     explained,
@@ -19,7 +19,7 @@ from diagnosis.words.numbers import (
 )
 from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
-from identification.printing import COEFFICIENTS, Document, significant, unit_mark
+from identification.printing import COEFFICIENTS, significant, unit_mark
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 
@@ -27,32 +27,30 @@ _MOST = 0.5  # of a variance: more than all its other sources together
 _COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
 
 
-def diagnosis_brief(document: Document) -> str:
+def diagnosis_brief(answer: Findings) -> str:
     """An answer in three lines: its causes, its gap, and the next step."""
-    gap, first = document["gap"], document["candidates"][0]
-    causes = document["causes"]
+    gap, first = answer.gap, answer.candidates[0]
+    causes = answer.causes
     named = named_answer(causes).lower() if causes else "no gap"
-    decided = document.get("decided", True)
-    undecided = "" if decided else f"undecided, the {set_out(document)} is "
-    misfit, excess = misfit_of(document), gap["excess_before"]
+    decided = answer.decision.decided
+    undecided = "" if decided else f"undecided, the {set_out(answer)} is "
+    misfit, excess = misfit_of(answer), gap.excess_before
     size = f"{held_out_excess(excess)} times the noise variance"
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
-    closed = (
-        f"; {share(gap['closed'])} explained {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
-    )
-    likely = probability(first["probability"])
+    closed = f"; {share(gap.closed)} explained {gap.closed_on}" if answer.names_effects else ""
+    likely = probability(first.probability)
     return (
-        f"Diagnosis of {document['campaign']!r}: {undecided}{named} (probability {likely})\n"
+        f"Diagnosis of {answer.campaign!r}: {undecided}{named} (probability {likely})\n"
         f"  gap {size}{closed}\n"
         "  print() shows all; .plot(), .write_report(path), .to_frame()"
     )
 
 
-def inclusion_line(document: Document) -> str:
+def inclusion_line(answer: Findings) -> str:
     """The effects that may be among the causes, most probable first; empty where none is probable enough."""
-    least = settings_of(document).words.effect_listed
-    likely = dict(sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1]))
+    least = answer.settings.words.effect_listed
+    likely = dict(sorted(answer.inclusion.items(), key=lambda item: -item[1]))
     names = [name for name, value in likely.items() if value >= least]
     last = scattering(names)  # scatter is common to every answer
     ordered = [*(name for name in names if name not in last), *last]
@@ -60,17 +58,17 @@ def inclusion_line(document: Document) -> str:
     return f"Among the causes, with probability: {', '.join(shown)}." if shown else ""
 
 
-def coefficients_line(document: Document) -> str:
+def coefficients_line(answer: Findings) -> str:
     """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
 
     Empty where none is known.
     """
-    after = {name: given for name, given in document["coefficients"]["after"].items() if given["std"]}
+    after = {name: given for name, given in answer.coefficients.after.items() if given.std}
     if not after:
         return ""
     parts = []
     for source, words in SOURCES.items():
-        shares = {name: given.get("shares", {}).get(source, 0.0) for name, given in after.items()}
+        shares = {name: given.shares.get(source, 0.0) for name, given in after.items()}
         if max(shares.values()) >= _COUNTS:
             mostly = listed(
                 [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
@@ -78,7 +76,7 @@ def coefficients_line(document: Document) -> str:
             parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
     if not parts:
         return ""
-    if all(given.get("shares", {}).keys() <= {"noise", "scatter", "air density"} for given in after.values()):
+    if all(given.shares.keys() <= {"noise", "scatter", "air density"} for given in after.values()):
         return f"± is the ± of tunnel identify; it includes {listed(parts)}."
     return (
         f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
@@ -86,68 +84,68 @@ def coefficients_line(document: Document) -> str:
     )
 
 
-def hidden_line(document: Document) -> str:
+def hidden_line(answer: Findings) -> str:
     """The undetected effects that would change a coefficient by more than its ±; empty where none would.
 
     The one with the greatest change against the ±, and each that states how to read the coefficients without it.
     """
-    after, general_form = document["coefficients"]["after"], Effect.undetected
+    after, general_form = answer.coefficients.after, Effect.undetected
     clauses: list[tuple[bool, str]] = []
-    for one in document.get("hidden", ()):
+    for one in answer.hidden:
         moved = []
         for name, given in after.items():
-            move = one["moves"].get(name)
-            if move is not None and given.get("std") and move["value"] > given["std"]:
-                by = f"{significant(move['value'], 2)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}"
+            move = one.moves.get(name)
+            if move is not None and given.std and move.value > given.std:
+                by = f"{significant(move.value, 2)} {'' if given.unit == '1' else unit_mark(given.unit)}"
                 moved.append((COEFFICIENTS.get(name, name), by.strip()))
-        own = next((kind.undetected for kind in known_effects() if kind.name == one["effect"]), general_form)
+        own = next((kind.undetected for kind in known_effects() if kind.name == one.effect), general_form)
         template = own if moved else ""
         general = template == general_form
         if not moved or (general and any(said for said, _ in clauses)):
             continue
-        size = f"{significant(abs(one['size']['value']), 2)}{unit_mark(beside(one['size']['unit']))}"
+        size = f"{significant(abs(one.size.value), 2)}{unit_mark(beside(one.size.unit))}"
         changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
-        words = {"effect": plain(one["effect"]), "size": size + explained({one["size"]["unit"]})}
+        words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
         clause = template.format(changes=changes, **words)
         clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
     return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
 
 
-def patch_line(document: Document) -> str:
+def patch_line(answer: Findings) -> str:
     """The share of the gap that the patched model explains; empty without a model."""
-    model = document.get("model")
+    model = answer.model
     if model is None:
         return ""
-    if document["causes"] in ([], ["unknown"]):
-        fitted = ", ".join(model["free"])
+    if not answer.names_effects:
+        fitted = ", ".join(model.free)
         said = f"No cause is written into the patched model, only the fitted parameters: {fitted}."
     else:
-        closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
+        closed, by_fit = (f"{100.0 * part:.1f} %" for part in (model.closed, model.closed_by_fit))
         said = (
-            f"The patched model, simulated by MuJoCo, explains {closed} of the gap {model['closed_on']}; the fit "
+            f"The patched model, simulated by MuJoCo, explains {closed} of the gap {model.closed_on}; the fit "
             f"itself explains {by_fit}."
         )
-    zero = f"{'−' if model['zero_rad'] < 0.0 else '+'} {reading_shown(abs(model['zero_rad']), 3)}"
-    return f"{said} The reading is the position of {model['joint']} {zero}."
+    zero = f"{'−' if model.zero_rad < 0.0 else '+'} {reading_shown(abs(model.zero_rad), 3)}"
+    return f"{said} The reading is the position of {model.joint} {zero}."
 
 
-def noise_line(document: Document) -> str:
+def noise_line(answer: Findings) -> str:
     """The noise to which the gap is compared, and its origin."""
-    noise, unit = document["noise"], unit_of(document)
-    size = f"{reading_shown(noise['std'], 3, unit)} (noise_std = {noise['std']:.3g} {unit_mark(unit)})"
-    return f"Noise: {size}, {noise['source']} ({noise['reason']})."
+    noise, unit = answer.noise, unit_of(answer)
+    size = f"{reading_shown(noise.std, 3, unit)} (noise_std = {noise.std:.3g} {unit_mark(unit)})"
+    return f"Noise: {size}, {noise.source} ({noise.reason})."
 
 
-def model_line(document: Document) -> str:
+def model_line(answer: Findings) -> str:
     """The model that the gaps are computed with; empty where a caveat says more about it."""
-    checked, unit = document["confirmation"], unit_of(document)
-    if not checked["agrees"]:
+    checked, unit = answer.confirmation, unit_of(answer)
+    if not checked.agrees:
         return ""
     most, rms, allowed = (
-        reading_shown(checked[name], 2, unit)
-        for name in ("largest_difference_rad", "rms_difference_rad", "tolerance_rad")
+        reading_shown(size, 2, unit)
+        for size in (checked.largest_difference, checked.rms_difference, checked.tolerance)
     )
     return (
         f"The gaps are computed by the MuJoCo model. The integrator of the fits differs from it by {most} at most "
-        f"({rms} root mean square in run {checked['run']}; {allowed} is allowed)."
+        f"({rms} root mean square in run {checked.run}; {allowed} is allowed)."
     )

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any
 
 from diagnosis.findings.closure import Misfit
-from identification.printing import Document, significant, unit_mark, with_std
+from diagnosis.findings.whole import Findings
+from identification.estimate import Quantity
+from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.quantities import Share
@@ -108,16 +109,16 @@ def size_change(before: float, after: float) -> str:
     return f"{change:+.2g} %" if change else "0 %"
 
 
-def change_up_to(size: float, given: Mapping[str, Any]) -> str:
+def change_up_to(size: float, given: Quantity) -> str:
     """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
 
     Args:
         size: the change, in the coefficient's unit.
         given: the coefficient, from the document.
     """
-    if given["std"] is not None and given["std"] < abs(given["value"]):
-        return f"{rounded_up(100.0 * size / abs(given['value']))} %"
-    return f"{rounded_up(size)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}".strip()
+    if given.std is not None and given.std < abs(given.value):
+        return f"{rounded_up(100.0 * size / abs(given.value))} %"
+    return f"{rounded_up(size)} {'' if given.unit == '1' else unit_mark(given.unit)}".strip()
 
 
 def unit_shown(unit: str) -> tuple[str, float]:
@@ -125,10 +126,9 @@ def unit_shown(unit: str) -> tuple[str, float]:
     return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
 
 
-def misfit_of(document: Document) -> Misfit | None:
+def misfit_of(answer: Findings) -> Misfit | None:
     """The misfit of a diagnosis' document; None where it has none, as in a document of an earlier version."""
-    given = document["gap"].get("misfit")
-    return None if given is None else Misfit(given["noise"], given["swing"], given["unit"])
+    return answer.gap.misfit
 
 
 def rms_shown(misfit: Misfit, excess: float) -> str:
@@ -182,9 +182,9 @@ def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
     return f"{significant(factor * value, digits) if value else '0'}{mark if mark == '°' else f' {mark}'}"
 
 
-def unit_of(document: Document) -> str:
+def unit_of(answer: Findings) -> str:
     """The unit of the readings of a document: rad, rad/s or rad/s²."""
-    misfit = misfit_of(document)
+    misfit = misfit_of(answer)
     return "rad" if misfit is None else misfit.unit
 
 
@@ -193,7 +193,7 @@ def held_out_excess(value: float) -> str:
     return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
-def misfit_text(document: Document, excess: float) -> str:
+def misfit_text(answer: Findings, excess: float) -> str:
     """A gap in customary units, and in noise variances.
 
     Args:
@@ -202,23 +202,23 @@ def misfit_text(document: Document, excess: float) -> str:
     Returns:
         Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``.
     """
-    misfit, times = misfit_of(document), held_out_excess(excess)
+    misfit, times = misfit_of(answer), held_out_excess(excess)
     return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
 
 
-def misfit_shown(document: Document, value: float) -> str:
+def misfit_shown(answer: Findings, value: float) -> str:
     """A gap as a root mean square; in noise variances for a document without ``misfit``.
 
     Args:
         value: the gap as an excess, in noise variances, a ratio.
     """
-    misfit = misfit_of(document)
+    misfit = misfit_of(answer)
     return times_noise(value) if misfit is None else rms_shown(misfit, value)
 
 
-def excess_std(document: Document) -> float | None:
+def excess_std(answer: Findings) -> float | None:
     """Standard deviation of the campaign's excess by chance, in noise variances; None where there are no maps."""
-    runs = (document.get("maps") or {"runs": []})["runs"]
+    runs = answer.figure_data.get("runs", [])
     return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
 
 
@@ -282,15 +282,15 @@ def listed(parts: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def windy(document: Document) -> bool:
+def windy(answer: Findings) -> bool:
     """Whether any run had wind; True where the document does not say."""
-    runs = (document.get("maps") or {}).get("runs")
+    runs = answer.figure_data.get("runs")
     return not runs or any(run["wind_speed"] > 0.0 for run in runs)
 
 
-def acts_on(document: Document, effect: str) -> str:
+def acts_on(answer: Findings, effect: str) -> str:
     """The object and condition of an effect, such as ``the damping, only with the wind on``; empty if unknown."""
     kind = {kind.name: kind for kind in known_effects()}.get(effect)
     if kind is None:
         return ""
-    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(document) else ''}"
+    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
+from diagnosis.findings.whole import Findings
 from diagnosis.likelihood.ceiling import Ceiling
-from diagnosis.settings import settings_of
+from diagnosis.remainder.closable import Closable, Law, Line
+from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.numbers import (
     KINDS,
     change_up_to,
@@ -20,42 +22,42 @@ from diagnosis.words.numbers import (
     unit_shown,
 )
 from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, Document, significant, unit_mark, with_std
+from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 
 
-def rest_words(document: Document) -> str:
+def rest_words(answer: Findings) -> str:
     """The remaining gap, in sentences; empty for a document without it."""
-    rest, causes = document["rest"], document["causes"]
+    rest, causes = answer.rest, answer.causes
     if rest is None:
         return ""
-    after, named = document["coefficients"]["after"], causes not in ([], ["unknown"])
-    moves, excess, misfit = rest["moves"], rest["excess"], misfit_of(document)
+    after, named = answer.coefficients.after, answer.names_effects
+    moves, excess, misfit = rest.moves, rest.excess, misfit_of(answer)
     size = left_over(excess) if misfit is None else f"{rms_shown(misfit, excess)} root mean square"
     larger = excess > 1.0  # than the noise: people see it in the fit, whatever it does to the coefficients
     if larger and misfit is not None:
         size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
     left = f"the residual ({size})" if named else "the gap"
     subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]
-    material = [name for name, move in moves.items() if move["material"]]
-    known = [name for name, move in moves.items() if move["std"] is not None]
+    material = [name for name, move in moves.items() if move.material]
+    known = [name for name, move in moves.items() if move.std is not None]
     if not causes:
         words = "No gap: nothing remains beyond the noise."
-    elif not rest["significant"]:
+    elif not rest.significant:
         words = "The residual is within the noise."
     elif material:
-        moved = _each({name: change_up_to(moves[name]["value"], after[name]) for name in material})
+        moved = _each({name: change_up_to(moves[name].value, after[name]) for name in material})
         start = f"Part of the gap remains: {left}" if named else subject
         words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
     elif not known:
         words = f"{subject} changes no coefficient that these runs determine."
     else:
-        most = {name: max(moves[name]["value"], moves[name]["std"] or 0.0) for name in known}
+        most = {name: max(moves[name].value, moves[name].std or 0.0) for name in known}
         bounds = _each({name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()})
         words = f"{subject} changes {bounds}." if named else f"The gap is immaterial: it changes {bounds}."
-    if rest["further"]:
-        words += f" {plain(rest['further']).capitalize()} is significant, but too small to be named."
+    if rest.further:
+        words += f" {plain(rest.further).capitalize()} is significant, but too small to be named."
     return words
 
 
@@ -64,63 +66,63 @@ def _each(sizes: dict[str, str]) -> str:
     return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
-def closable_words(document: Document) -> str:
+def closable_words(answer: Findings) -> str:
     """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
-    closable = document["closable"]
+    closable = answer.closable
     if closable is None:
         return ""
-    named = document["causes"] != ["unknown"] and document["decided"]
-    beyond = " beyond the scatter between runs" if scattering(document["causes"]) else ""
+    named = answer.causes != UNKNOWN and answer.decision.decided
+    beyond = " beyond the scatter between runs" if scattering(answer.causes) else ""
     left = "the residual gap" if named else f"the gap{beyond}"
-    ceilings = [ceiling(one) for one in closable["ceilings"]]
-    if closable["kind"] == "noise":
-        chosen = settings_of(document).remainder
+    ceilings = closable.ceilings
+    if closable.kind == "noise":
+        chosen = answer.settings.remainder
         most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
         bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
         return (
             f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(document, closable["kind"], ceilings)
-    return " ".join([*_largest(closable, ceilings, left), *of_others, *_line(closable["line"])])
+    of_others = _measured_otherwise(answer, closable.kind, ceilings)
+    return " ".join([*_largest(closable, ceilings, left), *of_others, *_line(closable.line)])
 
 
-def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
+def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
     """The share of the kind beside those of the others, its place, and its formula."""
-    kind, where, law = found["kind"], found["events"], found["law"]
+    kind, where, law = found.kind, found.events, found.law
     best = next(one for one in ceilings if one.kind == kind)
     sentences = [
         f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {left} (measured on "
         f"held-out {best.held_out})."
     ]
-    if found["alike"]:
+    if found.alike:
         sentences.append(
-            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found['alike'])}."
+            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found.alike)}."
         )
-    elif found["next_most"] is not None:
+    elif found.next_most is not None:
         alike = all(one.held_out == best.held_out for one in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        sentences.append(f"{other} would explain more than {percent(max(found['next_most'], 0.0))}.")
+        sentences.append(f"{other} would explain more than {percent(max(found.next_most, 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
         sentences.append(f"Most of it is in {largest}{run}.")
     if law is not None:
-        formula = law["effect"].get("moment") or law["effect"]["reading"]
-        explains = percent(law["closed"], law["std"])
+        formula = law.effect.get("moment") or law.effect["reading"]
+        explains = percent(law.closed, law.std)
         sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
     return sentences
 
 
-def _with_values(law: Document) -> str:
+def _with_values(law: Law) -> str:
     """The numbers of a formula, as a clause; empty where it has none."""
-    stated, said, unknown = law["effect"].get("parameters", {}), [], []
-    for name, one in law["parameters"].items():
-        if not 0.0 < one["std"] < _UNKNOWN * abs(one["value"]):
+    stated, said, unknown = law.effect.get("parameters", {}), [], []
+    for name, (value, std) in law.parameters.items():
+        if not 0.0 < std < _UNKNOWN * abs(value):
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
-        said.append(f"{name} = {with_std(one['value'], one['std'])}{unit_mark(beside(unit))}")
+        said.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
     left = f"{listed(unknown)} not determined by these runs" if unknown else ""
     return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
 
@@ -128,10 +130,10 @@ def _with_values(law: Document) -> str:
 _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
 
 
-def formula_step(document: Document) -> str:
+def formula_step(answer: Findings) -> str:
     """How to try the formula of the remainder, without a full stop; empty where there is none."""
-    found = document["closable"]
-    if found is None or found["law"] is None:
+    found = answer.closable
+    if found is None or found.law is None:
         return ""
     return (
         "Write the formula as an effect with --propose FILE, and diagnose again with --effects-file FILE: its "
@@ -139,12 +141,12 @@ def formula_step(document: Document) -> str:
     )
 
 
-def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) -> list[str]:
+def _measured_otherwise(answer: Findings, kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
     """The kind that explains more than the named one, on other held-out readings, and why it is not named.
 
     Empty where no kind does.
     """
-    chosen = settings_of(document).remainder
+    chosen = answer.settings.remainder
     best = next(one for one in ceilings if one.kind == kind)
     others = (one for one in ceilings if one.determined(chosen) and one.held_out != best.held_out)
     most = max(others, key=lambda one: one.closed, default=best)
@@ -157,38 +159,33 @@ def _measured_otherwise(document: Document, kind: str, ceilings: list[Ceiling]) 
     ]
 
 
-def _line(found: dict[str, Any] | None) -> list[str]:
+def _line(found: Line | None) -> list[str]:
     """A steady line, in a sentence; none without one."""
     if found is None:
         return []
-    frequency = with_std(found["frequency_hz"], found["frequency_std_hz"])
-    mark, factor = unit_shown(found["unit"])
-    amplitude = with_std(factor * found["amplitude"], factor * found["amplitude_std"])
+    frequency = with_std(found.frequency_hz, found.frequency_std_hz)
+    mark, factor = unit_shown(found.unit)
+    amplitude = with_std(factor * found.amplitude, factor * found.amplitude_std)
     amplitude += mark if mark == "°" else f" {mark}"
     return [
         f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
         "alone shows a line in less than "
-        f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
+        f"{100.0 * found.false_alarm_rate:.2g} % of campaigns."
     ]
-
-
-def ceiling(given: Document) -> Ceiling:
-    """A kind's share, from the document."""
-    return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
 
 
 _LABEL = "What could explain the residual gap"
 
 
-def closable_line(document: Document) -> str:
+def closable_line(answer: Findings) -> str:
     """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
-    if found := document.get("closable"):
-        return f"{_LABEL}: {found['words']}"
-    rest = document.get("rest")
-    if not rest or not document["causes"]:
+    if found := answer.closable:
+        return f"{_LABEL}: {found.words}"
+    rest = answer.rest
+    if not rest or not answer.causes:
         return ""
-    if not rest["significant"]:
-        return f"{_LABEL}: nothing beyond chance (p = {rest['p_value']:.2g})."
-    if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
+    if not rest.significant:
+        return f"{_LABEL}: nothing beyond chance (p = {rest.p_value:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in answer.causes):
         return f"{_LABEL}: not stated, since any law would explain part of a random moment."
     return ""

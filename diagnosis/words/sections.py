@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.answers import set_out
 from diagnosis.words.captions import captioned
 from diagnosis.words.cards import cause_cards, effect_cards
@@ -58,56 +59,55 @@ from identification.blocks import (
     TextTable,
     brief,
 )
-from identification.printing import COEFFICIENTS, Document, significant, trade_off_line
-from identification.status import Remark
+from identification.printing import COEFFICIENTS, significant, trade_off_line
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNDETERMINED = "not shown by the residuals alone"
 
 
-def sections(document: Document, campaign: Campaign | None = None) -> tuple[Section, ...]:
+def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Section, ...]:
     """The whole answer.
 
     Args:
         campaign: adds the conditions of the runs.
     """
-    blown = any(run.wind_on for run in campaign.runs) if campaign else windy(document)
+    blown = any(run.wind_on for run in campaign.runs) if campaign else windy(answer)
     return (
-        Section("answer", "The answer", (Paragraph(str(document["verdict"])),)),
-        _where(document),
-        _which(document),
-        _causes(document),
-        _place(document),
-        _closes(document),
+        Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),
+        _where(answer),
+        _which(answer),
+        _causes(answer),
+        _place(answer),
+        _closes(answer),
         Section("fit", "The fit over the data", (captioned("fit"),)),
-        _repeats(document),
-        _how_far(document, campaign),
-        _closable(document),
-        _coefficients(document),
-        _uncertainty(document, blown),
-        _patch(document),
-        Section("cautions", "Caveats", (Listing(tuple(_caveats(document)), "Caveats"),), opened=True),
+        _repeats(answer),
+        _how_far(answer, campaign),
+        _closable(answer),
+        _coefficients(answer),
+        _uncertainty(answer, blown),
+        _patch(answer),
+        Section("cautions", "Caveats", (Listing(tuple(_caveats(answer)), "Caveats"),), opened=True),
         Section(
             "blind",
             "What these runs cannot show",
-            (Listing(tuple(document["blind_spots"]), "These runs cannot show"),),
+            (Listing(tuple(answer.blind_spots), "These runs cannot show"),),
         ),
-        _provenance(document),
+        _provenance(answer),
         Section(
             "next",
             "What to do next",
-            (Listing(tuple(next_steps(document)), "What to do next", numbered=True),),
+            (Listing(tuple(next_steps(answer)), "What to do next", numbered=True),),
         ),
     )
 
 
-def printed(document: Document) -> tuple[Block, ...]:
+def printed(answer: Findings) -> tuple[Block, ...]:
     """The blocks of a face without room for details, in order."""
-    return tuple(block for section in sections(document) for block in brief(section.blocks))
+    return tuple(block for section in sections(answer) for block in brief(section.blocks))
 
 
-def _place(document: Document) -> Section:
-    grid = (document.get("maps") or {}).get("grid") or {}
+def _place(answer: Findings) -> Section:
+    grid = answer.figure_data.get("grid") or {}
     axis = "the wind speed" if grid.get("wind_speeds") else "time"
     caption = (
         f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
@@ -116,15 +116,15 @@ def _place(document: Document) -> Section:
     return Section("place", "Where the gap is", (Figure("place", caption),))
 
 
-def _closes(document: Document) -> Section:
+def _closes(answer: Findings) -> Section:
     caption = (
         "The residual misfit as the causes are added, the largest contribution first, "
-        f"{document.get('waterfall_on', '')}. Open circles: the misfit without this cause, the others refitted."
+        f"{answer.waterfall.held_out}. Open circles: the misfit without this cause, the others refitted."
     )
     return Section("closes", "How much of the gap is explained", (Figure("waterfall", caption),))
 
 
-def _where(document: Document) -> Section:
+def _where(answer: Findings) -> Section:
     figures = (
         captioned("where-runs"),
         captioned("where-profiles"),
@@ -133,87 +133,87 @@ def _where(document: Document) -> Section:
         captioned("where-phase-plane"),
         captioned("where-moment"),
     )
-    place = (Detail((Pairs(place_rows(document)),)),) if document["causes"] else ()
-    words = Paragraph(document["where"]["words"], "Where")
+    place = (Detail((Pairs(place_rows(answer)),)),) if answer.causes else ()
+    words = Paragraph(answer.where.words, "Where")
     return Section(
         "where",
         "Where the model departs from the runs",
-        (words, *place, *figures, Detail((lines_table(document),))),
+        (words, *place, *figures, Detail((lines_table(answer),))),
     )
 
 
-def place_rows(document: Document) -> tuple[tuple[str, str], ...]:
+def place_rows(answer: Findings) -> tuple[tuple[str, str], ...]:
     """The place of the gap, field by field."""
-    where, degree = document["where"], unit_shown("rad")[1]
-    rows = [("Runs that show it", ", ".join(where["runs"]) or "–")]
-    for label, key, factor, unit in (
-        ("Time", "time_s", 1.0, " s"),
-        ("Amplitude", "amplitude_rad", degree, "°"),
-        ("Frequency", "frequency_hz", 1.0, " Hz"),
+    where, degree = answer.where, unit_shown("rad")[1]
+    rows = [("Runs that show it", ", ".join(where.runs) or "–")]
+    for label, interval, factor, unit in (
+        ("Time", where.time_s, 1.0, " s"),
+        ("Amplitude", where.amplitude_rad, degree, "°"),
+        ("Frequency", where.frequency_hz, 1.0, " Hz"),
     ):
-        ends = [significant(factor * value, 3) for value in where[key] or ()]
+        ends = [significant(factor * value, 3) for value in interval or ()]
         rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
-    rows.append(("Acts on", CHANNELS.get(where["channel"] or "", _UNDETERMINED)))
-    if windy(document):
-        condition = where["condition"]
+    rows.append(("Acts on", CHANNELS.get(where.channel or "", _UNDETERMINED)))
+    if windy(answer):
+        condition = where.condition
         rows.append(("Acts", _UNDETERMINED if condition is None else CONDITIONS[condition]))
     return tuple(rows)
 
 
-def _which(document: Document) -> Section:
+def _which(answer: Findings) -> Section:
     return Section(
         "which",
         "Which effect causes it",
         (
             captioned("which"),
-            candidates_table(document),
-            Paragraph(inclusion_line(document)),
-            *(Paragraph(line) for line in rival_lines(document)),
-            *effect_cards(document),
+            candidates_table(answer),
+            Paragraph(inclusion_line(answer)),
+            *(Paragraph(line) for line in rival_lines(answer)),
+            *effect_cards(answer),
             captioned("friction"),
         ),
     )
 
 
-def _causes(document: Document) -> Section:
-    cards = cause_cards(document)
+def _causes(answer: Findings) -> Section:
+    cards = cause_cards(answer)
     title = "The cause" if len(cards) == 1 else "The causes"
-    if not document.get("decided", True):
-        title += f" of the {set_out(document)}"
-    return Section("found", title, (*cards, parameters_table(document)) if cards else ())
+    if not answer.decision.decided:
+        title += f" of the {set_out(answer)}"
+    return Section("found", title, (*cards, parameters_table(answer)) if cards else ())
 
 
-def _repeats(document: Document) -> Section:
-    line = repeatability_line(document)
-    drawn = [] if not line or repeats(document) else [captioned("repeatability")]
-    return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, repeatability_table(document)))
+def _repeats(answer: Findings) -> Section:
+    line = repeatability_line(answer)
+    drawn = [] if not line or repeats(answer) else [captioned("repeatability")]
+    return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, repeatability_table(answer)))
 
 
-def _how_far(document: Document, campaign: Campaign | None) -> Section:
+def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
     drawn = captioned("how-far")
     meaning = (
         "A run shows the gap if its residual, with the nominal model fitted to all runs, exceeds chance at a "
         "false-alarm rate of 1 % per campaign and is at least a tenth of the largest residual of a run."
     )
-    runs = runs_table(document, campaign)
+    runs = runs_table(answer, campaign)
     return Section(
         "how-far-section",
         "How much of the gap is explained, run by run",
-        (waterfall_table(document), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
+        (waterfall_table(answer), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
     )
 
 
-def _closable(document: Document) -> Section:
+def _closable(answer: Findings) -> Section:
     drawn = captioned("law")
     return Section(
         "closable",
         "What could explain the residual gap",
-        (Paragraph(closable_line(document)), closable_table(document), drawn),
+        (Paragraph(closable_line(answer)), closable_table(answer), drawn),
     )
 
 
-def _coefficients(document: Document) -> Section:
-    table, symbols = coefficients_table(document), symbol_rows(document)
+def _coefficients(answer: Findings) -> Section:
+    table, symbols = coefficients_table(answer), symbol_rows(answer)
     title = "Coefficients before and after" if "change of size" in table.columns else "Coefficients"
     nothing = () if table.rows else (Detail((Paragraph("These runs give no coefficients."),)),)
     return Section(
@@ -222,13 +222,13 @@ def _coefficients(document: Document) -> Section:
         (
             table,
             *nothing,
-            Paragraph(document["coefficients"]["note"], "Note"),
+            Paragraph(answer.coefficients.note, "Note"),
             Detail((Pairs(tuple(symbols)),), "What the symbols mean"),
         ),
     )
 
 
-def _uncertainty(document: Document, blown: bool) -> Section:
+def _uncertainty(answer: Findings, blown: bool) -> Section:
     stated = (
         "spring stiffness, wind speed, air density, area and length"
         if blown
@@ -244,41 +244,41 @@ def _uncertainty(document: Document, blown: bool) -> Section:
         "Uncertainty of the coefficients",
         (
             captioned("coefficients"),
-            Detail((budget_table(document),)),
-            Paragraph(coefficients_line(document)),
-            Paragraph(trade_off_line(document, COEFFICIENTS)),
-            Paragraph(hidden_line(document)),
-            Detail((hidden_table(document), beyond)),
+            Detail((budget_table(answer),)),
+            Paragraph(coefficients_line(answer)),
+            Paragraph(trade_off_line(answer.trade_off, COEFFICIENTS)),
+            Paragraph(hidden_line(answer)),
+            Detail((hidden_table(answer), beyond)),
         ),
     )
 
 
-def _patch(document: Document) -> Section:
-    notes = (document.get("model") or {"notes": ()})["notes"]
+def _patch(answer: Findings) -> Section:
+    notes = () if answer.model is None else answer.model.notes
     title = "Differences between the elements of the model and the law of the fit"
     return Section(
         "patch",
         "The model with the causes",
-        (Paragraph(patch_line(document)), Listing(tuple(notes), title), patch_table(document)),
+        (Paragraph(patch_line(answer)), Listing(tuple(notes), title), patch_table(answer)),
     )
 
 
-def _caveats(document: Document) -> Iterator[str]:
-    for remark in document.get("remarks", ()):
-        yield str(Remark.from_json_dict(remark))
-    yield from document["cautions"]
+def _caveats(answer: Findings) -> Iterator[str]:
+    for remark in answer.remarks:
+        yield str(remark)
+    yield from answer.cautions
 
 
-def _provenance(document: Document) -> Section:
-    provenance = document.get("provenance") or {}
+def _provenance(answer: Findings) -> Section:
+    provenance = answer.provenance or {}
     versions = (
         *provenance.get("versions", {}).items(),
-        ("schema of the document", str(document["schema_version"])),
+        ("schema of the document", str(SCHEMA_VERSION)),
     )
     hashes = tuple(provenance.get("sha256", {}).items())
-    seconds = tuple((name, f"{value:.1f} s") for name, value in document["seconds"].items())
-    alarms = significant(document["gap"]["false_alarm_rate"], 2)
-    tests = tests_table(document)
+    seconds = tuple((name, f"{value:.1f} s") for name, value in answer.seconds.items())
+    alarms = significant(answer.gap.false_alarm_rate, 2)
+    tests = tests_table(answer)
     false = (
         f"All tests together raise a false alarm in {alarms} of the campaigns without a gap."
         if tests.rows
@@ -289,8 +289,8 @@ def _provenance(document: Document) -> Section:
         "Tests, noise and provenance",
         (
             Detail((tests, Paragraph(false, kind="small"))),
-            Paragraph(noise_line(document)),
-            Paragraph(model_line(document)),
+            Paragraph(noise_line(answer)),
+            Paragraph(model_line(answer)),
             Detail(
                 (
                     Heading("Units and terms"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from identification.printing import COEFFICIENTS, Document, unit_mark
+from diagnosis.findings.whole import Findings
+from identification.printing import COEFFICIENTS, unit_mark
 from tunnel_sim.effects import known_effects
 
 MEANINGS: Mapping[str, str] = {
@@ -32,11 +33,11 @@ MEANINGS: Mapping[str, str] = {
 _OF_OTHERS: Mapping[str, tuple[str, ...]] = {"½ρV²Al": ("ρ", "V", "A", "l"), "½ρVAl²": ("ρ", "V", "A", "l")}
 
 
-def symbol_rows(document: Document) -> list[tuple[str, str]]:
+def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
     """Symbols of a document's coefficients and causes, and those that explain them, with meaning and unit."""
-    named = set(document["causes"])
+    named = set(answer.causes)
     kinds = [kind for kind in known_effects() if kind.name in named]
-    coefficients = {**document["coefficients"]["before"], **document["coefficients"]["after"]}
+    coefficients = {**answer.coefficients.before, **answer.coefficients.after}
     texts = [COEFFICIENTS.get(name, name) for name in coefficients] + [kind.equation for kind in kinds]
     rows: dict[str, str] = {}
     while texts:
@@ -47,8 +48,8 @@ def symbol_rows(document: Document) -> list[tuple[str, str]]:
             if symbol not in rows and _holds(text, symbol):
                 rows[symbol] = meaning
                 texts.append(meaning)
-    first = document["candidates"][:1]
-    own, fitted = {}, {name.rpartition(".")[2] for answer in first for name in answer["parameters"]}
+    first = answer.candidates[:1]
+    own, fitted = {}, {name.rpartition(".")[2] for one in first for name in one.parameters}
     for kind in kinds:
         for info in kind.parameters():
             if info.symbol not in MEANINGS and info.name in fitted and _holds(kind.equation, info.symbol):

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from diagnosis.settings import settings_of
+from diagnosis.findings.candidates import CauseSize
+from diagnosis.findings.found import Nearly
+from diagnosis.findings.other_motions import TwoModes
+from diagnosis.findings.whole import Findings
+from diagnosis.search.disturbance import Disturbance
+from diagnosis.search.rivals.two_springs import SpringError
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from diagnosis.words.causes import (
     advice,
     consequence,
@@ -45,24 +52,22 @@ from diagnosis.words.scatter import (
     systematic,
     without_scatter,
 )
-from identification.printing import COEFFICIENTS, Document, significant
-from identification.status import WITHHOLDS
+from identification.printing import COEFFICIENTS, significant
+from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 
-_UNKNOWN = ["unknown"]
 
-
-def headline(document: Document) -> tuple[str, str]:
+def headline(answer: Findings) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
-    words, kind = _answer_in_words(document)
-    if document["found"].get("hold"):
+    words, kind = _answer_in_words(answer)
+    if answer.found.hold:
         delay = plain(the_effect(delays=True).name)
         words = words.replace(delay, f"{delay} or wrong hold")
-    if kind == "found" and not without_scatter(document["causes"]) and systematic(document):
+    if kind == "found" and not without_scatter(answer.causes) and systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
-    found = document.get("disturbed", ())
-    disturbed = [one["run"] for one in found if one["at_s"] is not None]
-    odd = [one["run"] for one in found if one["at_s"] is None]
+    found = answer.disturbed
+    disturbed = [one.run for one in found if one.at_s is not None]
+    odd = [one.run for one in found if one.at_s is None]
     said = f"; {_runs(disturbed)} disturbed" if disturbed else ""
     differ = "differ from the others" if len(odd) > 1 else "differs from the others"
     return words + said + (f"; {_runs(odd)} {differ}" if odd else ""), kind
@@ -73,90 +78,90 @@ def _runs(names: Sequence[str]) -> str:
     return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
 
 
-def _answer_in_words(document: Document) -> tuple[str, str]:
-    causes = document["causes"]
+def _answer_in_words(answer: Findings) -> tuple[str, str]:
+    causes = answer.causes
     if not causes:
         return "No gap", "none"
-    if not document.get("decided", True):
-        effects, channels = without_scatter(document["common"]["effects"]), document["common"]["channels"]
+    if not answer.decision.decided:
+        effects, channels = without_scatter(answer.decision.effects), answer.decision.channels
         known = plain(*effects) if effects else " and ".join(CHANNELS[name] for name in channels)
         return f"Undecided: {known}, and more" if known else "Undecided", "open"
-    if causes == _UNKNOWN:
+    if causes == UNKNOWN:
         return "Unexplained gap", "unknown"
     names = named_answer(causes)
-    if document["ambiguous_with"]:
-        return known_and_open(document), "open"
-    if (document.get("rest") or {}).get("material"):
+    if answer.ambiguous_with:
+        return known_and_open(answer), "open"
+    if answer.rest_is_material:
         return f"{names}, in part", "open"
     return names, "found"
 
 
-def verdict(document: Document, rest: str) -> str:
+def verdict(answer: Findings, rest: str) -> str:
     """The answer in one paragraph.
 
     Args:
         rest: the remaining gap, in sentences.
     """
-    found = document["found"]
-    if cycling := found["limit_cycles"]:
-        said = ". ".join(f"{remark['runs'][0]}: {remark['what']}" for remark in cycling)
+    found = answer.found
+    if cycling := found.limit_cycles:
+        said = ". ".join(f"{remark.runs[0]}: {remark.what}" for remark in cycling)
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
-        *(_disturbed(one, no_gap=not document["causes"]) for one in document.get("disturbed", ())),
-        *_with_second_modes(_answer(document, rest), document),
-        _choices(document),
-        hold_words(document),
-        model_words(document),
-        *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
+        *(_disturbed(one, no_gap=not answer.causes) for one in answer.disturbed),
+        *_with_second_modes(_answer(answer, rest), answer),
+        _choices(answer),
+        hold_words(answer),
+        model_words(answer),
+        *(RIVALS[rival.kind](rival.figures) for rival in found.rivals),
     ]
     return " ".join(filter(None, parts))
 
 
-def _answer(document: Document, rest: str) -> str:
+def _answer(answer: Findings, rest: str) -> str:
     """The gap, its causes, and the share of the gap that they explain."""
-    causes, gap, facts = document["causes"], document["gap"], document["found"]
-    excess, repeats = gap["excess_before"], repeats_words(document)
+    causes, gap, facts = answer.causes, answer.gap, answer.found
+    excess, repeats = gap.excess_before, repeats_words(answer)
     if not causes:
         sentence = (
             "No gap: the nominal model explains the runs down to their noise "
             f"(the residual is {beside_noise(excess)}, root mean square)."
         )
         return " ".join(filter(None, (sentence, repeats)))
-    size, misfit = times_noise(excess), misfit_of(document)
+    size, misfit = times_noise(excess), misfit_of(answer)
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
     there_is = f"There is a gap ({size})."
     proper = without_scatter(causes)
-    explained = f"{share(gap['closed'])} of the gap {gap['closed_on']}."
-    if not document["decided"]:
+    explained = f"{share(gap.closed)} of the gap {gap.closed_on}."
+    if not answer.decision.decided:
         sentence = f"{there_is} Its cause is undecided."
         first = f"{_sentence(plain(*proper))} {_explain(proper)}" if proper else "These differences explain"
-        by_first = "" if causes == _UNKNOWN else f"{first} {explained}"
-        return " ".join(filter(None, (sentence, undecided_words(document), repeats, by_first)))
-    if causes == _UNKNOWN:
-        nearly = "" if facts["nearly"] is None else _nearly(facts["nearly"])
+        by_first = "" if causes == UNKNOWN else f"{first} {explained}"
+        return " ".join(filter(None, (sentence, undecided_words(answer), repeats, by_first)))
+    if causes == UNKNOWN:
+        nearly = "" if facts.nearly is None else _nearly(facts.nearly)
         sentence = (
             "No effect is named as its cause."
             if nearly
             else "No known effect explains it (tunnel effects lists them)."
         )
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
-    changes = {} if document["rest"]["material"] else facts["immaterial"]
-    last = (explained, rest, _immaterial(changes) or consequence(document))
+    changes = {} if answer.rest_is_material else facts.immaterial
+    last = (explained, rest, _immaterial(changes) or consequence(answer))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
     acting = []
     for name in proper:  # the channel of each and, where the campaign can show it, the condition
         kind = effect_class(name)
-        wind = f", {CONDITIONS[kind.condition]}" if facts["both_winds"] else ""
+        wind = f", {CONDITIONS[kind.condition]}" if facts.both_winds else ""
         subject = plain(name) if len(proper) > 1 else "the cause"
         acting.append(f"{subject} acts on {CHANNELS[kind.channel]}{wind}")
     they = "They" if len(proper) > 1 else "It"
-    part = "part of the gap" if document["rest"]["material"] else "the gap"
-    if document["ambiguous_with"]:
-        sentence = f"{_sentence(part)} is explained by {known_and_open(document, sized=False)}."
+    part = "part of the gap" if answer.rest_is_material else "the gap"
+    if answer.ambiguous_with:
+        sentence = f"{_sentence(part)} is explained by {known_and_open(answer, sized=False)}."
     else:
-        likely = probability(document["credible"][0]["probability"])
+        likely = probability(answer.decision.credible[0][1])
         sentence = f"{_sentence(plain(*proper))} {_explain(proper)} {part} (probability {likely})."
     misfit_words = f"The misfit of the nominal model is {size}."
     acts = f"{_sentence('; '.join(acting))}."
@@ -176,44 +181,44 @@ def _explain(subjects: Sequence[str]) -> str:
     return "explain" if len(subjects) > 1 else "explains"
 
 
-def undecided_words(document: Document) -> str:
+def undecided_words(answer: Findings) -> str:
     """Sentences on an undecided diagnosis: the common part of its answers and the alternatives."""
-    common, credible = document["common"], document["credible"]
-    most_named = settings_of(document).words.answers_named
+    decision, credible = answer.decision, answer.decision.credible
+    most_named = answer.settings.words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
-    effects = {name: common["effects"][name] for name in without_scatter(common["effects"])}
+    effects = {name: decision.effects[name] for name in without_scatter(decision.effects)}
     named = {channels[name] for name in effects}
     common_to_all = [f"{plain(name)} ({probability(value)})" for name, value in effects.items()]
     parts = [f"contain {listed(common_to_all)}"] if common_to_all else []
-    for name, value in common["channels"].items():
+    for name, value in decision.channels.items():
         if name not in named:
             parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts)}. " if parts else ""
     answers = []
-    for one in credible[:most_named]:
-        answers.append(f"{_among_answers(one['effect'])} ({probability(one['probability'])})")
+    for effect, value in credible[:most_named]:
+        answers.append(f"{_among_answers(effect)} ({probability(value)})")
     if len(credible) > most_named:
         answers.append(f"{len(credible) - most_named} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
-    together = probability(sum(one["probability"] for one in credible))
-    if document["unpredictive"]:
-        best = _among_answers(document["unpredictive"]).capitalize()
-        doubts = [DOUBTS[one["kind"]](one["share"]) for one in document["doubts"]]
-        fit = "fits" if len(without_scatter(document["unpredictive"].split(" + "))) == 1 else "fit"
+    together = probability(sum(value for _, value in credible))
+    if answer.decision.unpredictive:
+        best = _among_answers(answer.decision.unpredictive).capitalize()
+        doubts = [DOUBTS[one.kind](one.share or 0.0) for one in answer.decision.doubts]
+        fit = "fits" if len(without_scatter(answer.decision.unpredictive.split(" + "))) == 1 else "fit"
         said += f"{best} {fit} best, but {' and '.join(doubts)}"
-        said += f": look at {_places(document)} there first. " if in_doubt_of_place(document) else ". "
+        said += f": look at {_places(answer)} there first. " if in_doubt_of_place(answer) else ". "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
 
 
-def in_doubt_of_place(document: Document) -> bool:
+def in_doubt_of_place(answer: Findings) -> bool:
     """Whether the answer is undecided because the residuals show another place than its causes."""
-    return any(one["kind"] == "elsewhere" for one in document.get("doubts", ()))
+    return any(one.kind == "elsewhere" for one in answer.decision.doubts)
 
 
-def _places(document: Document) -> str:
+def _places(answer: Findings) -> str:
     """The runs that show the gap, by name where not all do."""
-    runs = document["where"]["runs"]
-    return _runs(runs) if 0 < len(runs) < document["found"]["place"]["runs"] else "the runs"
+    runs, place = answer.where.runs, answer.found.place
+    return _runs(runs) if place is not None and 0 < len(runs) < place.runs else "the runs"
 
 
 def _little(explained: float) -> str:
@@ -241,16 +246,16 @@ def _among_answers(effect: str) -> str:
     return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
 
 
-def _nearly(found: Mapping[str, Any]) -> str:
+def _nearly(found: Nearly) -> str:
     """The effects that explain most of a gap without being named, and the reason."""
-    said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of the gap"
-    if found["noisy"]:
+    said = f"{plain(*found.effects).capitalize()} would explain {share(found.closes)} of the gap"
+    if found.noisy:
         return f"{said}, but irregular noise may explain a gap this small."
-    said = f"{said} (probability {probability(found['probability'])})"
-    if found["rival"]:
-        return f"{said}, and {plain(*found['rival'])} explains as much ({probability(found['rival_probability'])})."
-    if found["misfit"]:
-        misfit = " and ".join(MISFITS[name] for name in found["misfit"])
+    said = f"{said} (probability {probability(found.probability)})"
+    if found.rival:
+        return f"{said}, and {plain(*found.rival)} explains as much ({probability(found.rival_probability)})."
+    if found.misfit:
+        misfit = " and ".join(MISFITS[name] for name in found.misfit)
         return f"{said}, but leaves a significant misfit of {misfit}."
     return f"{said}, which is too little to name it."
 
@@ -269,20 +274,20 @@ def _immaterial(changes: Mapping[str, float]) -> str:
 _NO_CHANGE = 0.01  # %: smaller changes are shown as this
 
 
-def _disturbed(found: Mapping[str, Any], *, no_gap: bool) -> str:
+def _disturbed(found: Disturbance, *, no_gap: bool) -> str:
     """A disturbed run, and how much of it is used.
 
     Args:
         no_gap: whether the runs show no gap without the disturbance.
     """
-    run, kept, at, begins = found["run"], found["kept_until_s"], found["at_s"], found.get("kept_from_s")
+    run, kept, at, begins = found.run, found.kept_until_s, found.at_s, found.kept_from_s
     if at is None:
         if begins is not None:
             part = "Without that part there is no gap, so it" if no_gap else "That part"
             return f"Run {run} does not move as the others do before {begins:.4g} s. {part} is not used."
         whole = "Without it there is no gap, so it" if no_gap else "It"
         return f"Run {run} differs from the others. {whole} is not used."
-    if found["used"]:
+    if found.used:
         why = "the other runs do not determine the model"
         return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
     unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
@@ -291,43 +296,43 @@ def _disturbed(found: Mapping[str, Any], *, no_gap: bool) -> str:
     return f"Run {run} was disturbed at {at:.4g} s; {unused}."
 
 
-def _with_second_modes(answer: str, document: Document) -> list[str]:
+def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
     """The answer and the second modes of single runs; the modes come first where every run has one."""
-    modes = document["found"]["second_modes"]
-    said = [_second_mode(one, unit_of(document)) for one in modes]
-    of_all = {one["run"] for one in modes} >= {run["id"] for run in document["gap"]["runs"]}
-    return [*said, answer] if of_all else [answer, *said]
+    modes = answer.found.second_modes
+    said = [_second_mode(one, unit_of(answer)) for one in modes]
+    of_all = {one.run for one in modes} >= {run.id for run in answer.gap.runs}
+    return [*said, said_first] if of_all else [said_first, *said]
 
 
-def _second_mode(found: Mapping[str, Any], unit: str) -> str:
+def _second_mode(found: TwoModes, unit: str) -> str:
     """A second mode in a run, its amplitudes in a unit of readings."""
     main, second = (
-        f"{reading_shown(mode['amplitude_rad'], 2, unit)} at {mode['frequency_hz']:.3g} Hz, decaying at "
-        f"{mode['decay_per_s']:.2g} 1/s"
-        for mode in (found["main"], found["second"])
+        f"{reading_shown(mode.amplitude_rad, 2, unit)} at {mode.frequency_hz:.3g} Hz, decaying at "
+        f"{mode.decay_per_s:.2g} 1/s"
+        for mode in (found.main, found.second)
     )
     return (
-        f"{found['run']} contains a second mode: {second}. The main mode is {main}. The second mode explains "
-        f"{100.0 * found['closes']:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
+        f"{found.run} contains a second mode: {second}. The main mode is {main}. The second mode explains "
+        f"{100.0 * found.closes:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
         "one mode: look for another motion, such as heave or a motion of the mount."
     )
 
 
-def _choices(document: Document) -> str:
+def _choices(answer: Findings) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
-    found = document["found"]["choices"]
+    found = answer.found.choices
     if not found:
         return ""
-    springs = [f"{_spring_off(one)} ({probability(one['probability'])})" for one in found]
+    springs = [f"{_spring_off(one)} ({probability(one.probability or 0.0)})" for one in found]
     return (
-        f"{one_of_springs(document).capitalize()}, and these runs do not show which: {', or '.join(springs)}. The "
+        f"{one_of_springs(answer).capitalize()}, and these runs do not show which: {', or '.join(springs)}. The "
         f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
     )
 
 
-def choice_steps(document: Document) -> list[str]:
+def choice_steps(answer: Findings) -> list[str]:
     """How to tell which spring is off; none where the runs tell."""
-    found = sorted(one["stiffness"] for one in document["found"]["choices"])
+    found = sorted(one.stiffness for one in answer.found.choices)
     if not found:
         return []
     further, which = ("third", "both springs") if len(found) == 2 else ("further", "these springs")
@@ -338,19 +343,20 @@ def choice_steps(document: Document) -> list[str]:
     ]
 
 
-def _spring_off(found: Mapping[str, Any]) -> str:
+def _spring_off(found: SpringError) -> str:
     """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
-    size = for_people(100.0 * abs(found["error"]), 100.0 * found["std"], "%")
-    side = "stiffer" if found["error"] > 0.0 else "softer"
-    return f"{found['stiffness']:.4g} N m/rad is {size} {side} than stated"
+    size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
+    side = "stiffer" if found.error > 0.0 else "softer"
+    return f"{found.stiffness:.4g} N m/rad is {size} {side} than stated"
 
 
 def _two_springs_off(found: Mapping[str, Any]) -> str:
     """Springs that would explain the gap together."""
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    springs = " and ".join(_spring_off(SpringError(**one)) for one in found["springs"])
     return (
         f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
-        f"{' and '.join(map(_spring_off, found['springs']))}. Measure their stiffness again."
+        f"{springs}. Measure their stiffness again."
     )
 
 
@@ -365,26 +371,26 @@ _VISIBLE = 0.005  # least change of a damping ratio that is stated
 _VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
 
 
-def size_words(document: Document, size: Document) -> str:
+def size_words(answer: Findings, size: CauseSize) -> str:
     """A cause's effect on a swing, in a sentence; damping and frequency where they change visibly."""
-    mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
+    mark, factor = unit_shown(answer.figure_data.get("unit", "rad"))
     angle = unit_shown("rad")[1]
     changes = []
-    zeta, without = size["damping_ratio"], size["damping_ratio_without"]
+    zeta, without = size.damping_ratio, size.damping_ratio_without
     if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
         changes.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
-    if abs(size["frequency_change"]) > _VISIBLE_FREQUENCY:
-        change = 100.0 * size["frequency_change"]
+    if abs(size.frequency_change) > _VISIBLE_FREQUENCY:
+        change = 100.0 * size.frequency_change
         changes.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
-    reading = factor * size["reading_change"]
-    if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
-        changes.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
+    reading = factor * size.reading_change
+    if abs(size.zero_change) > 0.5 * size.reading_change:
+        changes.append(f"the middle moves by {significant(factor * size.zero_change, 2)}{_spaced(mark)}")
     if not changes and not reading:  # the run that is simulated does not show it
         return ""
     changes.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
-    held = angle * size["stands_rad"]
+    held = angle * size.stands
     stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
-    amplitude = significant(angle * size["amplitude_rad"], 2)
+    amplitude = significant(angle * size.amplitude, 2)
     return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
 
 
@@ -392,17 +398,21 @@ def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-def run_to_make(document: Document) -> Document | None:
+def run_to_make(answer: Findings) -> Mapping[str, Any] | None:
     """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
-    run: Document | None = document["next_run"]
-    least = settings_of(document).answer.separated_by
-    return run if run is not None and run["separation"] >= least else None
+    run = answer.next_run
+    return run if run is not None and distinguishes(run, answer.settings) else None
 
 
-def unplannable(document: Document) -> str:
+def distinguishes(run: Mapping[str, Any], settings: Settings) -> bool:
+    """Whether a planned run distinguishes its answers."""
+    return bool(run["separation"] >= settings.answer.separated_by)
+
+
+def unplannable(answer: Findings) -> str:
     """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
-    known = document["coefficients"]["before"]
-    if document["found"].get("driven"):
+    known = answer.coefficients.before
+    if answer.found.driven:
         return f"No run is planned for driven runs: {_OTHER_INPUT}."
     if not known:
         return "No run can be planned: the nominal model was not fitted to any run."
@@ -422,14 +432,14 @@ def too_close(run: Mapping[str, float]) -> str:
     )
 
 
-def rival_lines(document: Document) -> list[str]:
+def rival_lines(answer: Findings) -> list[str]:
     """Effects that the runs cannot distinguish from the causes, and the run that could; none without a rival."""
-    decided = document.get("decided", True)
-    rivals, run = document["ambiguous_with"] if decided else (), document["next_run"]
+    decided = answer.decision.decided
+    rivals, run = answer.ambiguous_with if decided else (), answer.next_run
     lines = []
     if rivals:
         lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
-    if run is not None and run_to_make(document) is None:
+    if run is not None and run_to_make(answer) is None:
         lines.append(too_close(run))
     elif run is not None:
         which = (
@@ -437,8 +447,8 @@ def rival_lines(document: Document) -> list[str]:
             if decided
             else "A run that would distinguish the likely answers"
         )
-        lines.append(f"{which}: {_run_words(document, run)}.")
-    elif rivals and document["found"].get("driven"):
+        lines.append(f"{which}: {_run_words(answer, run)}.")
+    elif rivals and answer.found.driven:
         lines.append(f"To distinguish them, {_OTHER_INPUT}.")
     elif rivals:
         lines.append(
@@ -464,36 +474,31 @@ def run_words(run: Mapping[str, float], *, robot: bool = False) -> str:
     )
 
 
-def _run_words(document: Document, run: Mapping[str, float]) -> str:
+def _run_words(answer: Findings, run: Mapping[str, float]) -> str:
     """As `run_words`, for the rig of a document."""
-    return run_words(run, robot=bool(document["found"].get("robot")))
+    return run_words(run, robot=bool(answer.found.robot))
 
 
-def withholds(remark: Mapping[str, Any]) -> bool:
-    """Whether a remark of a document withholds the coefficients."""
-    return bool(remark.get("figures", {}).get(WITHHOLDS))
-
-
-def _remedies(remarks: Sequence[Mapping[str, Any]]) -> list[str]:
+def _remedies(remarks: Sequence[Remark]) -> list[str]:
     """What to do about runs that are left out or refused, or whose units are wrong, each remedy once.
 
     A cut run is used and needs nothing.
     """
     runs: dict[str, list[str]] = {}
     for remark in remarks:
-        if remark["outcome"] in ("left out", "refused") or withholds(remark):
-            runs.setdefault(remark["remedy"], []).extend(remark["runs"])
+        if remark.outcome in (Outcome.LEFT_OUT, Outcome.REFUSED) or remark.withholds:
+            runs.setdefault(remark.remedy, []).extend(remark.runs)
     return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
 
 
-def _repeat(found: Mapping[str, Any]) -> str:
+def _repeat(found: Disturbance) -> str:
     """What to do about a disturbed run."""
-    if found["at_s"] is not None:
-        return f"Repeat run {found['run']}, which was disturbed at {found['at_s']:.4g} s."
-    if found.get("kept_from_s") is not None:
-        return f"Look at the release of run {found['run']}: its free motion begins at {found['kept_from_s']:.4g} s."
+    if found.at_s is not None:
+        return f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s."
+    if found.kept_from_s is not None:
+        return f"Look at the release of run {found.run}: its free motion begins at {found.kept_from_s:.4g} s."
     return (
-        f"Repeat run {found['run']}, which differs from the others, or look at its release, its unit, its gain "
+        f"Repeat run {found.run}, which differs from the others, or look at its release, its unit, its gain "
         "and its filter."
     )
 
@@ -501,50 +506,50 @@ def _repeat(found: Mapping[str, Any]) -> str:
 _SUSPECT = "State the suspected effect in a file, and diagnose again with --effects-file"
 
 
-def next_steps(document: Document) -> list[str]:
+def next_steps(answer: Findings) -> list[str]:
     """What to do next, in the order in which to do it."""
-    causes = document["causes"]
-    steps = [_repeat(one) for one in document.get("disturbed", ())]
-    steps += _remedies(document.get("remarks", ()))
-    steps += repeat_steps(document)
-    if causes != _UNKNOWN and document.get("decided", True):
-        steps += choice_steps(document)
-    if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
-        words = f"Make the run that distinguishes the answers: {_run_words(document, run)}."
+    causes = answer.causes
+    steps = [_repeat(one) for one in answer.disturbed]
+    steps += _remedies(answer.remarks)
+    steps += repeat_steps(answer)
+    if causes != UNKNOWN and answer.decision.decided:
+        steps += choice_steps(answer)
+    if (run := run_to_make(answer)) is not None and answer.ambiguous_with:
+        words = f"Make the run that distinguishes the answers: {_run_words(answer, run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
-    if step := model_step(document):
+    if step := model_step(answer):
         steps.append(f"{step}.")
-    if not causes and any(map(withholds, document.get("remarks", ()))):
+    if not causes and any(remark.withholds for remark in answer.remarks):
         return [*steps, "Diagnose again: no coefficients are given."]
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
-    if not document.get("decided", True):
-        robot, driven = (bool(document["found"].get(name)) for name in ("robot", "driven"))
+    if not answer.decision.decided:
+        robot, driven = answer.found.robot, answer.found.driven
         # stated, and can be chosen
-        springs = not robot and not unplannable(document) and document.get("model") is None
-        kinds = ["springs"] * springs + ["wind speeds"] * windy(document)
+        springs = not robot and not unplannable(answer) and answer.model is None
+        kinds = ["springs"] * springs + ["wind speeds"] * windy(answer)
         kinds += ["inputs" if driven else "release angles"]
-        if in_doubt_of_place(document):
-            steps.append(f"Look at {_places(document)} where the residuals point (Where), before any cause.")
+        if in_doubt_of_place(answer):
+            steps.append(f"Look at {_places(answer)} where the residuals point (Where), before any cause.")
         steps += [
             f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
         ]
-    elif causes == ["unknown"]:
+    elif causes == UNKNOWN:
         steps += [
             "Read where the model departs from the runs, and examine the rig there.",
-            f"{formula_step(document) or _SUSPECT}.",
+            f"{formula_step(answer) or _SUSPECT}.",
         ]
     else:
         of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
-        to_mend = [name for name in causes if name not in of_spring or not document["found"]["choices"]]
+        to_mend = [name for name in causes if name not in of_spring or not answer.found.choices]
         steps += [
-            *(f"{step}." for step in [hold_step(document)] if step),
-            *(f"{advice(document, name)}." for name in to_mend),
-            *(f"{step}." for step in [formula_step(document)] if step),
+            *(f"{step}." for step in [hold_step(answer)] if step),
+            *(f"{advice(answer, name)}." for name in to_mend),
+            *(f"{step}." for step in [formula_step(answer)] if step),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]
-    if (document.get("rest") or {}).get("material"):
+    if answer.rest_is_material:
         steps.append("Do not trust the coefficients beyond their intervals: the residual gap changes them.")
     return steps

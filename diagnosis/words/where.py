@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping
 from math import degrees
 from typing import Any
 
-from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.where.described import BETWEEN_RUNS
+from diagnosis.findings.whole import Findings
+from diagnosis.model.fact import Fact
+from diagnosis.settings import WordsSettings
+from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
 from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
 from diagnosis.words.scatter import scattering
-from identification.printing import Document, p_text
+from identification.printing import p_text
 from tunnel_sim.effects import effect_class
 
 _WIND = "whether it needs wind cannot be determined"
@@ -49,72 +51,68 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
 """Reasons why a gap acts on a channel, or needs wind: clauses by kind."""
 
 
-def reason(given: Mapping[str, Any]) -> str:
+def reason(given: Fact) -> str:
     """The clause of a reason, a fact of the document."""
-    said = REASONS[given["kind"]]
-    return said.format(**given) if isinstance(said, str) else said(given)
+    said = REASONS[given.kind]
+    return said.format(**given.figures) if isinstance(said, str) else said(given.figures)
 
 
-def where_words(document: Document) -> str:
+def where_words(answer: Findings) -> str:
     """The place of the gap, in sentences; empty where the document has none."""
-    found = document["found"]
-    if found["nowhere"]:
-        return _nowhere(found["nowhere"])
-    if not found["place"]:
+    found = answer.found
+    if found.nowhere:
+        return _nowhere(found.nowhere)
+    if not found.place:
         return ""
-    where, place = document["where"], found["place"]
-    settings = settings_of(document)
+    where, place = answer.where, found.place
+    settings = answer.settings
     parts = [f"{_which_runs(where, place, settings.words)}."]
     if places := _places(where, place):
         most = part(settings.where.interval_share).capitalize()
         parts.append(f"{most} of the gap lie {', '.join(places)}.")
-    if place["bands"]:
-        largest_first = sorted(place["bands"].items(), key=lambda item: -item[1])
+    if place.bands:
+        largest_first = sorted(place.bands.items(), key=lambda item: -item[1])
         listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in largest_first)
         parts.append(f"By frequency: {', '.join(listed)}.")
-    channel, condition = reason(place["channel"]), reason(place["condition"])
-    words = CHANNELS.get(where["channel"] or "")
+    channel, condition = reason(place.channel), reason(place.condition)
+    words = CHANNELS.get(where.channel or "")
     acts = f"It acts on {words}" if words else "The residuals alone do not show what it acts on"
-    if (
-        words
-        and place["compared"]
-        and (place.get("alike") or not (place["agrees"] or place.get("elsewhere")))
-    ):
+    if words and place.compared and (place.alike or not (place.agrees or place.elsewhere)):
         acts = f"It looks like a change of {words}"  # which the causes bring about as well
-    between = place["channel"]["kind"] in BETWEEN_RUNS and bool(scattering(document["causes"]))
+    between = place.channel.kind in BETWEEN_RUNS and bool(scattering(answer.causes))
     if between:
         acts, channel = "Most of it is between the runs", "each run alone is linear"
-    if where["condition"] is None:
+    if where.condition is None:
         parts.append(f"{acts}: {channel}; {condition}.")
     else:
         parts.append(f"{acts}: {channel}.")
-        if place["wind"]:  # without runs of both winds the condition goes unsaid
-            conditions = {effect_class(name).condition for name in place["compared"]}
-            if conditions and where["condition"] not in conditions:  # the causes act in other runs, too
+        if place.wind:  # without runs of both winds the condition goes unsaid
+            conditions = {effect_class(name).condition for name in place.compared}
+            if conditions and where.condition not in conditions:  # the causes act in other runs, too
                 parts.append(f"{condition[:1].upper()}{condition[1:]}.")
             else:
-                parts.append(f"It appears {CONDITIONS[where['condition']]}: {condition}.")
+                parts.append(f"It appears {CONDITIONS[where.condition]}: {condition}.")
     return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
 
 
-def _nowhere(found: Mapping[str, Any]) -> str:
+def _nowhere(found: Nowhere) -> str:
     """The sentence for a campaign without a gap."""
-    count = found["runs"]
+    count = found.runs
     runs = f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is"
-    chance = f"p {p_text(found['p_value'])} for the run that differs most, corrected for their number"
-    if found["within_step"]:
+    chance = f"p {p_text(found.p_value)} for the run that differs most, corrected for their number"
+    if found.within_step:
         return f"{runs} not white noise ({chance}), but within the steps of the readings."
     return f"{runs} consistent with the noise ({chance})."
 
 
-def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: WordsSettings) -> str:
+def _which_runs(where: Where, place: PlaceFound, chosen: WordsSettings) -> str:
     """The runs that show the gap, and the ratio between wind on and off."""
-    runs, count = where["runs"], place["runs"]
-    share = f"{100.0 * place['share']:.0f} % of the gap"
+    runs, count = where.runs, place.runs
+    share = f"{100.0 * place.share:.0f} % of the gap"
     named = f" ({', '.join(runs)})" if len(runs) <= chosen.runs_listed else ""
     if not runs:
         text = (
-            f"No single run is beyond chance (false-alarm rate {100.0 * place['false_alarm_rate']:.0f} % over all "
+            f"No single run is beyond chance (false-alarm rate {100.0 * place.false_alarm_rate:.0f} % over all "
             "runs); the gap shows only in all of them together"
         )
     elif len(runs) == count:
@@ -123,7 +121,7 @@ def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: Word
         text = f"{share} is in one run of {count}{named}"
     else:
         text = f"{share} is in {len(runs)} of {count} runs{named}"
-    wind = place["wind"]
+    wind = place.wind
     if runs and len(wind) == 2:
         more, less = sorted(("on", "off"), key=lambda state: -wind[state])
         if wind[less] < chosen.one_wind * wind[more]:
@@ -134,27 +132,26 @@ def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: Word
     return text
 
 
-def _places(where: Mapping[str, Any], place: Mapping[str, Any]) -> list[str]:
+def _places(where: Where, place: PlaceFound) -> list[str]:
     """The intervals that locate the gap."""
-    found = {name: where[name] for name in place["narrow"]}
     places = []
-    if "time_s" in found:
-        places.append("between {:.1f} and {:.1f} s of the record".format(*found["time_s"]))
-    if "amplitude_rad" in found:
-        least, most = (f"{float(f'{degrees(one):.2g}'):g}" for one in found["amplitude_rad"])
+    if "time_s" in place.narrow and where.time_s is not None:
+        places.append("between {:.1f} and {:.1f} s of the record".format(*where.time_s))
+    if "amplitude_rad" in place.narrow and where.amplitude_rad is not None:
+        least, most = (f"{float(f'{degrees(one):.2g}'):g}" for one in where.amplitude_rad)
         places.append(f"at amplitudes from {least}° to {most}°")
-    if "frequency_hz" in found:
-        places.append("at {:.2f} to {:.2f} Hz".format(*found["frequency_hz"]))
+    if "frequency_hz" in place.narrow and where.frequency_hz is not None:
+        places.append("at {:.2f} to {:.2f} Hz".format(*where.frequency_hz))
     return places
 
 
-def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
+def _agreement(where: Where, place: PlaceFound) -> str:
     """Whether causes act at the place that the residuals show; empty where there is nothing to compare."""
-    if not place["compared"] or where["channel"] is None:
+    if not place.compared or where.channel is None:
         return ""
-    kinds = [effect_class(name) for name in place["compared"]]
-    there = [kind for kind in kinds if where["channel"] == kind.channel]
-    alike = [kind for kind in kinds if kind not in there and where["channel"] in kind.resembles]
+    kinds = [effect_class(name) for name in place.compared]
+    there = [kind for kind in kinds if where.channel == kind.channel]
+    alike = [kind for kind in kinds if kind not in there and where.channel in kind.resembles]
     elsewhere: dict[str, list[str]] = {}
     for kind in (kind for kind in kinds if kind not in there):
         elsewhere.setdefault(CHANNELS[kind.channel], []).append(kind.name)
@@ -163,13 +160,13 @@ def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
         for acts, names in elsewhere.items()
     ]
     if not elsewhere:
-        return f"That agrees with {plain(*place['compared'])}."
+        return f"That agrees with {plain(*place.compared)}."
     if there:
         acts_there = f"{plain(*(kind.name for kind in there))} act{'s' * (len(there) == 1)} there"
         return f"{acts_there[0].upper()}{acts_there[1:]}; {' and '.join(acting)}."
     if alike:
         names = plain(*(kind.name for kind in alike))
         return f"{names[0].upper()}{names[1:]} look{'s' * (len(alike) == 1)} like this in a decay."
-    if not place.get("elsewhere", True):
+    if not place.elsewhere:
         return ""  # the place does not speak against them
-    return f"That does not agree with {plain(*place['compared'])}: {' and '.join(acting)}."
+    return f"That does not agree with {plain(*place.compared)}: {' and '.join(acting)}."

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from diagnosis.findings.whole import Findings
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
 from diagnosis.words.numbers import unit_of
 from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words
-from identification.printing import Document
 from identification.status import Remark
 
 
@@ -40,22 +40,22 @@ class Sentences:
     patch: tuple[str, ...]
 
 
-def sentences(document: Document) -> Sentences:
+def sentences(answer: Findings) -> Sentences:
     """Write the sentences of a diagnosis.
 
     Args:
         document: the diagnosis in JSON's types; its text fields are ignored.
     """
-    found, rest, model = document["found"], rest_words(document), document["model"]
-    unit = unit_of(document)
+    found, rest, model = answer.found, rest_words(answer), answer.model
+    unit = unit_of(answer)
     return Sentences(
-        verdict=verdict(document, rest),
-        where=where_words(document),
+        verdict=verdict(answer, rest),
+        where=where_words(answer),
         rest=rest,
-        closable=closable_words(document),
-        note=coefficient_note(document),
-        noise="" if found["noise"] is None else said(NOISE, found["noise"], unit),
-        cautions=tuple(said(CAUTIONS, one, unit) for one in found["cautions"]),
-        remarks=tuple(remark(one, unit) for one in found["noted"]),
-        patch=() if model is None else tuple(said(PATCH, one) for one in model["differences"]),
+        closable=closable_words(answer),
+        note=coefficient_note(answer),
+        noise="" if found.noise is None else said(NOISE, found.noise, unit),
+        cautions=tuple(said(CAUTIONS, one, unit) for one in found.cautions),
+        remarks=tuple(remark(one, unit) for one in found.noted),
+        patch=() if model is None else tuple(said(PATCH, one) for one in model.differences),
     )

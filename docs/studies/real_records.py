@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis import diagnose
+from diagnosis.result import Diagnosis
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from tunnel_lab.plotting.style import save
 from tunnel_lab.report.figures import waterfall_figure
@@ -115,7 +116,7 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
         std = "" if given["std"] is None else f" ± {given['std']:.1g}"
         unit = "" if given["unit"] == "1" else f" {given['unit']}"
         parts.append(f"- `{key}`: {given['value']:.4g}{std}{unit}")
-    figure = waterfall_figure(document)
+    figure = waterfall_figure(Diagnosis.from_json_dict(document))
     if figure is not None:
         path = images / f"real-records-{name}.png"
         save(figure, path)

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from math import degrees
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import tomli_w
 from nicegui import ui
 
+from diagnosis.result import Diagnosis
 from diagnosis.words.numbers import plain
+from diagnosis.words.verdict import distinguishes
 from identification.blocks import Paragraph, typeset
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, left_out_of, options
@@ -144,10 +146,10 @@ class DiagnosePage:
 
     def _show_answer(self) -> None:
         try:
-            document = read_diagnosis(self._session)
-            if document is not None and is_current(self._session, self._session.diagnosis):
-                ShownAnswer(self._session, document)
-            elif document is not None:
+            answer = read_diagnosis(self._session)
+            if answer is not None and is_current(self._session, self._session.diagnosis):
+                ShownAnswer(self._session, answer)
+            elif answer is not None:
                 words = "The campaign has changed since it was diagnosed; diagnose it again."
                 ui.label(words).classes("fault")
         except TunnelError as error:
@@ -194,34 +196,34 @@ def progress_of(lines: Sequence[str]) -> DiagnosisProgress:
 class ShownAnswer:
     """The answer in words and figures, and fits with causes chosen by hand."""
 
-    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+    def __init__(self, session: Session, answer: Diagnosis) -> None:
         from diagnosis.words.cards import key_figures
         from diagnosis.words.sections import sections
         from diagnosis.words.verdict import headline
 
-        answer, kind = headline(document)
+        words, kind = headline(answer)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
-            ui.label(answer).classes("answer")
-            ui.label(document["verdict"])
-            show_facts((typeset(one.value), one.label, typeset(one.note)) for one in key_figures(document))
-        if (document.get("maps") or {}).get("traces"):
+            ui.label(words).classes("answer")
+            ui.label(answer.verdict)
+            show_facts((typeset(one.value), one.label, typeset(one.note)) for one in key_figures(answer))
+        if answer.figure_data.get("traces"):
             heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
             ui.element("iframe").classes("fit-frame").props(
                 f'src="{source}" title="The fit over the data" loading=lazy'
             )
         self._figures = ui.element("div").classes("figures")
-        ui.timer(0.0, lambda: self._draw(document), once=True)
-        parts = {section.key: section.blocks for section in sections(document)}
+        ui.timer(0.0, lambda: self._draw(answer), once=True)
+        parts = {section.key: section.blocks for section in sections(answer)}
         for keys in _FIRST:
             show_blocks(block for key in keys for block in parts.pop(key))
         with ui.expansion("Residual gap, runs and caveats"):
             for key in (key for key in parts if key not in _ELSEWHERE):
                 show_blocks(parts[key])
-        if document["gap"]["detected"]:
-            ByHandPart(session, document)
+        if answer.gap.detected:
+            ByHandPart(session, answer)
 
-    async def _draw(self, document: dict[str, Any]) -> None:
+    async def _draw(self, answer: Diagnosis) -> None:
         """The figures of the report's summary."""
 
         def drawings() -> list[str]:
@@ -232,11 +234,11 @@ class ShownAnswer:
             from tunnel_lab.report.repeatability import repeatability_figure
             from tunnel_lab.report.where import runs_figure
 
-            drawn = {"waterfall": waterfall_figure(document)}
-            if not repeats(document):
-                drawn["repeatability"] = repeatability_figure(document)
-            if document.get("maps"):
-                drawn["where-runs"] = runs_figure(document)
+            drawn = {"waterfall": waterfall_figure(answer)}
+            if not repeats(answer):
+                drawn["repeatability"] = repeatability_figure(answer)
+            if answer.maps:
+                drawn["where-runs"] = runs_figure(answer)
             return [
                 inline_svg(fig, name, DESCRIPTIONS[name]) for name, fig in drawn.items() if fig is not None
             ]
@@ -252,14 +254,14 @@ class ShownAnswer:
 class ByHandPart:
     """Switches for the causes, initially those of the diagnosis, and the closure with them."""
 
-    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+    def __init__(self, session: Session, answer: Diagnosis) -> None:
         from tunnel_sim.effects import known_effects
 
-        self._session, self._document = session, document
+        self._session, self._answer = session, answer
         self._waiting = self._converged = False
         heading("By hand")
         ui.label(_ABOUT).classes("soft")
-        listed = [name for candidate in document["candidates"] for name in candidate["effect"].split(" + ")]
+        listed = [name for candidate in answer.candidates for name in candidate.effect.split(" + ")]
         known = [kind for kind in known_effects() if kind.fitted]
         known.sort(key=lambda kind: listed.index(kind.name) if kind.name in listed else len(listed))
         self._boxes = {}
@@ -267,7 +269,7 @@ class ByHandPart:
             with ui.element("legend"):
                 ui.html("Causes", sanitize=False, tag="span")
             for kind in known:
-                box = ui.checkbox(kind.name.replace("_", " "), value=kind.name in document["causes"])
+                box = ui.checkbox(kind.name.replace("_", " "), value=kind.name in answer.causes)
                 self._boxes[kind.name] = box.on_value_change(partial(self._fit_chosen, False))
         self._fault = Fault()
         self._place = ui.element("div").props("role=status aria-live=polite").classes("by-hand")
@@ -287,7 +289,7 @@ class ByHandPart:
             if shown == (effects, self._converged):
                 break
             shown = (effects, self._converged)
-            runs = work.Runs(self._session.campaign, self._session.state(), left_out_of(self._document))
+            runs = work.Runs(self._session.campaign, self._session.state(), left_out_of(self._answer))
             closure, fault = None, ""
             try:
                 closure = await work.closure(runs, effects, converged=self._converged)
@@ -299,12 +301,12 @@ class ByHandPart:
             self._place.clear()
             with self._place:
                 if closure is not None:
-                    show_closure(closure, self._document)
+                    show_closure(closure, self._answer)
         self._waiting = False
         self._place.classes(remove="waiting")
 
 
-def show_closure(closure: Closure, document: dict[str, Any]) -> None:
+def show_closure(closure: Closure, answer: Diagnosis) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
     from diagnosis.words.numbers import misfit_shown, share
     from identification.printing import estimated, unit_mark
@@ -315,8 +317,8 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     show_facts(
         [
             (share(closure.closed), f"explained {closure.held_out}"),
-            (misfit_shown(document, closure.after), "residual misfit, root mean square"),
-            (misfit_shown(document, closure.before), "with the nominal model"),
+            (misfit_shown(answer, closure.after), "residual misfit, root mean square"),
+            (misfit_shown(answer, closure.before), "with the nominal model"),
         ]
     )
     ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap explained"')
@@ -331,18 +333,18 @@ def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.words.verdict import next_steps, rival_lines, run_to_make, unplannable
 
-    document = read_diagnosis(session)
-    assert document is not None  # else the stage is closed
+    answer = read_diagnosis(session)
+    assert answer is not None  # else the stage is closed
     heading("What to do next")
     with ui.element("ol"):
-        show_items(next_steps(document))
-    show_blocks(map(Paragraph, rival_lines(document)))
-    if (run := run_to_make(document)) is not None:
+        show_items(next_steps(answer))
+    show_blocks(map(Paragraph, rival_lines(answer)))
+    if (run := run_to_make(answer)) is not None:
         show_run(run)
-    if why := unplannable(document):
+    if why := unplannable(answer):
         ui.label(why).classes("soft")
     else:
-        _Rivals(session, document)
+        _Rivals(session, answer)
     with ui.element("p").classes("buttons"):
         frame.way_on()
 
@@ -350,27 +352,27 @@ def build_next_run(session: Session, frame: Frame) -> None:
 class _Rivals:
     """Fields for two answers, and the run that would distinguish them."""
 
-    def __init__(self, session: Session, document: dict[str, Any]) -> None:
+    def __init__(self, session: Session, answer: Diagnosis) -> None:
         from diagnosis.words.numbers import windy
         from tunnel_sim.effects import known_effects
 
-        self._session, self._left_out = session, left_out_of(document)
-        blown = windy(document)  # an effect of the wind cannot be fitted to runs without wind
+        self._session, self._left_out, self._settings = session, left_out_of(answer), answer.settings
+        blown = windy(answer)  # an effect of the wind cannot be fitted to runs without wind
         fitted = {
             kind.name: plain(kind.name)
             for kind in known_effects()
             if kind.fitted and (blown or kind.condition == "always")
         }
         answers = [
-            [name for name in candidate["effect"].split(" + ") if name in fitted]
-            for candidate in document["candidates"]
+            [name for name in candidate.effect.split(" + ") if name in fitted]
+            for candidate in answer.candidates
         ]
-        answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
+        answers = [names for names in answers if names] or [[next(iter(fitted))]]
         heading("Which run would distinguish two answers?")
         with ui.element("div").classes("fields"):
             self._first, self._second = (
-                ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")
-                for label, answer in (
+                ui.select(fitted, label=label, value=names, multiple=True).props("dense use-chips")
+                for label, names in (
                     ("This answer", answers[0]),
                     ("or that one", answers[min(1, len(answers) - 1)]),
                 )
@@ -381,7 +383,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.words.verdict import run_to_make, too_close
+        from diagnosis.words.verdict import too_close
 
         self._place.clear()
         with self._fault.around():
@@ -401,7 +403,7 @@ class _Rivals:
             if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                if run_to_make({"next_run": run}) is None:
+                if not distinguishes(run, self._settings):
                     ui.label(too_close(run))
                 else:
                     show_run(run)
@@ -478,9 +480,9 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign
 
-    document = read_diagnosis(session)
-    assert document is not None  # else the stage is closed
+    answer = read_diagnosis(session)
+    assert answer is not None  # else the stage is closed
     made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
-    given = read_campaign(session.campaign).without(left_out_of(document))
+    given = read_campaign(session.campaign).without(left_out_of(answer))
     campaign = diagnosable(given).campaign
-    write_report(document, campaign, session.report, Byline(made, author, notes))
+    write_report(answer, campaign, session.report, Byline(made, author, notes))

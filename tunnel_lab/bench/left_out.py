@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from nicegui import ui
 
+from diagnosis.result import Diagnosis
 from tunnel_lab.bench.workspace import CAMPAIGN_FILE, Session
 from tunnel_sim.files.campaign_folder import read_document
 from tunnel_sim.files.reading import read_json
@@ -26,9 +26,9 @@ def options(session: Session) -> tuple[str, ...]:
     return tuple(word for name in runs_left_out(session) for word in ("--leave-out", name))
 
 
-def left_out_of(document: Mapping[str, Any]) -> tuple[str, ...]:
+def left_out_of(answer: Diagnosis) -> tuple[str, ...]:
     """Ids of the runs that a diagnosis left out at the user's request."""
-    return tuple((document.get("provenance") or {}).get("left_out", ()))
+    return tuple(answer.provenance.get("left_out", ()))
 
 
 def build_choice(session: Session, changed: Callable[[], None]) -> None:

@@ -205,11 +205,11 @@ def add_pages(folder: Path) -> None:
         from tunnel_lab.report import render_fit
 
         session = open_session(folder, name)
-        document = read_diagnosis(session)
-        if document is None:
+        answer = read_diagnosis(session)
+        if answer is None:
             raise HTTPException(_CONFLICT, "Diagnose the campaign first.")
         with as_described("cannot be drawn", shown(session.diagnosis), "diagnose the campaign again"):
-            page = render_fit(document)
+            page = render_fit(answer)
         return _report(page)
 
     @ui.page("/{name}/{stage}")

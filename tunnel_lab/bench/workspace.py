@@ -11,6 +11,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from diagnosis.result import Diagnosis
 from tunnel_lab.bench.work import work_of
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
@@ -257,12 +258,12 @@ def read_result(path: Path) -> dict[str, Any] | None:
     return read_json(path, remedy="delete it, and let the bench write it again")
 
 
-def read_diagnosis(session: Session) -> dict[str, Any] | None:
+def read_diagnosis(session: Session) -> Diagnosis | None:
     """The diagnosis as it is shown; None where there is none.
 
     Raises:
         TunnelError: when the file is not one that this version's ``tunnel diagnose --json`` writes.
     """
-    from tunnel_lab.report.diagnosis_file import read_whole
+    from tunnel_lab.report import diagnosis_file
 
-    return read_whole(session.diagnosis) if session.diagnosis.is_file() else None
+    return diagnosis_file.read_diagnosis(session.diagnosis) if session.diagnosis.is_file() else None

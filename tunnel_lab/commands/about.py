@@ -189,7 +189,7 @@ SCHEMAS = {
     "campaign": "tunnel_sim.files.campaign_folder:CampaignDocument.model_json_schema",
     "plan": "tunnel_sim.files.plan_file:PlanDocument.model_json_schema",
     "estimate": "identification.estimate:estimate_schema",
-    "diagnosis": "tunnel_lab.report.diagnosis_file:DiagnosisDocument.model_json_schema",
+    "diagnosis": "diagnosis.findings.schema:diagnosis_schema",
 }
 """By name of the document: the module and the function that makes its schema."""
 

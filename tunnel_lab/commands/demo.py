@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Option
 
+from diagnosis.result import Diagnosis
 from identification.blocks import TextTable
-from identification.printing import Document
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
 from tunnel_sim.vocabulary.dimensions import beside
@@ -110,18 +110,17 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     write_json(files.estimate(CHECKED_ESTIMATOR), estimate.to_json_dict())
     with step_display() as show_step:
         answer = diagnosis.diagnose(campaign, progress=show_step)
-    document = answer.to_json_dict()
-    document["provenance"]["sha256"] = file_hashes(files.campaign)
-    write_json(files.diagnosis, document)
-    write_report(document, campaign, folder / REPORT)
-    show_faults(plan, campaign, document)
+    answer = answer.with_hashes(file_hashes(files.campaign))
+    write_json(files.diagnosis, answer.to_json_dict())
+    write_report(answer, campaign, folder / REPORT)
+    show_faults(plan, campaign, answer)
     say_written(folder / REPORT)
     say(f"Records, plan and both answers (JSON) are in {folder}")
     show_next(folder)
-    return missed_faults(plan, document)
+    return missed_faults(plan, answer)
 
 
-def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> None:
+def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> None:
     """Print the injected faults, the findings, and the explained part of the gap."""
     from diagnosis.words.tables import waterfall_table
     from tunnel_sim.effects.registry import effect_class
@@ -139,33 +138,33 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, document: Document) -> N
             if info.name in effect.parameters
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
-    say(f"\nFound, from the records alone:\n{document['verdict']}\n")
-    show([found_table(plan, document), waterfall_table(document)])
+    say(f"\nFound, from the records alone:\n{answer.verdict}\n")
+    show([found_table(plan, answer), waterfall_table(answer)])
 
 
-def found_table(plan: CampaignPlan, document: Document) -> TextTable:
+def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:
     """The injected values, beside the results of the nominal model and of the model with the causes."""
     from identification.estimate import UNITS
     from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
     from tunnel_sim.effects.registry import effect_class
 
     rows = []
-    before, after = document["coefficients"]["before"], document["coefficients"]["after"]
+    before, after = answer.coefficients.before, answer.coefficients.after
     for name in after:
         truth = getattr(plan.truth, name)
         rows.append(
             (
                 f"{SYMBOLS[name]} {unit(UNITS[name])}",
                 significant(truth),
-                with_std(before[name]["value"], before[name]["std"]),
-                with_std(after[name]["value"], after[name]["std"]),
-                in_stds(after[name]["value"] - truth, after[name]["std"]),
+                with_std(before[name].value, before[name].std),
+                with_std(after[name].value, after[name].std),
+                in_stds(after[name].value - truth, after[name].std),
             )
         )
-    for (effect, name), (truth, found) in planted_and_found(plan, document).items():
+    for (effect, name), (truth, found) in planted_and_found(plan, answer).items():
         info = next(info for info in effect_class(effect).parameters() if info.name == name)
-        error = in_stds(found["value"] - truth, found["std"]) if found and found["std"] else ""
-        cell = "not found" if found is None else estimated(found)
+        error = in_stds(found.value - truth, found.std) if found and found.std else ""
+        cell = "not found" if found is None else estimated(found.to_json_dict())
         rows.append((f"{info.symbol} {unit(info.unit)}", significant(truth), "", cell, error))
     heads = ("quantity", "planted", "nominal model", "with the causes", "error")
     return TextTable(
@@ -174,13 +173,13 @@ def found_table(plan: CampaignPlan, document: Document) -> TextTable:
 
 
 def planted_and_found(
-    plan: CampaignPlan, document: Document
-) -> dict[tuple[str, str], tuple[float, Document | None]]:
+    plan: CampaignPlan, answer: Diagnosis
+) -> dict[tuple[str, str], tuple[float, Quantity | None]]:
     """Injected parameters by effect and name, each with the answer's; None where the answer lacks it."""
-    answer = document["candidates"][0]
+    first = answer.candidates[0]
     given = {
-        tuple(name.split(".")) if "." in name else (answer["effect"], name): found
-        for name, found in answer["parameters"].items()
+        tuple(name.split(".")) if "." in name else (first.effect, name): found
+        for name, found in first.parameters.items()
     }
     return {
         (effect.name, name): (value, given.get((effect.name, name)))
@@ -189,23 +188,23 @@ def planted_and_found(
     }
 
 
-def missed_faults(plan: CampaignPlan, document: Document) -> list[str]:
+def missed_faults(plan: CampaignPlan, answer: Diagnosis) -> list[str]:
     """Clauses on errors of a diagnosis: other causes, or a size or coefficient too far from the truth.
 
     A choice among stated values, such as the spring, has no standard deviation and must equal the injected value.
     """
     planted = sorted(effect.name for effect in plan.effects)
-    if sorted(document["causes"]) != planted:
-        found = " and ".join(document["causes"]) or "none"
-        return [f"planted {' and '.join(planted)}, found {found}"]
-    pairs = {f"{effect} {name}": pair for (effect, name), pair in planted_and_found(plan, document).items()}
-    for name, found in document["coefficients"]["after"].items():
+    if sorted(answer.causes) != planted:
+        named = " and ".join(answer.causes) or "none"
+        return [f"planted {' and '.join(planted)}, found {named}"]
+    pairs = {f"{effect} {name}": pair for (effect, name), pair in planted_and_found(plan, answer).items()}
+    for name, found in answer.coefficients.after.items():
         pairs[name] = getattr(plan.truth, name), found
     return [
         f"{name} misses the truth by more than {CHECK_STDS:g} std"
         for name, (truth, found) in pairs.items()
         if found is None
-        or not isclose(found["value"], truth, abs_tol=CHECK_STDS * (found["std"] or 0.0), rel_tol=1e-9)
+        or not isclose(found.value, truth, abs_tol=CHECK_STDS * (found.std or 0.0), rel_tol=1e-9)
     ]
 
 

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
 from identification.blocks import TextTable
-from identification.printing import Document, coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
@@ -27,6 +27,7 @@ from tunnel_lab.terminal.arguments import (
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
@@ -181,9 +182,8 @@ def diagnose(
         from diagnosis.patch.patched_model import refuse_unpatchable
 
         refuse_unpatchable(own_model, data, patch)
-    answer = diagnose_with_progress(whole, kinds, own_model, left_out)
+    answer = diagnose_with_progress(whole, kinds, own_model, left_out).with_hashes(hashes)
     document = answer.to_json_dict()
-    document["provenance"]["sha256"] = hashes
     # Files first: the reader of a pipe may close it early.
     if json is not None and not to_stdout:
         write_json(json, document)
@@ -195,30 +195,30 @@ def diagnose(
         today = datetime.now().astimezone().date().isoformat()
         byline = Byline(today, author, notes, "" if patch is None else patch.name)
         if report is not None:
-            write_report(document, answer.data, report, byline)
+            write_report(answer, answer.data, report, byline)
         if summary is not None:
-            write_summary(document, answer.data, summary, byline)
-    proposed = None if propose is None else write_proposal(propose, document)
+            write_summary(answer, answer.data, summary, byline)
+    proposed = None if propose is None else write_proposal(propose, answer)
     if to_stdout:
         typer.echo(printable_json(json_text(document)), nl=False)
         return
-    show(printed(document))
+    show(printed(answer))
     if propose is not None and proposed is None:
         nothing = "no residual gap is significant, a random moment is a cause, or the body has no spring"
-        say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
+        say(f"No formula is proposed: {'none is supported' if answer.closable else nothing}")
     say_written(json, report, summary, patch, proposed)
 
 
-def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
+def write_proposal(path: Path, answer: Diagnosis) -> Path | None:
     """Write the proposed formula as an effects file; None without a proposal."""
     import tomli_w
 
     from tunnel_sim.files.writing import write_whole
 
-    law = (document["closable"] or {}).get("law")
+    law = None if answer.closable is None else answer.closable.law
     if law is None:
         return None
-    return write_whole(path, tomli_w.dumps({"effects": [law["effect"]]}).encode())
+    return write_whole(path, tomli_w.dumps({"effects": [as_json(law.effect)]}).encode())
 
 
 def diagnose_with_progress(
@@ -278,7 +278,7 @@ def compare(
         raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
     diagnoses = [read_diagnosis(path) for path in documents]
     # The campaign's name; the file's where campaigns share a name; if also shared, with a number.
-    names, stems = [str(d["campaign"]) for d in diagnoses], [one_line(path.stem) for path in documents]
+    names, stems = [d.campaign for d in diagnoses], [one_line(path.stem) for path in documents]
     if len(set(names)) < len(names):
         names = stems
     if len(set(names)) < len(names):
@@ -286,63 +286,64 @@ def compare(
     show(comparison_tables(names, diagnoses))
 
 
-def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[TextTable]:
+def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> list[TextTable]:
     """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
 
     Args:
-        names: of the documents, each different.
-        documents: of diagnoses, the reference first.
+        names: of the diagnoses, each different.
+        answers: the reference first.
     """
     from diagnosis.words.numbers import excess_std, probability, share
     from diagnosis.words.scatter import spread_estimate
 
-    def excess(document: Document, key: str) -> str:
-        """An excess with its standard deviation by chance, where the document has the noise of its runs."""
-        value, std = document["gap"][key], excess_std(document)
+    def excess(answer: Diagnosis, value: float) -> str:
+        """An excess with its standard deviation by chance, where the diagnosis has the noise of its runs."""
+        std = excess_std(answer)
         return f"{value:.4g}" if std is None else with_std(value, std)
 
-    explained = [document["causes"] not in ([], ["unknown"]) for document in documents]
-    pairs = list(zip(documents, explained, strict=True))
-    answers = (
-        ("gap [× noise variance]", *(excess(d, "excess_before") for d in documents)),
+    rows_of_answers = (
+        ("gap [× noise variance]", *(excess(d, d.gap.excess_before) for d in answers)),
         (
             "residual gap [× noise variance]",
-            *(excess(d, "excess_after") if known else _NONE for d, known in pairs),
+            *(excess(d, d.gap.excess_after) if d.names_effects else _NONE for d in answers),
         ),
-        ("share explained", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
-        ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
-        ("decided", *("yes" if d["decided"] else "no" for d in documents)),
-        ("or instead", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
-        ("probability", *(probability(d["candidates"][0]["probability"]) for d in documents)),
+        ("share explained", *(share(d.gap.closed) if d.names_effects else _NONE for d in answers)),
+        ("causes", *(",\n".join(d.causes) or "none" for d in answers)),
+        ("decided", *("yes" if d.decision.decided else "no" for d in answers)),
+        ("or instead", *(",\n".join(d.ambiguous_with) or _NONE for d in answers)),
+        ("probability", *(probability(d.candidates[0].probability) for d in answers)),
     )
     parameters = []  # of each answer, by effect and name
-    for document in documents:
-        answer, texts = document["candidates"][0], {}
-        for full, given in answer["parameters"].items():
+    for answer in answers:
+        first_answer, texts = answer.candidates[0], {}
+        for full, given in first_answer.parameters.items():
             owner, _, name = full.rpartition(".")
-            mark = unit_mark(beside(given["unit"], ""))
-            owner = owner or answer["effect"]
-            texts[owner, name] = spread_estimate(document, owner, given) or estimated(given, mark)
+            mark = unit_mark(beside(given.unit, ""))
+            owner = owner or first_answer.effect
+            texts[owner, name] = spread_estimate(answer, owner, given) or estimated(
+                given.to_json_dict(), mark
+            )
         parameters.append(texts)
     labels = {
-        name: coefficient_label(name, given["unit"])
-        for document in documents
-        for name, given in document["coefficients"]["after"].items()
+        name: coefficient_label(name, given.unit)
+        for answer in answers
+        for name, given in answer.coefficients.after.items()
     }
     coefficients = []
     for name, label in labels.items():
         for key in ("before", "after"):
-            found = [document["coefficients"][key].get(name) for document in documents]
-            cells = (_NONE if given is None else estimated(given) for given in found)
+            found = [getattr(answer.coefficients, key).get(name) for answer in answers]
+            cells = (_NONE if given is None else estimated(given.to_json_dict()) for given in found)
             coefficients.append((f"{label} {key}", *cells))
-    first, *others = (document["coefficients"]["after"] for document in documents)
+    first, *others = (answer.coefficients.after for answer in answers)
     differences = []  # assumed independent
     for name, label in labels.items():
         row, mine = [label], first.get(name)
         for theirs in (other.get(name) for other in others):
-            alike = mine is not None and theirs is not None and mine["unit"] == theirs["unit"]
-            if alike and mine["std"] is not None and theirs["std"] is not None:
-                moved, std = theirs["value"] - mine["value"], math.hypot(mine["std"], theirs["std"])
+            if mine is None or theirs is None or mine.unit != theirs.unit:
+                row.append(_NONE)
+            elif mine.std is not None and theirs.std is not None:
+                moved, std = theirs.value - mine.value, math.hypot(mine.std, theirs.std)
                 row.append(f"{with_std(moved, std)} ({in_stds(moved, std)})")
             else:
                 row.append(_NONE)
@@ -352,7 +353,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     quantity, parameter = ("quantity",), ("effect", "parameter")
     change = f"Coefficients with the causes: difference from {names[0]}"
     return [
-        TextTable("Gap and answer", (*quantity, *names), answers),
+        TextTable("Gap and answer", (*quantity, *names), rows_of_answers),
         TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
         TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
         TextTable(change, (*quantity, *names[1:]), tuple(differences)),

@@ -115,20 +115,20 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
         TunnelError: for an unknown figure or run, or a diagnosis without curves.
     """
     from tunnel_lab.report import draw
-    from tunnel_lab.report.diagnosis_file import read_document
+    from tunnel_lab.report.diagnosis_file import read_diagnosis
     from tunnel_lab.report.repeatability import repeatability_figure
     from tunnel_lab.report.where import fit_pages
 
-    document, drawn = read_document(file), dict[str, "Figure"]()
+    answer, drawn = read_diagnosis(file), dict[str, "Figure"]()
     where, again = shown(file), "diagnose the campaign again"
     with as_described("cannot be drawn", where, again):
         if not names or "fit" in names:
-            pages = fit_pages(document, runs)
+            pages = fit_pages(answer, runs)
             if not pages:
                 raise TunnelError("has no curves to draw", where=where, remedy=again)
             drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
-        drawn |= {name: draw(document, name) for name in names if name != "fit"}
-        repeats = None if names else repeatability_figure(document)
+        drawn |= {name: draw(answer, name) for name in names if name != "fit"}
+        repeats = None if names else repeatability_figure(answer)
     return drawn if repeats is None else drawn | {"repeatability": repeats}
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.findings.closure import Misfit
-from diagnosis.words.numbers import misfit_of, unit_shown
+from diagnosis.findings.whole import Findings
+from diagnosis.words.numbers import unit_shown
 from identification.printing import Document
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
@@ -93,14 +94,14 @@ def run_labels(maps: Document) -> list[str]:
     return labels
 
 
-def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
+def misfit_scale(answer: Findings) -> tuple[str, Callable[[float], float]]:
     """The unit in which gaps are drawn, and the function from an excess in noise variances to this unit.
 
     The unit is degrees for readings of angles, and standard deviations of the noise for a document without
     ``misfit``.
     """
-    misfit = misfit_of(document) or Misfit(1.0, 0.0, "rad")
-    unit, factor = unit_shown(misfit.unit) if document["gap"].get("misfit") else ("noise std", 1.0)
+    misfit = answer.gap.misfit or Misfit(1.0, 0.0, "rad")
+    unit, factor = unit_shown(misfit.unit) if answer.gap.misfit else ("noise std", 1.0)
     return unit, lambda excess: factor * misfit.rms(excess)
 
 

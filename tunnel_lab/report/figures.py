@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.settings import settings_of
+from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
 from diagnosis.words.numbers import excess_std, plain, probability, unit_shown
 from diagnosis.words.scatter import answer_name
-from identification.printing import Document, coefficient_label, significant
+from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,
@@ -76,25 +76,25 @@ _AXES = {
 }
 
 
-def diagnosis_figures(document: Document) -> dict[str, Figure]:
+def diagnosis_figures(answer: Findings) -> dict[str, Figure]:
     """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
-    figures = {name: make(document) for name, make in _makers(document).items()}
+    figures = {name: make(answer) for name, make in _makers(answer).items()}
     return {name: figure for name, figure in figures.items() if figure is not None}
 
 
-def diagnosis_figure(document: Document, name: str) -> Figure | None:
+def diagnosis_figure(answer: Findings, name: str) -> Figure | None:
     """One of `diagnosis_figures`; None where there is no such figure."""
-    make = _makers(document).get(name)
-    return None if make is None else make(document)
+    make = _makers(answer).get(name)
+    return None if make is None else make(answer)
 
 
-def _makers(document: Document) -> dict[str, Callable[[Document], Figure | None]]:
+def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     """By name, in the order of the report, what draws each figure, or finds that there is none."""
-    makers: dict[str, Callable[[Document], Figure | None]] = {}
-    if document.get("maps") and document["causes"]:
+    makers: dict[str, Callable[[Findings], Figure | None]] = {}
+    if answer.maps and answer.causes:
         makers["place"] = where.place_figure
     makers["waterfall"] = waterfall_figure
-    if document.get("maps"):
+    if answer.maps:
         makers |= {
             "fit": where.fit_figure,
             "where-runs": where.runs_figure,
@@ -114,30 +114,28 @@ def _makers(document: Document) -> dict[str, Callable[[Document], Figure | None]
     }
 
 
-def summary_figures(document: Document) -> dict[str, Figure]:
+def summary_figures(answer: Findings) -> dict[str, Figure]:
     """The figures of the printed summary; the fit over the data in several heights, one of which is shown."""
-    located = document.get("maps") and document["causes"]
-    place = where.place_figure(document, _LOW) if located else None
-    figures = {"place": place, "waterfall": waterfall_figure(document)}
-    return {name: figure for name, figure in figures.items() if figure is not None} | where.fit_sheets(
-        document
-    )
+    located = answer.maps and answer.causes
+    place = where.place_figure(answer, _LOW) if located else None
+    figures = {"place": place, "waterfall": waterfall_figure(answer)}
+    return {name: figure for name, figure in figures.items() if figure is not None} | where.fit_sheets(answer)
 
 
 @styled
-def waterfall_figure(document: Document) -> Figure | None:
+def waterfall_figure(answer: Findings) -> Figure | None:
     """The residual gap as the causes are added one after another; None where no cause is named.
 
     A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a dot
     for the rest, on a linear scale of the root mean square misfit.
     """
-    steps = document.get("waterfall", [])
+    steps = answer.waterfall.steps
     if len(steps) < 2:
         return None
-    unit, size = misfit_scale(document)
-    misfits = np.array([size(step["excess"]) for step in steps], np.float64)
-    without = {name: size(value) for name, value in document.get("without", {}).items()}
-    alone = [without.get(step["effect"], np.nan) if len(without) > 1 else np.nan for step in steps]
+    unit, size = misfit_scale(answer)
+    misfits = np.array([size(step.excess) for step in steps], np.float64)
+    without = {name: size(value) for name, value in answer.waterfall.without.items()}
+    alone = [without.get(step.effect or "", np.nan) if len(without) > 1 else np.nan for step in steps]
     fig = figure(NARROW, 1.2 + 0.36 * (misfits.size + 1))
     axes = fig.add_subplot()
     rows, upper = np.arange(misfits.size + 1), np.maximum(misfits[:-1], misfits[1:])
@@ -150,7 +148,7 @@ def waterfall_figure(document: Document) -> Figure | None:
     if np.isfinite(alone).any():
         label = "without this cause alone"
         axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
-    names = [textwrap.fill(f"+ {plain(answer_name(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
+    names = [textwrap.fill(f"+ {plain(answer_name(step.effect or ''))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(rows, ["nominal model", *names, "the rest"])
     axes.set(ylim=(misfits.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
     axes.locator_params(axis="x", nbins=6)
@@ -162,15 +160,14 @@ def waterfall_figure(document: Document) -> Figure | None:
         f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}"
         for value in misfits.tolist()
     ]
-    rest = document.get("rest") or {}
-    if rest.get("significant") is False:
+    if answer.rest is not None and not answer.rest.significant:
         shown[-1] = WITHIN_THE_NOISE
-    elif rest:
-        shown[-1] += ", material" if rest.get("material") else ", immaterial"
+    elif answer.rest is not None:
+        shown[-1] += ", material" if answer.rest.material else ", immaterial"
     # The residual after the last cause is given in the row of the rest.
     words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
     _place_texts(axes, words, [misfits[0], *upper, misfits[-1]], [*alone, np.nan])
-    noise = size(SIGMAS * (excess_std(document) or _LEAST_EXCESS))
+    noise = size(SIGMAS * (excess_std(answer) or _LEAST_EXCESS))
     seen = noise > _VISIBLE * axes.get_xlim()[1]
     axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)
     if seen or np.isfinite(alone).any():  # a key aligned with the axis above it
@@ -208,17 +205,17 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 
 
 @styled
-def candidates_figure(document: Document) -> Figure | None:
+def candidates_figure(answer: Findings) -> Figure | None:
     """The answers that are not improbable; None for fewer than two, where words suffice."""
-    least = settings_of(document).words.answer_drawn
-    shown = [c for c in ranked(document)[:SHOWN] if c["probability"] >= least]
+    least = answer.settings.words.answer_drawn
+    shown = [c for c in ranked(answer)[:SHOWN] if c.probability >= least]
     if len(shown) < 2:
         return None
-    names = [textwrap.fill(plain(answer_name(candidate["effect"])), _LABEL) for candidate in shown]
+    names = [textwrap.fill(plain(answer_name(candidate.effect)), _LABEL) for candidate in shown]
     fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
-    values = [candidate["probability"] for candidate in shown]
-    colours = [ACCENT if candidate is document["candidates"][0] else QUIET for candidate in shown]
+    values = [candidate.probability for candidate in shown]
+    colours = [ACCENT if candidate is answer.candidates[0] else QUIET for candidate in shown]
     axes.barh(range(len(shown)), values, color=colours, height=0.6)
     for index, value in enumerate(values):
         axes.text(value + 0.01, index, probability(value), va="center")
@@ -230,16 +227,16 @@ def candidates_figure(document: Document) -> Figure | None:
 
 
 @styled
-def closure_figure(document: Document) -> Figure:
+def closure_figure(answer: Findings) -> Figure:
     """Misfit of every run before and after the causes are added; filled marks for runs held out of the fit."""
-    runs = document["gap"]["runs"]
+    runs = answer.gap.runs
     fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
     rows = np.arange(len(runs))
-    unit, size = misfit_scale(document)
-    before = np.array([size(run["before"]) for run in runs])
-    after = np.array([size(run["after"]) for run in runs])
-    stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
+    unit, size = misfit_scale(answer)
+    before = np.array([size(run.before) for run in runs])
+    after = np.array([size(run.after) for run in runs])
+    stds = [run["std"] for run in answer.figure_data.get("runs", [])]
     noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
     axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
     most = 1.05 * float(max(before.max(), after.max())) or 1.0
@@ -247,12 +244,12 @@ def closure_figure(document: Document) -> Figure:
     axes.hlines(rows, after, before, color=LINE, linewidth=2.5)
     axes.plot(before, rows, "s", color=BEFORE, ms=5, clip_on=False, label="nominal model")
     if not np.array_equal(before, after):
-        held_out = np.array([run["held_out"] for run in runs])
+        held_out = np.array([run.held_out for run in runs])
         for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
             if chosen.any():
                 points, label = (after[chosen], rows[chosen]), f"with the causes, run {words}"
                 axes.plot(*points, "o", color=AFTER, mfc=face, ms=5, clip_on=False, label=label)
-    axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
+    axes.set_yticks(rows, [figure_text(run.id) for run in runs])
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=2)
     grid(axes)
@@ -260,35 +257,35 @@ def closure_figure(document: Document) -> Figure:
 
 
 @styled
-def coefficients_figure(document: Document) -> Figure | None:
+def coefficients_figure(answer: Findings) -> Figure | None:
     """The coefficients that the runs determine, before and after, with 95 % intervals; None without any."""
-    before, after = (document["coefficients"][key] for key in ("before", "after"))
+    before, after = answer.coefficients.before, answer.coefficients.after
     both = [name for name in before if name in after]
-    names = [n for n in both if all(given[n].get("determined", True) for given in (before, after))]
+    names = [n for n in both if before[n].determined and after[n].determined]
     if not names:
         return None
     fig = figure(NARROW, 0.3 + 1.3 * len(names))
     for place, name in enumerate(names, 1):
         axes = fig.add_subplot(len(names), 1, place)
         for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
-            std = values[name]["std"]
+            std = values[name].std
             axes.errorbar(
-                values[name]["value"], row, xerr=None if std is None else INTERVAL * std, color=colour,
+                values[name].value, row, xerr=None if std is None else INTERVAL * std, color=colour,
                 marker=marker, ms=6, capsize=4,
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
-        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name]["unit"]))
+        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name].unit))
         axes.locator_params(axis="x", nbins=5)
         grid(axes)
     return fig
 
 
 @styled
-def backbone_figure(document: Document) -> Figure:
+def backbone_figure(answer: Findings) -> Figure:
     """Frequency and damping against amplitude, relative to the nominal model's, with 95 % bands."""
-    maps = document["maps"]
+    maps = answer.figure_data
     curves = [curve for curve in maps["backbones"] if len(curve["time_s"]) > 1]
-    named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
+    named = [curve for curve in curves if curve["id"] in answer.where.runs]
     # first the runs that show the gap, in the campaign's order, then the others for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
     labels = {
@@ -328,18 +325,18 @@ def backbone_figure(document: Document) -> Figure:
 
 
 @styled
-def law_figure(document: Document) -> Figure | None:
+def law_figure(answer: Findings) -> Figure | None:
     """The law without a formula, with its 95 % band; in a map, white cells are within it. None without a law."""
-    curve = (document.get("closable") or {}).get("curve")
+    curve = None if answer.closable is None else answer.closable.curve
     if curve is None:
         return None
-    shape = [len(axis) for axis in curve["places"]]
-    moment = curve["unit"] == "N m"
-    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve["unit"] == "rad" else "rad/s2")
-    values, std = (factor * np.reshape(curve[name], shape) for name in ("values", "std"))
-    name = f"{'error of the reading' if curve['unit'] == 'rad' else 'missing moment'} [{unit}]"
-    (label, *others), scales = zip(*(_AXES[axis] for axis in curve["over"]), strict=True)
-    places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve["places"], strict=True)]
+    shape = [len(axis) for axis in curve.places]
+    moment = curve.unit == "N m"
+    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve.unit == "rad" else "rad/s2")
+    values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
+    name = f"{'error of the reading' if curve.unit == 'rad' else 'missing moment'} [{unit}]"
+    (label, *others), scales = zip(*(_AXES[axis] for axis in curve.over), strict=True)
+    places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve.places, strict=True)]
     fig = figure(NARROW, 3.2)
     axes = fig.add_subplot()
     axes.set_xlabel(label)

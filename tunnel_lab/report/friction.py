@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.findings.whole import Findings
 from diagnosis.words.numbers import plain
-from identification.printing import Document, unit_mark
+from identification.printing import unit_mark
 from tunnel_lab.plotting.style import INTERVAL, figure, grid, log_axis, styled
 from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER
 
@@ -19,9 +20,9 @@ _MOST = 1.6  # times the law's greatest friction: very uncertain points lie beyo
 
 
 @styled
-def friction_figure(document: Document) -> Figure | None:
+def friction_figure(answer: Findings) -> Figure | None:
     """Friction against rate with 95 % intervals; None for an answer without friction."""
-    curve = (document.get("maps") or {}).get("friction")
+    curve = answer.figure_data.get("friction")
     if curve is None:
         return None
     rate, moment, std = (np.array(curve[name], np.float64) for name in ("rate_rad_s", "moment", "std"))

@@ -15,12 +15,12 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from diagnosis.findings.whole import Findings
 from diagnosis.words.captions import captioned
 from diagnosis.words.cards import key_figures
 from diagnosis.words.sections import sections
 from diagnosis.words.verdict import headline
 from identification.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
-from identification.printing import Document
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
@@ -58,7 +58,7 @@ _TIMEOUT = 120.0  # s
 
 @dataclass(frozen=True)
 class Byline:
-    """Statements on the page that are not in the document, because they would differ each time; empty: not shown.
+    """Statements on the page that are not in the answer, because they would differ each time; empty: not shown.
 
     Args:
         date: of the diagnosis, such as 2026-05-31.
@@ -72,22 +72,19 @@ class Byline:
     patch: str = ""
 
 
-def write_report(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
+def write_report(answer: Findings, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
     """Write the report of a diagnosis as an HTML file, completely or not at all.
 
     Args:
-        document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
 
     Raises:
         TunnelError: when the page cannot be drawn or the file cannot be written.
     """
-    return write_encoded(
-        path, lambda stream: stream.write(render_report(document, campaign, byline).encode())
-    )
+    return write_encoded(path, lambda stream: stream.write(render_report(answer, campaign, byline).encode()))
 
 
 def render_report(
-    document: Document, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
+    answer: Findings, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
 ) -> str:
     """The page as HTML that needs no other file and no network; the same for the same document and byline.
 
@@ -95,14 +92,14 @@ def render_report(
     """
     from markupsafe import Markup
 
-    byline, (answer, kind) = byline or Byline(), headline(document)
+    byline, (words, kind) = byline or Byline(), headline(answer)
     if summary:
-        drawings = summary_figures(document)
+        drawings = summary_figures(answer)
         page = _page(drawings, {}, ["style.css", "summary.css"], "summary.js")
     else:
-        page = _page(diagnosis_figures(document), fit_charts(document) | charts(document))
+        page = _page(diagnosis_figures(answer), fit_charts(answer) | charts(answer))
     drawn, parts = page.pop("drawn"), {}
-    for section in sections(document, campaign):
+    for section in sections(answer, campaign):
         blocks = section.blocks
         if summary and section.key == "fit":
             blocks = tuple(_summary_fit(drawn))
@@ -113,13 +110,13 @@ def render_report(
         if html := as_html(blocks, drawn, titled=True):
             parts[section.key] = {"title": section.title, "html": Markup(html), "opened": section.opened}
     context = {
-        "document": document,
+        "document": answer,
         "campaign": campaign,
         "byline": byline,
-        "answer": answer,
+        "answer": words,
         "kind": kind,
         "summary": summary,
-        "key_figures": key_figures(document),
+        "key_figures": key_figures(answer),
         "parts": parts,
         "details": {key: part for key, part in parts.items() if key not in _OPEN},
     }
@@ -138,17 +135,17 @@ def _summary_fit(drawn: Mapping[str, str]) -> Iterator[Block]:
         yield Figure(name, near if "near" in name else whole)
 
 
-def render_fit(document: Document) -> str:
+def render_fit(answer: Findings) -> str:
     """The fit over the data as a separate HTML page; without a chart where the document has no ``maps``."""
     from markupsafe import Markup
 
-    drawing = fit_figure(document)
-    page = _page({} if drawing is None else {"fit": drawing}, fit_charts(document))
+    drawing = fit_figure(answer)
+    page = _page({} if drawing is None else {"fit": drawing}, fit_charts(answer))
     fit = Markup(as_html((captioned("fit"),), page.pop("drawn")))
-    return _rendered("fit.html.j2", {"campaign": document["campaign"], "fit": fit} | page)
+    return _rendered("fit.html.j2", {"campaign": answer.campaign, "fit": fit} | page)
 
 
-def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Drawing:
+def draw(answer: Findings, what: str, runs: Sequence[str] = ()) -> Drawing:
     """One figure of the report.
 
     Args:
@@ -158,9 +155,9 @@ def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Drawing:
     Raises:
         TunnelError: for a figure or a run that the diagnosis does not have.
     """
-    drawn = fit_figure(document, runs) if what == "fit" else diagnosis_figure(document, what)
+    drawn = fit_figure(answer, runs) if what == "fit" else diagnosis_figure(answer, what)
     if drawn is None:
-        known = ", ".join(diagnosis_figures(document))
+        known = ", ".join(diagnosis_figures(answer))
         raise TunnelError(f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {known}")
     return drawn
 
@@ -273,7 +270,7 @@ def find_browser() -> str:
     return found
 
 
-def write_summary(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
+def write_summary(answer: Findings, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
     """Write the summary of a diagnosis as a PDF of one page, completely or not at all.
 
     Raises:
@@ -282,7 +279,7 @@ def write_summary(document: Document, campaign: Campaign, path: Path, byline: By
     browser = find_browser()
     with tempfile.TemporaryDirectory() as name:
         page, printed = Path(name) / "summary.html", Path(name) / "summary.pdf"
-        page.write_text(render_report(document, campaign, byline, summary=True), encoding="utf-8")
+        page.write_text(render_report(answer, campaign, byline, summary=True), encoding="utf-8")
         arguments = [
             "--headless", "--disable-gpu", "--no-pdf-header-footer", f"--user-data-dir={name}/profile",
             f"--print-to-pdf={printed}", page.as_uri(),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnosis.findings.whole import Findings
 from diagnosis.words.numbers import unit_shown
 from identification.printing import Document
 from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
@@ -50,7 +51,7 @@ _MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 
 
 @styled
-def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | None:
+def place_figure(answer: Findings, height: float = PLACE_HEIGHT) -> Figure | None:
     """Misfit by amplitude and by wind speed, or by time where there is one speed; None where the maps lack it.
 
     Cells within the noise are empty.
@@ -58,10 +59,10 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
     Args:
         height: of the figure, inches; small enough for a phone.
     """
-    grid_of = document["maps"].get("grid")
+    grid_of = answer.figure_data.get("grid")
     if grid_of is None:
         return None
-    unit, size = misfit_scale(document)
+    unit, size = misfit_scale(answer)
     excess, std = (np.stack([array(row) for row in grid_of[name]]) for name in ("excess", "std"))
     rows = np.degrees(array(grid_of["amplitude_edges_rad"]))
     speeds = grid_of["wind_speeds"]
@@ -81,11 +82,11 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
 
 
 @styled
-def runs_figure(document: Document) -> Figure:
+def runs_figure(answer: Findings) -> Figure:
     """Excess of every run over time on a logarithmic scale; cells within the noise are empty."""
     from matplotlib.colors import LogNorm
 
-    maps = document["maps"]
+    maps = answer.figure_data
     runs = maps["runs"]
     fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
@@ -114,17 +115,17 @@ def _run_cells(maps: Document) -> tuple[Array, float, float]:
 
 
 @styled
-def profiles_figure(document: Document) -> Figure:
+def profiles_figure(answer: Findings) -> Figure:
     """Excess over time and amplitude, all runs together, and the times at which a moment is missing.
 
     The shaded intervals contain four fifths of the gap.
     """
-    maps, where = document["maps"], document["where"]
-    swings = None if where["amplitude_rad"] is None else np.degrees(where["amplitude_rad"]).tolist()
+    maps, where = answer.figure_data, answer.where
+    swings = None if where.amplitude_rad is None else np.degrees(where.amplitude_rad).tolist()
     fig = figure(NARROW, 6.0)
     by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
     for axes, values, bounds, interval in (
-        (by_time, maps["time"], array(maps["time"]["edges_s"]), where["time_s"]),
+        (by_time, maps["time"], array(maps["time"]["edges_s"]), where.time_s),
         (by_amplitude, maps["amplitude"], np.degrees(array(maps["amplitude"]["edges_rad"])), swings),
     ):
         mean, std = array(values["excess"]), array(values["std"])
@@ -147,12 +148,12 @@ def profiles_figure(document: Document) -> Figure:
 
 
 @styled
-def spectrum_figure(document: Document) -> Figure:
+def spectrum_figure(answer: Findings) -> Figure:
     """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
     The shaded interval contains four fifths of the gap.
     """
-    values, interval = document["maps"]["frequency"], document["where"]["frequency_hz"]
+    values, interval = answer.figure_data["frequency"], answer.where.frequency_hz
     fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
     edges, centre = _spectrum_axis(values)
@@ -184,9 +185,9 @@ def _spectrum_axis(values: Document) -> tuple[Array, Array]:
 
 
 @styled
-def phase_plane_figure(document: Document) -> Figure | None:
+def phase_plane_figure(answer: Findings) -> Figure | None:
     """The missing moment over angle and rate; None where the maps lack it."""
-    plane = document["maps"]["phase_plane"]
+    plane = answer.figure_data["phase_plane"]
     if plane is None:
         return None
     low, *_, high = np.degrees(plane["edges_rad"]).tolist()
@@ -203,9 +204,9 @@ def phase_plane_figure(document: Document) -> Figure | None:
 
 
 @styled
-def moment_figure(document: Document) -> Figure | None:
+def moment_figure(answer: Findings) -> Figure | None:
     """Means of the missing moment over all rates and over all angles; None where the maps lack it."""
-    plane = document["maps"]["phase_plane"]
+    plane = answer.figure_data["phase_plane"]
     if plane is None:
         return None
     edges = np.degrees(array(plane["edges_rad"]))
@@ -239,9 +240,9 @@ def _plane_cells(plane: Document) -> tuple[Array, float, str, float]:
     return np.where(np.abs(moment) > SIGMAS * std, moment * factor, np.nan), reach, unit, factor
 
 
-def charts(document: Document) -> dict[str, list[Chart]]:
+def charts(answer: Findings) -> dict[str, list[Chart]]:
     """The charts of a diagnosis by the name of the figure that they replace on a screen; none without ``maps``."""
-    maps = document.get("maps")
+    maps = answer.maps
     if not maps:
         return {}
     cells, low, high = _run_cells(maps)
@@ -334,9 +335,9 @@ class Curves:
     differ: tuple[float, float]
 
 
-def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
+def fitted_runs(answer: Findings, ids: Sequence[str] = ()) -> list[Curves]:
     """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
-    maps = document.get("maps") or {"runs": [], "traces": []}
+    maps = answer.figure_data or {"runs": [], "traces": []}
     unit, factor = unit_shown(maps.get("unit", "rad"))
     labels = {run["id"]: label for run, label in zip(maps["runs"], run_labels(maps), strict=True)}
     traces = {trace["id"]: trace for trace in maps["traces"] if "reading_rad" in trace}
@@ -355,28 +356,28 @@ def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
     return runs
 
 
-def fit_figure(document: Document, ids: Sequence[str] = ()) -> Figure | None:
+def fit_figure(answer: Findings, ids: Sequence[str] = ()) -> Figure | None:
     """The fit over the data of the first two of `fitted_runs`; None without runs.
 
     A column for each run: the whole record, with the cycles marked in which the models differ most; the reading in
     these cycles with the predictions of both models; and their residuals.
     """
-    runs = fitted_runs(document, ids)[:_COLUMNS]
+    runs = fitted_runs(answer, ids)[:_COLUMNS]
     return _drawn(runs) if runs else None
 
 
-def fit_pages(document: Document, ids: Sequence[str] = ()) -> list[Figure]:
+def fit_pages(answer: Findings, ids: Sequence[str] = ()) -> list[Figure]:
     """The fit over the data of all runs, two to a figure, as `fit_figure` draws them."""
-    runs = fitted_runs(document, ids)
+    runs = fitted_runs(answer, ids)
     return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
 
 
-def fit_sheets(document: Document) -> dict[str, Figure]:
+def fit_sheets(answer: Findings) -> dict[str, Figure]:
     """The fit over the data of the two runs with the largest gap, in several heights to fill a printed page.
 
     The highest comes first; lower ones omit the whole record and show the cycles where the models differ most.
     """
-    runs = fitted_runs(document)[:_COLUMNS]
+    runs = fitted_runs(answer)[:_COLUMNS]
     sheets = _SHEETS.items() if runs else ()
     return {name: _drawn(runs, height, whole="near" not in name) for name, height in sheets}
 
@@ -418,12 +419,12 @@ def _curves(axes: Axes, run: Curves, measured: Array | None, before: Array, afte
     axes.set_xlim(*run.differ)
 
 
-def fit_charts(document: Document) -> dict[str, list[Chart]]:
+def fit_charts(answer: Findings) -> dict[str, list[Chart]]:
     """The readings of every run and, below them on the same axis, the residuals, under the name ``fit``.
 
     They first show the cycles in which the models differ most; there are none without ``maps``.
     """
-    runs = fitted_runs(document)
+    runs = fitted_runs(answer)
     if not runs:
         return {}
     models = [{"label": _NOMINAL, "role": "before"}, {"label": _CAUSES, "role": "after"}]

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.findings import reported as module
 from diagnosis.answer.held_out import predict_held_out
+from diagnosis.findings import reported as module
 from diagnosis.findings.judgements import cautions
 from diagnosis.findings.reported import Comparison, compare, confirm, report_fits
 from diagnosis.likelihood.least_squares import Fit, fit
