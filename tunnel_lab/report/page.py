@@ -75,8 +75,6 @@ class Byline:
 def write_report(answer: Findings, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
     """Write the report of a diagnosis as an HTML file, completely or not at all.
 
-    Args:
-
     Raises:
         TunnelError: when the page cannot be drawn or the file cannot be written.
     """
