@@ -26,8 +26,8 @@ from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
 from diagnosis.search.study import Answer
 from diagnosis.settings import Settings
-from diagnosis.words.numbers import plain
-from identification.estimate import Quantity
+from identification.show.numbers import plain
+from identification.show.quantity import Quantity
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -74,10 +74,10 @@ from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
 from identification import identify
-from identification.estimate import Estimate, Quantity
+from identification.estimate import Estimate
+from identification.show.quantity import Quantity
 from identification.status import Remark, left_out_as_asked
 from tunnel_sim.effects import effect_class, known_effects
-from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -204,7 +204,8 @@ def composed(
         trade_off=None if withheld else least_separated(fitted, study.campaign),
         blind_spots=() if cycling else study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
-        maps=maps.to_json_dict() | {"friction": as_json(_friction(study))},
+        maps=maps.to_json_dict(),
+        friction=_friction(study),
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},
             "settings": study.settings.differences(),
@@ -241,7 +242,7 @@ def composed(
             ),
         ),
         data=chosen.examined,
-        **findings_of(Answered(chosen.examined, study, named.coefficients)),
+        **findings_of(Answered(chosen.examined, study, named.coefficients.before, named.coefficients.after)),
     )
 
 

@@ -21,7 +21,7 @@ from diagnosis.settings import SelectionSettings
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
-from identification.printing import unit_mark
+from identification.show.numbers import unit_mark
 from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
         paper_springs,
         paper_windows,
     )
-    from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, WindowEstimate
+    from identification.estimate import Estimate, NoiseLevel, RunEstimate, WindowEstimate
     from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator, register_estimator
+    from identification.show.quantity import Quantity
     from identification.status import Remark, Status
 else:
     __getattr__, __dir__ = lazy_names(

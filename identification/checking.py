@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate, Status
+from identification.estimate import PARAMETERS, Estimate, RunEstimate, Status
 from identification.estimators import SUMMARIES, Estimator, make_estimator, takes_driven
 from identification.returned import CAMPAIGN_UNITS, RUN_UNITS, checked_return
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.drive import Drive

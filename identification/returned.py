@@ -11,7 +11,8 @@ from math import isfinite
 
 import numpy as np
 
-from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status
+from identification.estimate import PARAMETERS, UNITS, Estimate, RunEstimate, Status
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, raised_line
 from tunnel_sim.vocabulary.quantities import PerParameter, Square

@@ -16,8 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE, LEAST_CHANGE, OUTLIER_MEDIANS
+from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_sim.vocabulary.record import Array, read_only
 

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
-from identification.estimate import PARAMETERS, Estimate, Quantity
+from identification.estimate import PARAMETERS, Estimate
 from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
+from identification.show.quantity import Quantity
 from identification.status import Remark, Status, by_severity
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.quantities import PerParameter, PerUnknown, Square, Vector

@@ -19,7 +19,7 @@ from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from tunnel_sim.effects import known_effects

@@ -27,7 +27,8 @@ from diagnosis.model.similarity import Similarity
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import AnswerSettings
-from identification.estimate import Estimate, Quantity
+from identification.estimate import Estimate
+from identification.show.quantity import Quantity
 from identification.statistics import density_rounding
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign

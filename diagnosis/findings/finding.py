@@ -1,19 +1,19 @@
 """A finding: its numbers, its words and tables, and its figures, in one file.
 
-A finding is a frozen dataclass of typed fields with units, which are also its JSON. `Findings` has a field for each;
+A finding is a frozen dataclass of typed fields with units, which are also its JSON. `Findings` has a field for it;
 that line is all that the document, its schema, the terminal, the report, the bench and notebooks need of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
-from diagnosis.findings.coefficients import Coefficients
 from diagnosis.search.study import Study
 from diagnosis.settings import Settings
 from identification.show.blocks import Figure, Section
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
@@ -43,12 +43,14 @@ class Answered:
     Args:
         campaign: the measured one.
         study: of the similar campaign, its causes confirmed.
-        coefficients: before and after the causes are added, in the units of the measured campaign.
+        before: coefficients of the nominal model, by name, in the units of the measured campaign.
+        after: with the causes, by the same names.
     """
 
     campaign: Campaign
     study: Study
-    coefficients: Coefficients
+    before: Mapping[str, Quantity]
+    after: Mapping[str, Quantity]
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,16 @@ class Picture:
         return Figure(self.name, self.caption)
 
 
-class Finding:
-    """A finding of a diagnosis."""
+class Pictured:
+    """A value of a diagnosis with figures."""
+
+    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+        """Its figures."""
+        raise NotImplementedError
+
+
+class Finding(Pictured):
+    """A finding of a diagnosis with a section of its own."""
 
     #: Key of the section of a page after which its own stands.
     after: ClassVar[str]

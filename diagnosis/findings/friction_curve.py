@@ -4,20 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.findings.finding import Judged, Picture, Pictured
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
+from identification.show.drawing import AFTER, INK, NARROW, PAPER
+from identification.show.numbers import plain, unit_mark
+from identification.show.style import INTERVAL, figure, grid, log_axis, styled
 from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.quantities import Angles, Rates
 from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class FrictionPoint:
 
 
 @dataclass(frozen=True)
-class FrictionCurve:
+class FrictionCurve(Pictured):
     """The friction of an effect against the rate.
 
     Args:
@@ -62,6 +70,17 @@ class FrictionCurve:
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, in JSON's types."""
         return {name: as_json(value) for name, value in vars(self).items()}
+
+    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+        """Friction against rate."""
+        del judged
+        caption = (
+            "Friction against rate, with 95 % intervals. Line: the law of the answer, with the band of its fit. "
+            "Circles: energy lost between reversals of the motion, less the dissipation by the other terms of the "
+            "answer, over the distance; at the mean rate."
+        )
+        description = "Friction against rate: the fitted law with its band, and points by the energy lost."
+        return (Picture("friction", caption, description, partial(friction_figure, self)),)
 
 
 _PLACES = 80  # of the curve
@@ -232,3 +251,40 @@ def _point(group: Array) -> FrictionPoint:
     scatter = float(weight @ (moment - mean) ** 2) / max(len(group) - 1, 1)
     std = float(np.sqrt(max(scatter, 1.0) / total))
     return FrictionPoint(float(weight @ rate) / total, mean, std, int(count.sum()))
+
+
+@styled
+def friction_figure(curve: FrictionCurve) -> Figure:
+    """Friction against rate with 95 % intervals."""
+    rate, moment, std = (np.array(given, np.float64) for given in (curve.rate_rad_s, curve.moment, curve.std))
+    fig = figure(NARROW, 3.0)
+    axes = fig.add_subplot()
+    low, high = moment - INTERVAL * std, moment + INTERVAL * std
+    axes.fill_between(rate, np.maximum(low, 0.0), high, color=AFTER, alpha=0.25, lw=0)
+    load = curve.per_load
+    more = f" without load; {100.0 * load:.2g} % of the load comes on top" if load else ""
+    axes.plot(rate, moment, color=AFTER, label=f"law, fitted{more}")
+    tops = [float(high.max())]
+    if curve.points:
+        at, mean, error = (
+            np.array(given, np.float64)
+            for given in zip(*((one.rate_rad_s, one.moment, one.std) for one in curve.points), strict=True)
+        )
+        axes.errorbar(
+            at, mean, yerr=INTERVAL * error, fmt="o", color=INK, mfc=PAPER, ms=5, capsize=2, elinewidth=1.0,
+            label="energy lost between reversals",
+        )  # fmt: skip
+        tops.append(min(float((mean + INTERVAL * error).max()), _MOST_DRAWN * float(moment.max())))
+    axes.set_ylim(0.0, _ROOM_ABOVE * max(tops))
+    mark = "N m" if curve.unit == "N m" else f"{unit_mark(curve.unit)}, over inertia"
+    axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(curve.effect)} [{mark}]")
+    log_axis(axes, "x")
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if load else 2, borderpad=0.0, borderaxespad=0.3
+    )
+    grid(axes)
+    return fig
+
+
+_ROOM_ABOVE = 1.15  # length of the axis over the greatest friction drawn
+_MOST_DRAWN = 1.6  # times the law's greatest friction: very uncertain points lie beyond the axis

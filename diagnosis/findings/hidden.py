@@ -33,7 +33,7 @@ from diagnosis.likelihood.starting_points import (
 )
 from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import own_gain
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.record import Array
 
 

@@ -19,7 +19,7 @@ from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
 

@@ -12,7 +12,7 @@ from diagnosis.findings.candidates import damping_ratio
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.study import Study
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 
 _WIDE = 30.0  # standard deviations over the allowed range from which the distribution in it is uniform
 _FAR = 6.0  # standard deviations within which the whole distribution lies

@@ -24,7 +24,7 @@ def diagnosis_schema() -> Schema:
     for name, rearrange in _REARRANGED.items():
         rearrange(found["$defs"][name])
     fields = found["properties"]
-    del fields["data"], fields["decision"], fields["waterfall"]
+    del fields["data"], fields["decision"], fields["waterfall"], fields["friction"]
     fields |= {"schema_version": {"const": SCHEMA_VERSION}}
     fields |= _decision(found["$defs"].pop("Decision")) | _waterfall(found["$defs"].pop("Waterfall"))
     found["required"] = sorted(fields)

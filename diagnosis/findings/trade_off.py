@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.findings.units import own_estimate, own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from identification.trade_off import ROLES, Combination, Role, Setting, TradeOff, trade_off
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo

@@ -11,7 +11,7 @@ from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.dimensions import NUMBER, dimension, in_si, product

@@ -15,8 +15,9 @@ from diagnosis.findings.candidates import Candidate, CauseSize
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
-from diagnosis.findings.finding import Answered, Finding, Picture
+from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
 from diagnosis.findings.found import Found
+from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judgements import Remainder
 from diagnosis.findings.repeatability import RunRepeatability
@@ -68,6 +69,7 @@ class Findings:
         closable: the explainable share of the rest, and its law; None where the rest is within chance.
         sizes: effect of each fitted cause on a swing.
         found: facts for the words, beside the numbers.
+        friction: of the answer against the rate, which is part of ``maps`` in the JSON; None without friction.
         data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
     """
 
@@ -100,6 +102,7 @@ class Findings:
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()
     found: Found = field(default_factory=Found)
+    friction: FrictionCurve | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     @property
@@ -109,8 +112,9 @@ class Findings:
 
     @property
     def pictures(self) -> dict[str, Picture]:
-        """Their figures, by name."""
-        return {drawn.name: drawn for one in self.findings.values() for drawn in one.pictures(self)}
+        """The figures of the findings, by name."""
+        pictured = [one for one in vars(self).values() if isinstance(one, Pictured)]
+        return {drawn.name: drawn for one in pictured for drawn in one.pictures(self)}
 
     @property
     def settings(self) -> Settings:
@@ -134,6 +138,9 @@ class Findings:
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
+        own = {name: as_json(getattr(self, name)) for name in (*_LAST, *finding_kinds())}
+        if self.maps is not None:
+            own["maps"] = {**own["maps"], "friction": as_json(self.friction)}
         return {
             "schema_version": SCHEMA_VERSION,
             "campaign": self.campaign,
@@ -145,7 +152,7 @@ class Findings:
             "candidates": as_json(self.candidates),
             "inclusion": dict(self.inclusion),
             **self.waterfall.to_json_dict(),
-            **{name: as_json(getattr(self, name)) for name in (*_LAST, *finding_kinds())},
+            **own,
         }
 
     @classmethod
@@ -168,10 +175,14 @@ class Findings:
         """
         check_shape(data, where, remedy)
         with as_described("is not a diagnosis", where, remedy):
-            found = _adapter(cast(Any, cls)).validate_json(
-                json.dumps({**data, "waterfall": data, "decision": data}), strict=True
-            )
+            found = _adapter(cast(Any, cls)).validate_json(json.dumps(_by_field(data)), strict=True)
         return cast(Self, found)
+
+
+def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The document with the findings whose fields stand elsewhere in it."""
+    friction = (data.get("maps") or {}).get("friction")
+    return {**data, "waterfall": data, "decision": data, "friction": friction}
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from diagnosis.findings.whole import Findings
 from identification.show.blocks import Figure
 
 CAPTIONS: Mapping[str, str] = {
@@ -37,9 +38,6 @@ CAPTIONS: Mapping[str, str] = {
     "stiffness; a dependence on the rate indicates damping.",
     "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
     "and unknown.",
-    "friction": "Friction against rate, with 95 % intervals. Line: the law of the answer, with the band "
-    "of its fit. Circles: energy lost between reversals of the motion, less the dissipation by the other terms "
-    "of the answer, over the distance; at the mean rate.",
     "coefficients": "Estimates with 95 % intervals.",
 }
 
@@ -47,3 +45,8 @@ CAPTIONS: Mapping[str, str] = {
 def captioned(name: str) -> Figure:
     """A figure with its caption."""
     return Figure(name, CAPTIONS[name])
+
+
+def pictured(answer: Findings, *names: str) -> tuple[Figure, ...]:
+    """The figures of findings by their names, those that the answer has."""
+    return tuple(answer.pictures[name].block for name in names if name in answer.pictures)

@@ -9,19 +9,7 @@ from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
-from diagnosis.words.numbers import (
-    acts_on,
-    beside_noise,
-    left_over,
-    misfit_of,
-    misfit_shown,
-    of_swing,
-    plain,
-    probability,
-    rms_shown,
-    share,
-    times_noise,
-)
+from diagnosis.words.numbers import acts_on, misfit_of, misfit_shown, of_swing, rms_shown
 from diagnosis.words.scatter import (
     BETWEEN_RUNS,
     SCATTERS,
@@ -32,6 +20,7 @@ from diagnosis.words.scatter import (
 )
 from diagnosis.words.verdict import size_words
 from identification.show.blocks import Card, Heading, Paragraph
+from identification.show.numbers import beside_noise, left_over, plain, probability, share, times_noise
 from tunnel_sim.effects import known_effects
 
 WITHIN_THE_NOISE = "within the noise"

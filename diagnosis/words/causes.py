@@ -8,10 +8,18 @@ from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.numbers import for_people, listed, plain, probability
 from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
-from identification.estimate import Quantity
-from identification.printing import COEFFICIENTS, estimated, significant, unit_mark
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import (
+    estimated,
+    for_people,
+    listed,
+    plain,
+    probability,
+    significant,
+    unit_mark,
+)
+from identification.show.quantity import Quantity
 from tunnel_sim.effects import known_effects
 
 
@@ -218,7 +226,7 @@ def _of_the_rate(given: Coefficients) -> str:
     name = next(name for name in given.in_phase if name.startswith("cn_r"))
     whole, own = given.in_phase[name], given.after[name]
     lag = _digits(whole.value - own.value, 3)
-    both = (estimated(replace(one, interval=None).to_json_dict()).replace("-", "−") for one in (whole, own))
+    both = (estimated(replace(one, interval=None)).replace("-", "−") for one in (whole, own))
     return " Of Cnr in phase with the rate, {}, the lag contributes {lag} and the rate itself {}.".format(
         *both, lag=lag
     )

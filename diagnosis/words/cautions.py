@@ -11,7 +11,7 @@ from typing import Any
 
 from diagnosis.findings.whole import Findings
 from diagnosis.model.fact import Fact, Noted
-from diagnosis.words.numbers import part, plain, reading_shown, share
+from identification.show.numbers import part, plain, reading_shown, share
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 

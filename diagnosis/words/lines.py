@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import set_out
-from diagnosis.words.numbers import (
+from diagnosis.words.numbers import misfit_of, of_swing, rms_shown, unit_of
+from diagnosis.words.scatter import named_answer, scattering
+from diagnosis.words.tables import SOURCES
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import (
     explained,
     held_out_excess,
     listed,
-    misfit_of,
-    of_swing,
     plain,
     probability,
     reading_shown,
-    rms_shown,
     share,
-    unit_of,
+    significant,
+    unit_mark,
 )
-from diagnosis.words.scatter import named_answer, scattering
-from diagnosis.words.tables import SOURCES
-from identification.printing import COEFFICIENTS, significant, unit_mark
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 

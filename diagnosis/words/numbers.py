@@ -3,127 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Callable, Mapping
 
 from diagnosis.findings.closure import Misfit
 from diagnosis.findings.whole import Findings
-from identification.estimate import Quantity
-from identification.printing import Document, significant, unit_mark, with_std
+from identification.printing import Document
+from identification.show.numbers import (
+    held_out_excess,
+    reading_shown,
+    significant,
+    times_noise,
+    unit_shown,
+)
 from tunnel_sim.effects import known_effects
-from tunnel_sim.vocabulary.dimensions import beside
-from tunnel_sim.vocabulary.quantities import Share
-
-_ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
-_CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-
-
-def probability(value: float) -> str:
-    """A probability in whole per cent, never rounded to 0 or 100 %, such as ``97 %`` or ``> 99 %``."""
-    if value >= 0.995:
-        return "> 99 %"
-    return f"{100.0 * value:.0f} %" if value >= 0.005 else "< 1 %"
-
-
-def for_people(value: float, std: float | None, unit: str) -> str:
-    """A value to three digits, with its standard deviation where they show it, such as ``1.96 ± 0.12 %``.
-
-    Args:
-        value: in the unit; radians are shown in degrees.
-        std: its standard deviation, in the same unit; None: not known.
-        unit: as effects and documents write it.
-    """
-    if unit == "rad":
-        mark, factor = unit_shown(unit)
-        value, std = factor * value, None if std is None else factor * std
-    else:
-        mark = unit_mark(beside(unit))
-    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
-    shown = significant(value, 3) if std is None or std < 0.5 * last else with_std(value, std)
-    return f"{shown.replace('-', '−') if shown.startswith('-') else shown}{mark}"
-
-
-def part(share: float) -> str:
-    """A share above 0 and below 1 as a simple fraction in words, such as ``four fifths``; others in per cent."""
-    simple = Fraction(share).limit_denominator(10)
-    if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
-        return f"{100.0 * share:.3g} %"
-    ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
-    if count > 1:
-        return f"{_CARDINALS[count]} {ordinal}s"
-    return ordinal if ordinal == "half" else f"{'an' if ordinal == 'eighth' else 'a'} {ordinal}"
-
-
-def share(value: float) -> str:
-    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
-
-    Args:
-        value: a fraction; ``none`` below 0, where the residual has grown.
-    """
-    if value < 0.0:
-        return "none"
-    if value > 0.9995:
-        return "> 99.9 %" if value < 1.0 else "100 %"
-    if value < 0.0005:
-        return "< 0.1 %" if value > 0.0 else "0 %"
-    return f"{100.0 * value:.1f} %"
-
-
-def percent(share: Share, std: float | None = None) -> str:
-    """A share in per cent, such as ``94.2 ± 0.6 %``.
-
-    Args:
-        std: its standard deviation, a fraction.
-    """
-    beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
-    return f"{min(100.0 * share, 100.0):.1f}{beside} %"
-
-
-_UNITS = {"l/V": "the time in which the air passes the reference length"}
-
-
-def explained(units: Iterable[str]) -> str:
-    """Explanation of units that only this field uses, in brackets after a blank; empty where all are common."""
-    said = [f"{unit}: {_UNITS[unit]}" for unit in units if unit in _UNITS]
-    return f" ({'; '.join(said)})" if said else ""
-
-
-def rounded_up(value: float) -> str:
-    """Two significant digits, never below the value."""
-    if value <= 0.0:
-        return "0"
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
-
-
-def size_change(before: float, after: float) -> str:
-    """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
-
-    Args:
-        before: the value without the causes, not 0, in its unit.
-        after: the value with the causes, in the same unit.
-    """
-    if before * after < 0.0:
-        return "other sign"
-    change = 100.0 * (abs(after) / abs(before) - 1.0)
-    return f"{change:+.2g} %" if change else "0 %"
-
-
-def change_up_to(size: float, given: Quantity) -> str:
-    """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
-
-    Args:
-        size: the change, in the coefficient's unit.
-        given: the coefficient, from the document.
-    """
-    if given.std is not None and given.std < abs(given.value):
-        return f"{rounded_up(100.0 * size / abs(given.value))} %"
-    return f"{rounded_up(size)} {'' if given.unit == '1' else unit_mark(given.unit)}".strip()
-
-
-def unit_shown(unit: str) -> tuple[str, float]:
-    """The mark of the displayed unit of readings, and the factor on values in the given unit."""
-    return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
 
 
 def misfit_of(answer: Findings) -> Misfit | None:
@@ -150,47 +42,10 @@ def of_swing(misfit: Misfit, excess: float) -> str:
     return f"{significant(share, 2) if share else '0'} % of the swing"
 
 
-def times_noise(value: float) -> str:
-    """A gap in words, such as ``2.75 times the noise variance``, from its excess, a ratio."""
-    return f"{significant(value, 4) if value >= 10.0 else f'{value:.2f}'} times the noise variance"
-
-
-def left_over(excess: float) -> str:
-    """A residual gap, such as ``9.6 times the noise variance``, a ratio."""
-    least = 1e-3
-    size = f"less than {least:g}" if excess < least else significant(excess, 2)
-    return f"{size} times the noise variance"
-
-
-def beside_noise(excess: float) -> str:
-    """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
-
-    Args:
-        excess: its mean square over the noise variance, minus one, a ratio.
-    """
-    return f"{significant(math.sqrt(max(1.0 + excess, 0.0)), 3)} times the noise"
-
-
-def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
-    """A reading, or an error of one, in the displayed unit, such as ``0.0226°``.
-
-    Args:
-        value: in the unit.
-        digits: significant digits (a count).
-    """
-    mark, factor = unit_shown(unit)
-    return f"{significant(factor * value, digits) if value else '0'}{mark if mark == '°' else f' {mark}'}"
-
-
 def unit_of(answer: Findings) -> str:
     """The unit of the readings of a document: rad, rad/s or rad/s²."""
     misfit = misfit_of(answer)
     return "rad" if misfit is None else misfit.unit
-
-
-def held_out_excess(value: float) -> str:
-    """An excess in noise variances, a ratio: three decimals where it is small, or four significant digits."""
-    return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
 def misfit_text(answer: Findings, excess: float) -> str:
@@ -269,17 +124,6 @@ KINDS: Mapping[str, str] = {
     "noise": "nothing smooth: the rest is noise",
 }
 """Kinds of missing law (`diagnosis.likelihood.ceiling.KINDS`)."""
-
-
-def plain(*names: str) -> str:
-    """Effect names as words: ``mains hum, free play and coulomb friction``."""
-    return listed([name.replace("_", " ") for name in names])
-
-
-def listed(parts: Sequence[str]) -> str:
-    """Parts of a sentence as a list: ``one, two and three``."""
-    *first, last = parts
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def windy(answer: Findings) -> bool:

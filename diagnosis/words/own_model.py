@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from diagnosis.findings.whole import Findings
 from diagnosis.patch.written_model import WrittenAttribute
-from identification.printing import significant, unit_mark, with_std
+from identification.show.numbers import significant, unit_mark, with_std
 
 #: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
 _FREE = {

@@ -9,20 +9,21 @@ from diagnosis.findings.whole import Findings
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.remainder.closable import Closable, Law, Line
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.numbers import (
-    KINDS,
+from diagnosis.words.numbers import KINDS, misfit_of, rms_shown
+from diagnosis.words.scatter import scattering
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import (
     change_up_to,
     left_over,
     listed,
-    misfit_of,
     part,
     percent,
     plain,
-    rms_shown,
+    significant,
+    unit_mark,
     unit_shown,
+    with_std,
 )
-from diagnosis.words.scatter import scattering
-from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 

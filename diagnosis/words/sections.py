@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.answers import set_out
-from diagnosis.words.captions import captioned
+from diagnosis.words.captions import captioned, pictured
 from diagnosis.words.cards import cause_cards, effect_cards
 from diagnosis.words.lines import (
     coefficients_line,
@@ -20,12 +20,7 @@ from diagnosis.words.lines import (
     noise_line,
     patch_line,
 )
-from diagnosis.words.numbers import (
-    CHANNELS,
-    CONDITIONS,
-    unit_shown,
-    windy,
-)
+from diagnosis.words.numbers import CHANNELS, CONDITIONS, windy
 from diagnosis.words.remainder import closable_line
 from diagnosis.words.scatter import (
     repeatability_line,
@@ -47,7 +42,7 @@ from diagnosis.words.tables import (
     waterfall_table,
 )
 from diagnosis.words.verdict import next_steps, rival_lines
-from identification.printing import COEFFICIENTS, significant, trade_off_line
+from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
     Block,
     Detail,
@@ -60,6 +55,7 @@ from identification.show.blocks import (
     TextTable,
     brief,
 )
+from identification.show.numbers import significant, unit_shown
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNDETERMINED = "not shown by the residuals alone"
@@ -174,7 +170,7 @@ def _which(answer: Findings) -> Section:
             Paragraph(inclusion_line(answer)),
             *(Paragraph(line) for line in rival_lines(answer)),
             *effect_cards(answer),
-            captioned("friction"),
+            *pictured(answer, "friction"),
         ),
     )
 

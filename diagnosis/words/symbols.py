@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping
 
 from diagnosis.findings.whole import Findings
-from identification.printing import COEFFICIENTS, unit_mark
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import unit_mark
 from tunnel_sim.effects import known_effects
 
 MEANINGS: Mapping[str, str] = {

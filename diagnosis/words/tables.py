@@ -8,30 +8,26 @@ from dataclasses import replace
 
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked, set_out
-from diagnosis.words.numbers import (
-    KINDS,
+from diagnosis.words.numbers import KINDS, misfit_text, unit_of
+from diagnosis.words.scatter import answer_name, spread_estimate
+from identification.printing import coefficient_label
+from identification.show.blocks import TextTable
+from identification.show.numbers import (
+    estimated,
     explained,
     held_out_excess,
-    misfit_text,
+    p_text,
     percent,
     plain,
     probability,
     reading_shown,
     share,
-    size_change,
-    unit_of,
-)
-from diagnosis.words.scatter import answer_name, spread_estimate
-from identification.estimate import Quantity
-from identification.printing import (
-    coefficient_label,
-    estimated,
-    p_text,
     significant,
+    size_change,
     unit_mark,
     with_std,
 )
-from identification.show.blocks import TextTable
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.dimensions import beside
 
@@ -71,9 +67,7 @@ def candidates_table(answer: Findings) -> TextTable:
 def _estimate(answer: Findings, full: str, candidate: str, given: Quantity) -> str:
     """A parameter of an answer, by its full name."""
     mark = unit_mark(beside(given.unit, ""))
-    return spread_estimate(answer, full.rpartition(".")[0] or candidate, given) or estimated(
-        given.to_json_dict(), mark
-    )
+    return spread_estimate(answer, full.rpartition(".")[0] or candidate, given) or estimated(given, mark)
 
 
 def parameters_table(answer: Findings) -> TextTable:
@@ -205,7 +199,7 @@ def _rows(answer: Findings) -> Iterator[tuple[str, Quantity | None, Quantity | N
 
 
 def _without_interval(given: Quantity | None) -> str:
-    return "–" if given is None else estimated(replace(given, interval=None).to_json_dict())
+    return "–" if given is None else estimated(replace(given, interval=None))
 
 
 def _interval(given: Quantity | None) -> str:

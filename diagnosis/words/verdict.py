@@ -25,20 +25,10 @@ from diagnosis.words.numbers import (
     CHANNELS,
     CONDITIONS,
     MISFITS,
-    beside_noise,
-    for_people,
-    listed,
     misfit_of,
     of_swing,
-    plain,
-    probability,
-    reading_shown,
     rms_shown,
-    rounded_up,
-    share,
-    times_noise,
     unit_of,
-    unit_shown,
     windy,
 )
 from diagnosis.words.own_model import model_step, model_words
@@ -52,7 +42,20 @@ from diagnosis.words.scatter import (
     systematic,
     without_scatter,
 )
-from identification.printing import COEFFICIENTS, significant
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import (
+    beside_noise,
+    for_people,
+    listed,
+    plain,
+    probability,
+    reading_shown,
+    rounded_up,
+    share,
+    significant,
+    times_noise,
+    unit_shown,
+)
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 

@@ -10,9 +10,9 @@ from diagnosis.findings.whole import Findings
 from diagnosis.model.fact import Fact
 from diagnosis.settings import WordsSettings
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
-from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS, part, plain
+from diagnosis.words.numbers import BANDS, CHANNELS, CONDITIONS
 from diagnosis.words.scatter import scattering
-from identification.printing import p_text
+from identification.show.numbers import p_text, part, plain
 from tunnel_sim.effects import effect_class
 
 _WIND = "whether it needs wind cannot be determined"

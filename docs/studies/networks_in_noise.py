@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification import identify
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay, free_decay
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.paper.networks import METHODS, NETWORK

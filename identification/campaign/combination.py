@@ -22,10 +22,11 @@ from identification.campaign.derivatives import (
     statuses_of_runs,
 )
 from identification.campaign.run_scatter import MeasuredRuns, scatter_between
-from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_severity
+from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
-from identification.printing import with_std
 from identification.progress import counted
+from identification.show.numbers import with_std
+from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.forcing import forcing_of
 from identification.signal.free_decay import Decay

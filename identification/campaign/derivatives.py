@@ -20,13 +20,13 @@ from identification.estimate import (
     UNITS,
     Estimate,
     NoiseLevel,
-    Quantity,
     RunEstimate,
     RunScatter,
     Status,
     by_severity,
 )
 from identification.policy import LEAST_SPRING_SPREAD
+from identification.show.quantity import Quantity
 from identification.statistics import determined, inverse, scaled_solve, student_factor
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -31,7 +31,8 @@ from identification.campaign.derivatives import (
     filled_estimate,
     noise_statuses,
 )
-from identification.estimate import Estimate, Quantity, Status, by_severity
+from identification.estimate import Estimate, Status, by_severity
+from identification.show.quantity import Quantity
 from identification.signal.decay_fit import DecayFit, fit_decays, shared_system
 from identification.signal.noise import noise_of
 from identification.signal.run_fit import FittedRun, residuals_of

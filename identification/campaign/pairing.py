@@ -25,9 +25,10 @@ from identification.campaign.run_scatter import (
     scatter_between,
 )
 from identification.campaign.springs import inertia_of_springs
-from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status, by_severity
+from identification.estimate import PARAMETERS, UNITS, Estimate, RunEstimate, Status, by_severity
 from identification.policy import LEAST_FOR_SCATTER
 from identification.progress import counted
+from identification.show.quantity import Quantity
 from identification.statistics import decay_covariance, determined, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array

@@ -32,7 +32,8 @@ from identification.campaign.random_effects import (
     likeliest_widths,
     marginal,
 )
-from identification.estimate import Quantity, RunScatter
+from identification.estimate import RunScatter
+from identification.show.quantity import Quantity
 from identification.statistics import inverse, student_factor
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Repeatability, Run

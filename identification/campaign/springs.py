@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from identification.estimate import Quantity, RunEstimate
+from identification.estimate import RunEstimate
 from identification.policy import (
     DIFFERENCE_DEVIATIONS,
     LEAST_SPRING_RESOLUTION,
@@ -20,7 +20,8 @@ from identification.policy import (
     SPRING_AT_BEST,
     SPRING_FLAG_RATE,
 )
-from identification.printing import with_std
+from identification.show.numbers import with_std
+from identification.show.quantity import Quantity
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -24,7 +24,8 @@ from scipy.interpolate import RectBivariateSpline
 
 from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
-from identification.estimate import Quantity, Status
+from identification.estimate import Status
+from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, block_means, mean_of_blocks, project_run
 from identification.signal.forcing import Forced
 from identification.signal.free_decay import Decay, response_rows

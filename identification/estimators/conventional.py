@@ -13,8 +13,9 @@ import numpy as np
 
 from identification.campaign.derivatives import noise_statuses
 from identification.campaign.pairing import Paired, PairedRun
-from identification.estimate import Quantity, RunEstimate, Status, by_severity
+from identification.estimate import RunEstimate, Status, by_severity
 from identification.policy import LEAST_PROMINENCE
+from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import PEAK_HALF_WIDTH, peak_decay, psd_peak, psd_peak_std
 from identification.signal.noise import PeakNoise, reading_noise

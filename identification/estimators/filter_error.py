@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.campaign.combination import Found, RunByRun, RunDecay
-from identification.estimate import Quantity, Status
+from identification.estimate import Status
+from identification.show.quantity import Quantity
 from identification.signal.colour import Autoregression
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
 from identification.signal.filter import DrivenFit, KnownInput, fit_driven

@@ -19,8 +19,9 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from identification.campaign.combination import Found, RunByRun, run_estimate
-from identification.estimate import Quantity, Status, WindowEstimate
+from identification.estimate import Status, WindowEstimate
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
+from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, RunFit, even_reading, project_run
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay

@@ -20,7 +20,7 @@ from scipy.special import chdtri
 
 from identification.campaign.derivatives import noise_statuses
 from identification.campaign.pairing import Paired, PairedRun
-from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_severity
+from identification.estimate import RunEstimate, Status, WindowEstimate, by_severity
 from identification.neural.networks import Networks, read_networks, shipped_networks
 from identification.neural.three_cycles import (
     CYCLES,
@@ -31,6 +31,7 @@ from identification.neural.three_cycles import (
     response_points,
 )
 from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, MISFIT_RATE, SCATTER_TOLERANCE
+from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import holds_motion
 from identification.signal.noise import reading_noise

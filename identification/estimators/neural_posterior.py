@@ -29,7 +29,7 @@ from identification.campaign.derivatives import (
     statuses_of_runs,
 )
 from identification.campaign.run_scatter import MeasuredRuns, scatter_between
-from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
+from identification.estimate import Estimate, NoiseLevel, RunEstimate, Status, by_severity
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.posterior import (
     Posterior,
@@ -40,6 +40,7 @@ from identification.neural.posterior import (
 )
 from identification.neural.rivals import CAMPAIGN_NAMES, Features, Rivals, campaign_features, record_features
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
+from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay
 from identification.signal.noise import stated_noise
 from identification.signal.run_fit import residual_check

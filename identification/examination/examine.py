@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.campaign.derivatives import loads
-from identification.estimate import Estimate, Quantity
+from identification.estimate import Estimate
 from identification.examination.free_motion import find_release, with_zeros, without_rest
 from identification.examination.self_excited import self_excited_runs, swing_of
 from identification.examination.slips.base import SlipEvidence
 from identification.examination.slips.table import found_in, mended
+from identification.show.quantity import Quantity
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.files.plausible import few_samples
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from identification import policy
-from identification.printing import in_degrees, significant
+from identification.show.numbers import in_degrees, significant
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.free_decay import envelope_amplitude
 from identification.signal.frequency import PencilDecay, pencil_decay, starting_frequency, thinned_reading

@@ -17,9 +17,9 @@ import numpy as np
 from safetensors.numpy import save
 from scipy.special import ndtr
 
-from identification.estimate import Quantity
 from identification.neural.networks import open_stored, read_packaged, read_stored
 from identification.neural.rivals import LEVEL, MORE, SETS, Features
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)

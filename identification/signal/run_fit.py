@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, WindowEstimate, by_severity
+from identification.estimate import NoiseLevel, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import (
     FEW_CYCLES,
     GROSS_MISFIT,
@@ -20,6 +20,7 @@ from identification.policy import (
     LEAST_WINDOW_ENERGY,
     MISFIT_DEVIATIONS,
 )
+from identification.show.quantity import Quantity
 from identification.signal.colour import Autoregression
 from identification.signal.decay_fit import DecayFit, Reading, RunFit, fit_decays, fit_run
 from identification.signal.forcing import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO

@@ -20,7 +20,8 @@ from pydantic import Field
 
 from identification import policy
 from identification.campaign.derivatives import build_design
-from identification.estimate import PARAMETERS, Estimate, Quantity
+from identification.estimate import PARAMETERS, Estimate
+from identification.show.quantity import Quantity
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean

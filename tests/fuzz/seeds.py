@@ -216,7 +216,7 @@ def answer_document() -> dict[str, Any]:
     from diagnosis import Diagnosis, Settings
     from diagnosis.answer.held_out import ON_RUNS
     from diagnosis.findings.decision import decision
-    from identification.estimate import Quantity
+    from identification.show.quantity import Quantity
 
     values = {
         "cn_beta": Quantity(0.45, 0.01, "1/rad"),

@@ -16,9 +16,9 @@ import tomli_w
 from nicegui import ui
 
 from diagnosis.result import Diagnosis
-from diagnosis.words.numbers import plain
 from diagnosis.words.verdict import distinguishes
 from identification.show.blocks import Paragraph, typeset
+from identification.show.numbers import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, left_out_of, options
 from tunnel_lab.bench.parts import (
@@ -42,7 +42,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
-    from identification.estimate import Quantity
+    from identification.show.quantity import Quantity
 
 
 WORK = "diagnosis"
@@ -308,11 +308,11 @@ class ByHandPart:
 
 def show_closure(closure: Closure, answer: Diagnosis) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
-    from diagnosis.words.numbers import misfit_shown, share
-    from identification.printing import estimated, unit_mark
+    from diagnosis.words.numbers import misfit_shown
+    from identification.show.numbers import estimated, share, unit_mark
 
     def size(given: Quantity) -> str:
-        return typeset(estimated(given.to_json_dict(), unit_mark(beside(given.unit, ""))))
+        return typeset(estimated(given, unit_mark(beside(given.unit, ""))))
 
     show_facts(
         [

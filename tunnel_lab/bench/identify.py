@@ -13,8 +13,9 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text, unit
+from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text
 from identification.show.blocks import Block, Paragraph, TextTable
+from identification.show.numbers import unit
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
 from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command

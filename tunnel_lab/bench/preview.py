@@ -353,7 +353,7 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
     import numpy as np
 
     from identification.examination.free_motion import centre_of
-    from identification.printing import significant, with_std
+    from identification.show.numbers import significant, with_std
 
     if part.rest is not None:
         return part.rest, f"{significant(part.rest)} {unit}, stated and subtracted"

@@ -23,7 +23,8 @@ from tunnel_lab.terminal.progress import bar, step_display
 from tunnel_sim.vocabulary.dimensions import beside
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate, Quantity
+    from identification.estimate import Estimate
+    from identification.show.quantity import Quantity
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.plan import CampaignPlan
 
@@ -145,7 +146,8 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> No
 def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:
     """The injected values, beside the results of the nominal model and of the model with the causes."""
     from identification.estimate import UNITS
-    from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
+    from identification.printing import SYMBOLS
+    from identification.show.numbers import estimated, in_stds, significant, unit, with_std
     from tunnel_sim.effects.registry import effect_class
 
     rows = []
@@ -164,7 +166,7 @@ def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:
     for (effect, name), (truth, found) in planted_and_found(plan, answer).items():
         info = next(info for info in effect_class(effect).parameters() if info.name == name)
         error = in_stds(found.value - truth, found.std) if found and found.std else ""
-        cell = "not found" if found is None else estimated(found.to_json_dict())
+        cell = "not found" if found is None else estimated(found)
         rows.append((f"{info.symbol} {unit(info.unit)}", significant(truth), "", cell, error))
     heads = ("quantity", "planted", "nominal model", "with the causes", "error")
     return TextTable(
@@ -305,7 +307,8 @@ def truth_table(estimate: Estimate, truth: Mapping[str, float]) -> TextTable:
         truth: injected values by name, each in the unit of the estimate's quantity of that name.
     """
     from identification.estimate import UNITS
-    from identification.printing import SYMBOLS, in_stds, significant, unit, with_std
+    from identification.printing import SYMBOLS
+    from identification.show.numbers import in_stds, significant, unit, with_std
 
     rows = []
     for name, value in truth.items():

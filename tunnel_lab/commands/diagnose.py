@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.printing import coefficient_label
 from identification.show.blocks import TextTable
+from identification.show.numbers import estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
@@ -293,8 +294,9 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
         names: of the diagnoses, each different.
         answers: the reference first.
     """
-    from diagnosis.words.numbers import excess_std, probability, share
+    from diagnosis.words.numbers import excess_std
     from diagnosis.words.scatter import spread_estimate
+    from identification.show.numbers import probability, share
 
     def excess(answer: Diagnosis, value: float) -> str:
         """An excess with its standard deviation by chance, where the diagnosis has the noise of its runs."""
@@ -320,9 +322,7 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
             owner, _, name = full.rpartition(".")
             mark = unit_mark(beside(given.unit, ""))
             owner = owner or first_answer.effect
-            texts[owner, name] = spread_estimate(answer, owner, given) or estimated(
-                given.to_json_dict(), mark
-            )
+            texts[owner, name] = spread_estimate(answer, owner, given) or estimated(given, mark)
         parameters.append(texts)
     labels = {
         name: coefficient_label(name, given.unit)
@@ -333,7 +333,7 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
     for name, label in labels.items():
         for key in ("before", "after"):
             found = [getattr(answer.coefficients, key).get(name) for answer in answers]
-            cells = (_NONE if given is None else estimated(given.to_json_dict()) for given in found)
+            cells = (_NONE if given is None else estimated(given) for given in found)
             coefficients.append((f"{label} {key}", *cells))
     first, *others = (answer.coefficients.after for answer in answers)
     differences = []  # assumed independent

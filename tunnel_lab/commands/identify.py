@@ -197,8 +197,9 @@ def estimate_shown(
 
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     """Identify turning points by their own likelihood: ωn and ζ, with the JSON of a run."""
-    from identification.estimate import Estimate, Quantity, RunEstimate
-    from identification.printing import with_std
+    from identification.estimate import Estimate, RunEstimate
+    from identification.show.numbers import with_std
+    from identification.show.quantity import Quantity
     from identification.signal.turning_points import fit_turning_points
     from identification.status import Status
     from tunnel_sim.files.writing import json_text, write_json

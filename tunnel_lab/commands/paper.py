@@ -62,7 +62,7 @@ def paper_table() -> SpringTable:
 def show_springs(springs: SpringTable, source: str) -> None:
     """Fit and print the line; `typer.Exit` with status 1 when the gradient is not positive."""
     from identification.campaign.springs import fit_springs
-    from identification.printing import with_std
+    from identification.show.numbers import with_std
 
     fit = fit_springs(springs.stiffness, springs.frequency_hz)
     rows = []

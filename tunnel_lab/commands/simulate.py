@@ -311,7 +311,8 @@ def _changes(document: PlanDocument) -> float:
 def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> TextTable:
     """The bounds of both plans, and their ratio with the first repeated ``longer`` times, for equal rig time."""
     from identification.estimate import UNITS
-    from identification.printing import SYMBOLS, significant, unit
+    from identification.printing import SYMBOLS
+    from identification.show.numbers import significant, unit
 
     names = tuple(f"std {SYMBOLS[name]}\n{unit(UNITS[name])}" for name in _COEFFICIENTS)
     heads = ("runs", "record\n[s]", "rig time\n[min]", *names)

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from identification.printing import significant
 from identification.scoring import score
 from identification.show.blocks import Paragraph, TextTable
+from identification.show.numbers import significant
 from identification.show.style import figure, styled
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet

@@ -9,9 +9,7 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
-from identification.printing import concise, significant
 from identification.scoring import (
     Change,
     Score,
@@ -24,6 +22,8 @@ from identification.scoring import (
     score,
 )
 from identification.show.blocks import Block, Paragraph, TextTable
+from identification.show.numbers import concise, significant
+from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_lab.experiments.experiment import parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text

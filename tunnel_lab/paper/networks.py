@@ -15,7 +15,7 @@ from identification.datasets import paper_derivatives, paper_springs, paper_wind
 from identification.estimate import Estimate, WindowEstimate
 from identification.neural.networks import Networks, held_out_points, shipped_networks
 from identification.neural.three_cycles import cycles_time, network_inputs
-from identification.printing import concise, significant
+from identification.show.numbers import concise, significant
 from identification.show.style import (
     BLUE,
     COLOURS,

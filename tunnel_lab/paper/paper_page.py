@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_encoded, write_json
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -13,7 +13,7 @@ import numpy as np
 from identification import identify
 from identification.campaign.springs import SpringFit, fit_springs
 from identification.datasets import SpringRow, paper_springs
-from identification.printing import concise, with_std
+from identification.show.numbers import concise, with_std
 from identification.show.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan

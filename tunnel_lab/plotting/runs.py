@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.estimate import Quantity
-from identification.printing import SYMBOLS, unit_mark
+from identification.printing import SYMBOLS
+from identification.show.numbers import unit_mark
+from identification.show.quantity import Quantity
 from identification.show.style import (
     BLUE,
     COLOURS,

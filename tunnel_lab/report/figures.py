@@ -15,9 +15,9 @@ from diagnosis.findings.finding import Picture
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
-from diagnosis.words.numbers import excess_std, misfit_scale, plain, probability, run_labels, unit_shown
+from diagnosis.words.numbers import excess_std, misfit_scale, run_labels
 from diagnosis.words.scatter import answer_name
-from identification.printing import coefficient_label, significant
+from identification.printing import coefficient_label
 from identification.show.drawing import (
     ACCENT,
     AFTER,
@@ -33,6 +33,7 @@ from identification.show.drawing import (
     colour_bar,
     faded,
 )
+from identification.show.numbers import plain, probability, significant, unit_shown
 from identification.show.style import (
     COLOURS,
     INTERVAL,
@@ -45,7 +46,6 @@ from identification.show.style import (
     styled,
 )
 from tunnel_lab.report import where
-from tunnel_lab.report.friction import friction_figure
 from tunnel_lab.report.repeatability import repeatability_figure
 from tunnel_sim.vocabulary.record import Array
 
@@ -107,7 +107,6 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return makers | {
         "which": candidates_figure,
-        "friction": friction_figure,
         "repeatability": repeatability_figure,
         "how-far": closure_figure,
         "law": law_figure,

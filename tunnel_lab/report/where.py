@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.findings.whole import Findings
-from diagnosis.words.numbers import misfit_scale, run_labels, unit_shown
+from diagnosis.words.numbers import misfit_scale, run_labels
 from identification.printing import Document
 from identification.show.drawing import (
     AFTER,
@@ -23,6 +23,7 @@ from identification.show.drawing import (
     colour_bar,
     faded,
 )
+from identification.show.numbers import unit_shown
 from identification.show.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

@@ -10,7 +10,7 @@ import numpy as np
 from identification import policy
 from identification.examination.self_excited import Swing
 from identification.examination.slips.base import SlipEvidence, StatementSlip
-from identification.printing import significant
+from identification.show.numbers import significant
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
 

@@ -8,15 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.printing import (
-    coefficient_label,
-    concise,
-    in_stds,
-    significant,
-    unit,
-    unit_mark,
-    with_std,
-)
+from identification.printing import coefficient_label
+from identification.show.numbers import concise, in_stds, significant, unit, unit_mark, with_std
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,8 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.similarity import Similarity
 from diagnosis.settings import AnswerSettings, Settings
-from identification.estimate import Quantity
-from identification.printing import estimated
+from identification.show.numbers import estimated
+from identification.show.quantity import Quantity
 from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
@@ -244,7 +244,7 @@ def test_what_is_left_moves_the_coefficients(data, base):
     ],
 )
 def test_a_skewed_interval_is_printed(value, std, interval, text):
-    assert estimated({"value": value, "std": std, "unit": "1", "interval": interval}) == text
+    assert estimated(Quantity(value, std, "1", interval)) == text
 
 
 def test_an_interval_has_the_units_of_the_measured_campaign():

@@ -10,7 +10,7 @@ from diagnosis.answer.held_out import one_more
 from diagnosis.findings.candidates import damping_ratio
 from diagnosis.findings.passive import truncated, within_bounds
 from diagnosis.search.investigate import nominal_study
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tests.reference.free_decays import Setting, campaign
 from tests.support.gap_campaigns import answer
 from tunnel_sim.effects import effect_class

@@ -22,7 +22,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
 from diagnosis.settings import Settings
 from diagnosis.words.remainder import rest_words
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.writing import as_json

@@ -11,7 +11,7 @@ from diagnosis.model.choose import nominal_model
 from diagnosis.model.rig import PerInertia
 from diagnosis.model.similar import similar_campaign
 from identification import identify
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting

@@ -12,8 +12,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.settings import Settings
-from identification.estimate import Quantity
-from identification.printing import estimated
+from identification.show.numbers import estimated
+from identification.show.quantity import Quantity
 from tests.support.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
@@ -37,7 +37,7 @@ def test_a_parameter_at_the_end_of_its_range_says_so():
 def test_a_bound_is_shown_and_written_without_a_deviation():
     data = Quantity(0.5, None, "N m", bound="upper").to_json_dict()
     assert data == {"value": 0.5, "std": None, "unit": "N m", "bound": "upper"}
-    assert estimated(data, "N m") == "0.5000 N m (at its upper bound)"
+    assert estimated(Quantity(0.5, None, "N m", bound="upper"), "N m") == "0.5000 N m (at its upper bound)"
 
 
 def test_the_frequency_of_a_hum_scatters_as_stated():

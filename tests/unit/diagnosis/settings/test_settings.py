@@ -11,8 +11,8 @@ from diagnosis import Settings, diagnose, vocabulary
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
-from diagnosis.words.numbers import part
 from docs.studies import settings_page
+from identification.show.numbers import part
 from tests.support.gap_campaigns import campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 

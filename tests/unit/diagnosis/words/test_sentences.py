@@ -21,7 +21,7 @@ from diagnosis.words.tables import closable_table
 from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document
 
 Document = dict[str, Any]

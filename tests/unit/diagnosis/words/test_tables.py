@@ -14,7 +14,6 @@ import pytest
 
 from diagnosis.words import tables
 from diagnosis.words.lines import coefficients_line, hidden_line, inclusion_line, model_line, noise_line
-from diagnosis.words.numbers import probability, share
 from diagnosis.words.sections import printed
 from diagnosis.words.tables import (
     candidates_table,
@@ -24,10 +23,12 @@ from diagnosis.words.tables import (
     waterfall_table,
 )
 from diagnosis.words.verdict import rival_lines, run_words
-from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
+from identification.estimate import Estimate, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs
 from identification.show.blocks import Paragraph, TextTable
+from identification.show.numbers import probability, share
+from identification.show.quantity import Quantity
 from identification.status import Status
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.support.shown_numbers import assert_shows, assert_units

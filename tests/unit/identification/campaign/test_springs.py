@@ -10,8 +10,9 @@ from scipy.stats import binom
 from identification import identify
 from identification.campaign.springs import fit_springs, pair_remark, wind_off_line
 from identification.datasets import paper_springs
-from identification.estimate import Quantity, RunEstimate
+from identification.estimate import RunEstimate
 from identification.policy import DIFFERENCE_RATE, SPRING_AT_BEST, SPRING_FLAG_RATE
+from identification.show.quantity import Quantity
 from tests.support.gap_campaigns import campaign
 from tunnel_sim.effects import effect_from
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from identification import Estimate, identify
-from identification.estimate import Quantity
 from identification.estimators.bayesian import shared_moments
+from identification.show.quantity import Quantity
 from identification.statistics import determined
 from tests.reference.free_decays import TWELVE, Setting, campaign, damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

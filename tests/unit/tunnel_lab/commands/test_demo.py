@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from diagnosis.words.causes import consequence
-from identification.estimate import Estimate, Quantity, Status
+from identification.estimate import Estimate, Status
+from identification.show.quantity import Quantity
 from tests.support.command import Tunnel
 from tunnel_lab.bench.workspace import open_session
 from tunnel_lab.commands.demo import (

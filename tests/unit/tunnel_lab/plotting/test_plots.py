@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.estimate import Quantity
 from identification.show import style
+from identification.show.quantity import Quantity
 from identification.show.style import figure, limit_to_known, log_axis, styled
 from tests.support.diagnosis_document import campaign
 from tunnel_lab.plotting import runs

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from diagnosis.findings.friction_curve import friction_figure
 from diagnosis.words.numbers import run_labels
 from identification.show.style import styled
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
@@ -19,7 +20,6 @@ from tests.support.shown_numbers import numbers
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
 from tunnel_lab.report.figures import backbone_figure, law_figure
-from tunnel_lab.report.friction import friction_figure
 
 Document = dict[str, Any]
 

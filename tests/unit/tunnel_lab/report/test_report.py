@@ -18,8 +18,8 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.remainder.closable import Closable, Curve
 from diagnosis.result import Diagnosis
-from identification.estimate import Quantity
 from identification.show.drawing import THEMED, inline_svg
+from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary

@@ -13,7 +13,7 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from tests.support.gap_campaigns import campaign
 from tests.support.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (

@@ -11,9 +11,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from identification.estimate import Estimate, Quantity, RunEstimate
+from identification.estimate import Estimate, RunEstimate
 from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint
+from identification.show.quantity import Quantity
 from identification.uncertainty.budget import load_uncertainties
 from tunnel_lab.commands.paper import read_spring_table
 from tunnel_lab.experiments.blind.sets import file_hash, read_hashes

@@ -15,7 +15,7 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.where.described import Where
-from identification.estimate import Quantity
+from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind import score_page as blind
 from tunnel_lab.experiments.blind.cases import case

@@ -1,0 +1,315 @@
+"""Numbers as text: with their deviations, as shares and probabilities, and readings in customary units.
+
+Two significant digits of the standard deviation determine those of the value.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+from identification.show.quantity import Quantity
+from tunnel_sim.vocabulary.dimensions import beside
+from tunnel_sim.vocabulary.quantities import Share
+
+FIXED_DECIMALS = 9
+"""A number with more decimals than this, above a million or below a ten-thousandth has a power of ten."""
+
+
+NEGLIGIBLE = 1e-9
+"""A standard deviation below this share of the value does not determine the number of digits."""
+
+
+def unit_mark(unit: str) -> str:
+    """A unit of a document with superscripts: ``m³/rad`` for ``m3/rad``; a 1 is unchanged."""
+    return re.sub(r"(?<=[A-Za-z])[234]\b", lambda found: "²³⁴"[int(found[0]) - 2], unit)
+
+
+def in_degrees(angle: float) -> str:
+    """An angle (rad) in degrees, such as ``5.2°``."""
+    return f"{significant(math.degrees(angle), 2)}°"
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """A number whose uncertainty is not known, in fixed notation where that is short.
+
+    Args:
+        value: the number, any unit.
+        digits: significant digits (a count).
+    """
+    if not math.isfinite(value):
+        return "not finite"
+    if value == 0.0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if -4 <= exponent < 6:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def with_std(value: float, std: float | None) -> str:
+    """A value and its standard deviation, such as ``0.4951 ± 0.0012`` or ``(1.234 ± 0.056)e-05``.
+
+    Args:
+        value: the estimate, any unit.
+        std: its standard deviation, in the same unit; None where it is not known.
+    """
+    special = _special(value, std)
+    if special or std is None:
+        return special
+    decimals = 1 - _exponent(std, 2)
+    if _fixed(value, std, decimals):
+        places = max(decimals, 0)
+        return f"{round(value, decimals):.{places}f} ± {round(std, decimals):.{places}f}"
+    power = max(_exponent(value, 2), _exponent(std, 2))
+    scale, places = 10.0**power, max(decimals + power, 0)
+    return f"({value / scale:.{places}f} ± {std / scale:.{places}f})e{power:+03d}"
+
+
+def concise(value: float, std: float | None) -> str:
+    """The short notation of metrology, such as ``0.4951(12)``, for narrow columns: arguments as in `with_std`."""
+    special = _special(value, std)
+    if special or std is None:
+        return special
+    decimals = 1 - _exponent(std, 2)
+    if not _fixed(value, std, decimals):
+        return with_std(value, std)
+    if decimals <= 0:
+        return f"{round(value, decimals):.0f}({round(std, decimals):.0f})"
+    rounded = f"{round(std, decimals):.{decimals}f}"
+    return f"{value:.{decimals}f}({rounded if std >= 1.0 else rounded.replace('.', '').lstrip('0')})"
+
+
+def in_stds(error: float, std: float | None) -> str:
+    """An error in standard deviations, such as ``+0.8 σ``; ``–`` where the standard deviation is not known.
+
+    Args:
+        error: estimate − truth, any unit.
+        std: standard deviation of the estimate, in the same unit; None where it is not known.
+    """
+    if std is None or not math.isfinite(std) or std <= 0.0:
+        return "–"
+    ratio = error / std
+    return f"{ratio:+.1f} σ" if abs(ratio) < 1000.0 else f"{ratio:+.0e} σ"
+
+
+def unit(text: str) -> str:
+    """A unit of an estimate's JSON as printed: ``[kg m²]`` for ``kg m2``."""
+    return f"[{unit_mark(text)}]"
+
+
+def _special(value: float, std: float | None) -> str:
+    """The text of a value that cannot be rounded by its standard deviation; empty for others."""
+    if not math.isfinite(value):
+        return "not finite"
+    if std is None or not math.isfinite(std):
+        return f"{significant(value)} (std unknown)"
+    if std <= 0.0:
+        return f"{significant(value, 7)} ± 0"
+    return f"{value:.10g} ± {std:.1e}" if std < NEGLIGIBLE * abs(value) else ""
+
+
+def _fixed(value: float, std: float, decimals: int) -> bool:
+    """Whether fixed notation is short enough."""
+    return decimals <= FIXED_DECIMALS and 1e-4 <= max(abs(value), std) < 1e6
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Decimal exponent of ``value`` after rounding to ``digits`` significant digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value != 0.0 else -300
+
+
+def estimated(given: Quantity, mark: str = "") -> str:
+    """An estimate: ``0.4951 ± 0.0012``, ``0.4951 ± 0.0012 (0.4939 to 0.4986)``, or not determined.
+
+    A deviation of zero means that the value was given, not fitted: it is marked as fixed.
+    """
+    if not given.determined:
+        return UNDETERMINED
+    value = with_std(given.value, given.std) if given.std else significant(given.value)
+    bound = f" (at its {given.bound} bound)" if given.bound else ""
+    text = f"{value} {mark}".rstrip() + bound + (" (fixed)" if given.std == 0.0 else "")
+    if given.interval is None or not given.std:
+        return text
+    # The ends of the interval have as many digits as the value.
+    texts = [with_std(end, given.std) for end in given.interval]
+    powers = [end.rpartition(")")[2] if end.startswith("(") else "" for end in texts]
+    low, high = (
+        end.partition(" ± ")[0].removeprefix("(") + power for end, power in zip(texts, powers, strict=True)
+    )
+    return f"{text} ({low} to {high})"
+
+
+UNDETERMINED = "not determined by these runs"
+
+
+def p_text(value: float) -> str:
+    """The text of a probability, never rounded to 0: such as ``= 3.7e-08``, or ``< 1e-300``."""
+    return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
+
+
+_LEAST_P = 1e-300  # close to the smallest positive float
+
+
+_ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+
+
+_CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def probability(value: float) -> str:
+    """A probability in whole per cent, never rounded to 0 or 100 %, such as ``97 %`` or ``> 99 %``."""
+    if value >= 0.995:
+        return "> 99 %"
+    return f"{100.0 * value:.0f} %" if value >= 0.005 else "< 1 %"
+
+
+def for_people(value: float, std: float | None, unit: str) -> str:
+    """A value to three digits, with its standard deviation where they show it, such as ``1.96 ± 0.12 %``.
+
+    Args:
+        value: in the unit; radians are shown in degrees.
+        std: its standard deviation, in the same unit; None: not known.
+        unit: as effects and documents write it.
+    """
+    if unit == "rad":
+        mark, factor = unit_shown(unit)
+        value, std = factor * value, None if std is None else factor * std
+    else:
+        mark = unit_mark(beside(unit))
+    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
+    shown = significant(value, 3) if std is None or std < 0.5 * last else with_std(value, std)
+    return f"{shown.replace('-', '−') if shown.startswith('-') else shown}{mark}"
+
+
+def part(share: float) -> str:
+    """A share above 0 and below 1 as a simple fraction in words, such as ``four fifths``; others in per cent."""
+    simple = Fraction(share).limit_denominator(10)
+    if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
+        return f"{100.0 * share:.3g} %"
+    ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
+    if count > 1:
+        return f"{_CARDINALS[count]} {ordinal}s"
+    return ordinal if ordinal == "half" else f"{'an' if ordinal == 'eighth' else 'a'} {ordinal}"
+
+
+def share(value: float) -> str:
+    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
+
+    Args:
+        value: a fraction; ``none`` below 0, where the residual has grown.
+    """
+    if value < 0.0:
+        return "none"
+    if value > 0.9995:
+        return "> 99.9 %" if value < 1.0 else "100 %"
+    if value < 0.0005:
+        return "< 0.1 %" if value > 0.0 else "0 %"
+    return f"{100.0 * value:.1f} %"
+
+
+def percent(share: Share, std: float | None = None) -> str:
+    """A share in per cent, such as ``94.2 ± 0.6 %``.
+
+    Args:
+        std: its standard deviation, a fraction.
+    """
+    beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
+    return f"{min(100.0 * share, 100.0):.1f}{beside} %"
+
+
+_UNITS = {"l/V": "the time in which the air passes the reference length"}
+
+
+def explained(units: Iterable[str]) -> str:
+    """Explanation of units that only this field uses, in brackets after a blank; empty where all are common."""
+    said = [f"{unit}: {_UNITS[unit]}" for unit in units if unit in _UNITS]
+    return f" ({'; '.join(said)})" if said else ""
+
+
+def rounded_up(value: float) -> str:
+    """Two significant digits, never below the value."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
+
+
+def size_change(before: float, after: float) -> str:
+    """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
+
+    Args:
+        before: the value without the causes, not 0, in its unit.
+        after: the value with the causes, in the same unit.
+    """
+    if before * after < 0.0:
+        return "other sign"
+    change = 100.0 * (abs(after) / abs(before) - 1.0)
+    return f"{change:+.2g} %" if change else "0 %"
+
+
+def change_up_to(size: float, given: Quantity) -> str:
+    """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
+
+    Args:
+        size: the change, in the coefficient's unit.
+        given: the coefficient, from the document.
+    """
+    if given.std is not None and given.std < abs(given.value):
+        return f"{rounded_up(100.0 * size / abs(given.value))} %"
+    return f"{rounded_up(size)} {'' if given.unit == '1' else unit_mark(given.unit)}".strip()
+
+
+def unit_shown(unit: str) -> tuple[str, float]:
+    """The mark of the displayed unit of readings, and the factor on values in the given unit."""
+    return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
+
+
+def times_noise(value: float) -> str:
+    """A gap in words, such as ``2.75 times the noise variance``, from its excess, a ratio."""
+    return f"{significant(value, 4) if value >= 10.0 else f'{value:.2f}'} times the noise variance"
+
+
+def left_over(excess: float) -> str:
+    """A residual gap, such as ``9.6 times the noise variance``, a ratio."""
+    least = 1e-3
+    size = f"less than {least:g}" if excess < least else significant(excess, 2)
+    return f"{size} times the noise variance"
+
+
+def beside_noise(excess: float) -> str:
+    """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
+
+    Args:
+        excess: its mean square over the noise variance, minus one, a ratio.
+    """
+    return f"{significant(math.sqrt(max(1.0 + excess, 0.0)), 3)} times the noise"
+
+
+def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
+    """A reading, or an error of one, in the displayed unit, such as ``0.0226°``.
+
+    Args:
+        value: in the unit.
+        digits: significant digits (a count).
+    """
+    mark, factor = unit_shown(unit)
+    return f"{significant(factor * value, digits) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+
+
+def held_out_excess(value: float) -> str:
+    """An excess in noise variances, a ratio: three decimals where it is small, or four significant digits."""
+    return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
+
+
+def plain(*names: str) -> str:
+    """Effect names as words: ``mains hum, free play and coulomb friction``."""
+    return listed([name.replace("_", " ") for name in names])
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts of a sentence as a list: ``one, two and three``."""
+    *first, last = parts
+    return f"{', '.join(first)} and {last}" if first else last

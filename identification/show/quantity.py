@@ -1,0 +1,75 @@
+"""A value with its standard deviation and unit: the one type of an estimated number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+from pydantic import ConfigDict
+
+_FINITE = ConfigDict(allow_inf_nan=False)
+
+
+class AsNumber:
+    """A value that is taken as a number: by ``float`` and by NumPy."""
+
+    value: float
+
+    def __float__(self) -> float:
+        """The value, in its unit."""
+        return float(self.value)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """The value as an array without dimensions."""
+        del copy  # it is always new
+        return np.array(self.value, dtype=dtype)
+
+
+@dataclass(frozen=True)
+class Quantity(AsNumber):
+    """A value with its standard deviation and unit; ``float`` and NumPy take it as its value.
+
+    Args:
+        value: estimate, in ``unit``.
+        std: standard deviation, in ``unit``; 0 where the value was given, not fitted; None where it is not known.
+        unit: of both, SI, e.g. ``rad/s``; ``1`` where there is none.
+        interval: ends of the central interval of 0.95, in ``unit``, where it is not value ± 1.96 std; else None.
+        bound: ``lower`` or ``upper`` where the fit ended at that end of the allowed range; ``std`` is then None.
+        determined: whether the runs determine it; if not, ``value`` is meaningless and ``std`` is None.
+        shares: of ``std`` squared by source, fractions; empty where they are not known.
+    """
+
+    __pydantic_config__ = _FINITE
+
+    value: float
+    std: float | None
+    unit: str
+    interval: tuple[float, float] | None = None
+    bound: str | None = None
+    determined: bool = True
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def known_std(self) -> float:
+        """The standard deviation that every quantity of an `Estimate` has, in ``unit``.
+
+        Raises:
+            ValueError: where it is not known, as of a coefficient that a diagnosis does not determine.
+        """
+        if self.std is None:
+            raise ValueError(f"internal error: {self} has no standard deviation")
+        return self.std
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Value, std, unit; shares, interval and bound where there are any, ``determined`` where it is false."""
+        data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
+        if self.shares and self.std is not None:
+            data["shares"] = dict(self.shares)
+        if self.interval is not None and self.std is not None:
+            data["interval"] = list(self.interval)
+        if self.bound is not None:
+            data["bound"] = self.bound
+        return data if self.determined else data | {"determined": False}
