@@ -277,7 +277,8 @@ class _State:
 
     def linearise(self, base: Fit | None) -> None:
         """Compute sensitivities, reusing those of a smaller fit where given."""
-        self.jacobian = sensitivities(self.problem, self.here.point, base, self.here.prediction)
+        known = None if base is None else base.jacobian
+        self.jacobian = sensitivities(self.problem, self.here.point, known, self.here.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
         self.products = Products.of(self.jacobian, self.problem.parameters.precision)

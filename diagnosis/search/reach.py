@@ -37,7 +37,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
         return 0.0
     able = may_scatter(between_runs, base.problem.data)
     problem, point = with_deviations(base.problem, base.point, tuple(usual(base, kind) for kind in able))
-    jacobian = sensitivities(problem, point, base)
+    jacobian = sensitivities(problem, point, base.jacobian)
     bases = [_orthonormal(own) for _, own in jacobian]
 
     def beside(change: Sequence[Array]) -> Array:
