@@ -14,8 +14,8 @@ from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import FOLDS, folds
 from diagnosis.search.hypothesis import restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_moments import RandomAnswer

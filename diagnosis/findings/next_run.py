@@ -11,8 +11,9 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.normal_equations import project_release
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array

@@ -12,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.data import Data
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly

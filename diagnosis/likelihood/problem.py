@@ -10,8 +10,9 @@ import numpy as np
 
 from diagnosis.likelihood.motions import Asked, readings
 from diagnosis.model.chance import RunDeparture, Scatter, departure
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, ParameterSet, Point
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly

@@ -15,8 +15,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit
 from diagnosis.likelihood.scatter_widths import Between, width_prior
 from diagnosis.model.chance import Scatter
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial

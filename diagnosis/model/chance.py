@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, RunParameterPrior
-from diagnosis.model.run_data import Data
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import RunSettings

@@ -24,9 +24,9 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.data import FOLDS
 from diagnosis.model.fact import Fact
 from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
-from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.native_friction import native_friction, nearest_polynomial

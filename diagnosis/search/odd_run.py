@@ -20,8 +20,8 @@ from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, resonance
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale

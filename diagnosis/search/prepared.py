@@ -16,8 +16,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.blocks import prepare, without_rest, without_start
+from diagnosis.model.data import Data
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour

@@ -21,8 +21,8 @@ from diagnosis.likelihood.normal_equations import by_run
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (

@@ -18,8 +18,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Chance, Scatter
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import ScatterSettings
 from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import Effect

@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model

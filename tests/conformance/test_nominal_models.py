@@ -14,10 +14,10 @@ from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.data import Data
 from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.prepared import fit_nominal

@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import misfit
-from diagnosis.model.run_data import Data
+from diagnosis.model.data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import sets_with_one_more

@@ -18,8 +18,8 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.starting_points import misses_motion
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.grow import sets_with_one_more

@@ -14,10 +14,11 @@ from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import Data
 from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.settings import Settings

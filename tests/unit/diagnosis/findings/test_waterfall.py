@@ -21,7 +21,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.model.run_data import FOLDS
+from diagnosis.model.data import FOLDS
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.random_moments import RandomAnswer

@@ -14,8 +14,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import SelectionSettings, Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import SIX

@@ -9,8 +9,8 @@ import pytest
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting

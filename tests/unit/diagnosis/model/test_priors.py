@@ -25,7 +25,8 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from diagnosis.model.run_data import Data, RunData
+    from diagnosis.model.data import Data
+    from diagnosis.model.run_data import RunData
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.05, 2e-4, 200.0
 SPRINGS = (16.0, 16.0, 30.0, 30.0, 44.0, 44.0)
