@@ -23,8 +23,8 @@ from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import acts_by, likeliest, random_moments, with_response
 from diagnosis.search.random_spectra import SOURCES
 from diagnosis.search.scatter import scattered

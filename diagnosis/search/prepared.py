@@ -33,8 +33,8 @@ from diagnosis.noise.sensor_noise import (
     typical_step,
 )
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.one_more import second_mode_alone
 from diagnosis.search.scatter import as_stated
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import fdtrc
@@ -23,8 +22,9 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, mi
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import grow, sets_with_one_more
+from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
     ProcessNoise,
     acts_by,
@@ -34,14 +34,12 @@ from diagnosis.search.process_noise import (
     with_response,
 )
 from diagnosis.search.random_spectra import SOURCES, MomentSource
+from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import settled
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from diagnosis.settings import RandomMomentSettings
 from tunnel_sim.effects import Effect
-
-if TYPE_CHECKING:
-    from diagnosis.search.views.view import View
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
@@ -74,7 +72,7 @@ class RandomAnswer:
         return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
 
 
-def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
+def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
     """Try turbulence, vortices with a wandering phase, and the surroundings, under all sets of effects.
 
     Args:
@@ -117,10 +115,10 @@ class _Beside:
     alike: tuple[ProcessNoise, ...]
     top: Hypothesis
     seen: Hypothesis
-    view: View
+    view: RunsInView
 
     @classmethod
-    def found(cls, source: MomentSource, best: Hypothesis, view: View) -> _Beside | None:
+    def found(cls, source: MomentSource, best: Hypothesis, view: RunsInView) -> _Beside | None:
         """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
         top = _settled(best, view, source)
@@ -372,7 +370,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, view: View, source: MomentSource) -> Hypothesis:
+def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypothesis:
     """The best set of effects on rows whose noise includes the response to the random moment.
 
     The given set where no random moment acts or its filter does not settle. The random moment is estimated from

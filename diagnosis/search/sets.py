@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,17 +13,14 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
+from diagnosis.search.one_more import same_change, sets_with_one_more
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival, Rival
+from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import drifting, with_scatter
 from diagnosis.search.surviving import refusal, refusal_with_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
-
-if TYPE_CHECKING:
-    from diagnosis.search.views.view import View
-
 
 Names = tuple[str, ...]
 
@@ -45,7 +41,7 @@ class Sets:
             not a fitted set, or is not settled yet.
     """
 
-    view: View
+    view: RunsInView
     hypotheses: tuple[Hypothesis, ...]
     random: tuple[RandomAnswer, ...] = ()
     rivals: tuple[FoundRival, ...] = ()

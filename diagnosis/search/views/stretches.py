@@ -22,8 +22,8 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import Progress, StepClock
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, with_forms
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared, fit_nominal
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View

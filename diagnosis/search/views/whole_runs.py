@@ -50,7 +50,7 @@ class WholeRuns(View):
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view, or one after a view whose answer does not hold in whole runs."""
         del clock
-        if known is not None and known.view.holds(known):
+        if known is not None and known.view.holds(known.answer, known.settled):
             return None
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)

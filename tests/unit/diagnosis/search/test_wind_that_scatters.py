@@ -14,9 +14,9 @@ from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import nominal_study
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.scatter import scattered
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.files.rig_file import load_rig
