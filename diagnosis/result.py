@@ -15,8 +15,8 @@ from diagnosis.findings.whole import Findings
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.sections import printed
 from diagnosis.words.written import sentences
-from identification.blocks import as_notebook, as_text
 from identification.estimate import as_pandas, correlated, wide_frame
+from identification.show.blocks import as_notebook, as_text
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -16,8 +16,8 @@ import polars as pl
 from numpy.typing import DTypeLike, NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
-from identification.blocks import as_notebook, as_text
 from identification.printing import estimate_blocks, estimate_brief
+from identification.show.blocks import as_notebook, as_text
 from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_severity as by_severity

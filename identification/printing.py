@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identification.blocks import Block, Paragraph, TextTable
+from identification.show.blocks import Block, Paragraph, TextTable
 from identification.status import SYSTEMATIC, Remark, Status
 from identification.trade_off import Combination, TradeOff
 from tunnel_sim.vocabulary.errors import counted

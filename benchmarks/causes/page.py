@@ -260,7 +260,7 @@ def _draw(found: Sequence[Mapping[str, Any]], path: Path) -> None:
     """A point with its interval for each method."""
     from matplotlib.figure import Figure
 
-    from tunnel_lab.plotting.style import save
+    from identification.show.style import save
 
     figure = Figure(figsize=(6.4, 0.6 + 0.32 * len(found)), layout="constrained")
     axes = figure.subplots()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from identification.blocks import Figure
+from identification.show.blocks import Figure
 
 CAPTIONS: Mapping[str, str] = {
     "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "

@@ -31,7 +31,7 @@ from diagnosis.words.scatter import (
     without_scatter,
 )
 from diagnosis.words.verdict import size_words
-from identification.blocks import Card, Heading, Paragraph
+from identification.show.blocks import Card, Heading, Paragraph
 from tunnel_sim.effects import known_effects
 
 WITHIN_THE_NOISE = "within the noise"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from diagnosis.findings.closure import Misfit
 from diagnosis.findings.whole import Findings
 from identification.estimate import Quantity
-from identification.printing import significant, unit_mark, with_std
+from identification.printing import Document, significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.quantities import Share
@@ -294,3 +294,31 @@ def acts_on(answer: Findings, effect: str) -> str:
     if kind is None:
         return ""
     return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"
+
+
+def misfit_scale(answer: Findings) -> tuple[str, Callable[[float], float]]:
+    """The unit in which gaps are drawn, and the function from an excess in noise variances to this unit.
+
+    The unit is degrees for readings of angles, and standard deviations of the noise for a document without
+    ``misfit``.
+    """
+    misfit = answer.gap.misfit or Misfit(1.0, 0.0, "rad")
+    unit, factor = unit_shown(misfit.unit) if answer.gap.misfit else ("noise std", 1.0)
+    return unit, lambda excess: factor * misfit.rms(excess)
+
+
+def run_labels(maps: Document) -> list[str]:
+    """The runs of ``maps`` with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
+
+    A spring is named where stated, and the wind speed where any run had wind.
+    """
+    windy = any(run["wind_speed"] > 0.0 for run in maps["runs"])
+    labels = []
+    for run in maps["runs"]:
+        parts = [str(run["id"])]
+        if run["spring_stiffness"]:
+            parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
+        if windy:
+            parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0.0 else "wind off")
+        labels.append(" · ".join(parts))
+    return labels

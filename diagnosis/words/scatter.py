@@ -9,9 +9,9 @@ from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import WordsSettings
 from diagnosis.words.numbers import listed, plain, probability, rounded_up
-from identification.blocks import TextTable
 from identification.estimate import Quantity
 from identification.printing import concise, significant, with_std
+from identification.show.blocks import TextTable
 from identification.status import SYSTEMATIC
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.quantities import Share

@@ -47,7 +47,8 @@ from diagnosis.words.tables import (
     waterfall_table,
 )
 from diagnosis.words.verdict import next_steps, rival_lines
-from identification.blocks import (
+from identification.printing import COEFFICIENTS, significant, trade_off_line
+from identification.show.blocks import (
     Block,
     Detail,
     Figure,
@@ -59,7 +60,6 @@ from identification.blocks import (
     TextTable,
     brief,
 )
-from identification.printing import COEFFICIENTS, significant, trade_off_line
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _UNDETERMINED = "not shown by the residuals alone"

@@ -22,7 +22,6 @@ from diagnosis.words.numbers import (
     unit_of,
 )
 from diagnosis.words.scatter import answer_name, spread_estimate
-from identification.blocks import TextTable
 from identification.estimate import Quantity
 from identification.printing import (
     coefficient_label,
@@ -32,6 +31,7 @@ from identification.printing import (
     unit_mark,
     with_std,
 )
+from identification.show.blocks import TextTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.dimensions import beside
 

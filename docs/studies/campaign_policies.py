@@ -22,13 +22,13 @@ import polars as pl
 from scipy.stats import binom
 
 from identification.estimate import PARAMETERS
+from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
 from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, Policy, run_campaign
 from tunnel_lab.envs.session import answers, probabilities
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.runner import crew
-from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array

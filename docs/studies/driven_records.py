@@ -27,7 +27,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from identification import identify
-from tunnel_lab.plotting.style import save
+from identification.show.style import save
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.writing import write_whole

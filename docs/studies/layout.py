@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 
-from tunnel_lab.plotting.style import COLOURS, figure, styled
+from identification.show.style import COLOURS, figure, styled
 
 ROOT = Path(__file__).parents[2]
 PICTURE = ROOT / "docs" / "images" / "layout.svg"

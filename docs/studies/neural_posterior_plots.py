@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import figure, grid, styled
+from identification.show.style import figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

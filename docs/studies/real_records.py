@@ -15,7 +15,7 @@ from typing import Any
 from diagnosis import diagnose
 from diagnosis.result import Diagnosis
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
-from tunnel_lab.plotting.style import save
+from identification.show.style import save
 from tunnel_lab.report.figures import waterfall_figure
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from docs.studies.window_rivals import Explanation, WindowDiagnosis
-from tunnel_lab.plotting.style import COLOURS, WIDTH, figure, grid, styled
+from identification.show.style import COLOURS, WIDTH, figure, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -55,8 +55,9 @@ def test_identify_answers_or_refuses_in_one_line(campaign, number, draws):
 
 def draw_figures(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
+    from identification.show import style
     from tunnel_lab.commands.show import spread
-    from tunnel_lab.plotting import runs, style
+    from tunnel_lab.plotting import runs
     from tunnel_lab.plotting.runs import windows_figure
 
     for page in runs.trace_pages(campaign):

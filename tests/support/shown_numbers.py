@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from identification.blocks import Block, Card, Detail, TextTable
+from identification.show.blocks import Block, Card, Detail, TextTable
 
 _NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _SCALED = re.compile(r"\(([−-]?[\d.]+) ± ([\d.]+)\)e([+-]\d+)")

@@ -18,7 +18,7 @@ from nicegui import ui
 from diagnosis.result import Diagnosis
 from diagnosis.words.numbers import plain
 from diagnosis.words.verdict import distinguishes
-from identification.blocks import Paragraph, typeset
+from identification.show.blocks import Paragraph, typeset
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, left_out_of, options
 from tunnel_lab.bench.parts import (
@@ -228,7 +228,7 @@ class ShownAnswer:
 
         def drawings() -> list[str]:
             from diagnosis.words.scatter import repeats
-            from tunnel_lab.report.drawing import inline_svg
+            from identification.show.drawing import inline_svg
             from tunnel_lab.report.figures import waterfall_figure
             from tunnel_lab.report.page import DESCRIPTIONS
             from tunnel_lab.report.repeatability import repeatability_figure

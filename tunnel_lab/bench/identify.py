@@ -11,10 +11,10 @@ from pathlib import Path
 import tomli_w
 from nicegui import background_tasks, ui
 
-from identification.blocks import Block, Paragraph, TextTable
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
 from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text, unit
+from identification.show.blocks import Block, Paragraph, TextTable
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
 from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command

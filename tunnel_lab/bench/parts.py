@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from identification.blocks import Block, as_html, brief
+from identification.show.blocks import Block, as_html, brief
 from tunnel_lab.bench.workspace import STAGES, Session, closed
 from tunnel_sim.vocabulary.errors import TunnelError
 

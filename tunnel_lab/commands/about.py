@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.arguments import output_file
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show

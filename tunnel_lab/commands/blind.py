@@ -238,9 +238,9 @@ def score(
       0 scored, 2 bad input: an answer is missing, or a file does not match its hash.
     """
     from diagnosis import vocabulary
+    from identification.show.style import save_both
     from tunnel_lab.experiments.blind import score_page as blind
     from tunnel_lab.experiments.blind import score_set
-    from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_json, write_whole
 
     names = split_names(exclude)

@@ -17,7 +17,7 @@ import typer
 from typer import Option
 
 from diagnosis.result import Diagnosis
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
 from tunnel_sim.vocabulary.dimensions import beside
@@ -234,8 +234,8 @@ def compare_estimators(plan: CampaignPlan, folder: Path) -> list[str]:
     Returns:
         Clauses on failed checks.
     """
+    from identification.show.style import save_both
     from tunnel_lab.plotting import runs
-    from tunnel_lab.plotting.style import save_both
 
     campaign, estimates = simulated_part(plan, folder)
     off = next(run for run in campaign.runs if not run.wind_on)

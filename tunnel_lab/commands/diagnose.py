@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from identification.blocks import TextTable
 from identification.printing import coefficient_label, estimated, in_stds, unit_mark, with_std
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import (
     EffectsFileOption,

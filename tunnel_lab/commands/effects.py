@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument
 
-from identification.blocks import TextTable
 from identification.printing import unit_mark
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.arguments import EffectsFileOption, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -15,9 +15,9 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
-from identification.blocks import Block, Paragraph, TextTable
 from identification.estimators import SUMMARIES, make_estimator
 from identification.printing import budget_blocks, estimate_blocks
+from identification.show.blocks import Block, Paragraph, TextTable
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import (
     LeaveOutOption,

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary import limits

@@ -79,8 +79,8 @@ def plot(
       0 drawn, 1 no run could be identified (no figure of windows), 2 bad input.
     """
     from identification import identify
+    from identification.show.style import save_both
     from tunnel_lab.plotting import runs as figures
-    from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import output_folder
 
     failure = ""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
     ending,
@@ -120,8 +120,8 @@ def simulate(
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
+    from identification.show.style import save
     from tunnel_lab.plotting.runs import trace_pages
-    from tunnel_lab.plotting.style import save
     from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.plan_file import load_plan

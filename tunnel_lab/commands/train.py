@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.terminal.arguments import SchedulerOption, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_lab.terminal.progress import bar

@@ -326,8 +326,8 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from identification.show.style import COLOURS
     from tunnel_lab.plotting.runs import WIND_OFF, WIND_ON
-    from tunnel_lab.plotting.style import COLOURS
 
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)  # only partly typed by matplotlib

@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from identification.blocks import Paragraph, TextTable
 from identification.printing import significant
 from identification.scoring import score
+from identification.show.blocks import Paragraph, TextTable
+from identification.show.style import figure, styled
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
 from tunnel_lab.experiments.view import ExperimentView
-from tunnel_lab.plotting.style import figure, styled
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.in_phase import in_phase

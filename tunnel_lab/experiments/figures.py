@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import polars as pl
 
-from identification.blocks import Paragraph
 from identification.estimate import Quantity
 from identification.printing import SYMBOLS
 from identification.scoring import Score, Trials
+from identification.show.blocks import Paragraph
 from identification.statistics import Proportion
 from tunnel_sim.vocabulary.record import read_only
 

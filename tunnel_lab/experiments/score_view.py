@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from identification.blocks import Block, Paragraph, TextTable
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE
 from identification.printing import concise, significant
@@ -24,6 +23,7 @@ from identification.scoring import (
     reach_of_rmse,
     score,
 )
+from identification.show.blocks import Block, Paragraph, TextTable
 from identification.statistics import Proportion
 from tunnel_lab.experiments.experiment import parquet
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text

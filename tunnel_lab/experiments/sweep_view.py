@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification.blocks import Paragraph, TextTable
 from identification.printing import concise, significant, unit
 from identification.scoring import Score, score
+from identification.show.blocks import Paragraph, TextTable
+from identification.show.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text, trials_of
 from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
 from tunnel_lab.experiments.view import ExperimentView
-from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.text_cells import as_text_cell

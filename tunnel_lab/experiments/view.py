@@ -9,8 +9,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.blocks import Block, Figure, as_html
-from tunnel_lab.plotting.style import save_both
+from identification.show.blocks import Block, Figure, as_html
+from identification.show.style import save_both
 from tunnel_lab.report.page import page_of
 from tunnel_lab.terminal.outputs import show
 from tunnel_sim.files.writing import output_folder, write_whole

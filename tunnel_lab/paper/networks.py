@@ -16,9 +16,7 @@ from identification.estimate import Estimate, WindowEstimate
 from identification.neural.networks import Networks, held_out_points, shipped_networks
 from identification.neural.three_cycles import cycles_time, network_inputs
 from identification.printing import concise, significant
-from identification.signal.free_decay import Decay, response_rows
-from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
-from tunnel_lab.plotting.style import (
+from identification.show.style import (
     BLUE,
     COLOURS,
     INTERVAL,
@@ -31,6 +29,8 @@ from tunnel_lab.plotting.style import (
     save_both,
     styled,
 )
+from identification.signal.free_decay import Decay, response_rows
+from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
 from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig

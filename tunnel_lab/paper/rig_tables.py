@@ -14,10 +14,10 @@ from identification import identify
 from identification.campaign.springs import SpringFit, fit_springs
 from identification.datasets import SpringRow, paper_springs
 from identification.printing import concise, with_std
+from identification.show.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan
 from tunnel_lab.paper.paper_page import PaperSection, Picture, scaled, signed
-from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError

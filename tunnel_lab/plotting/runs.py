@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.estimate import Quantity
 from identification.printing import SYMBOLS, unit_mark
-from tunnel_lab.plotting.style import (
+from identification.show.style import (
     BLUE,
     COLOURS,
     INTERVAL,

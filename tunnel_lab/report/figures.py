@@ -13,22 +13,10 @@ import numpy as np
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
-from diagnosis.words.numbers import excess_std, plain, probability, unit_shown
+from diagnosis.words.numbers import excess_std, misfit_scale, plain, probability, run_labels, unit_shown
 from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label, significant
-from tunnel_lab.plotting.style import (
-    COLOURS,
-    INTERVAL,
-    MARKERS,
-    figure,
-    figure_text,
-    grid,
-    limit_to_known,
-    log_axis,
-    styled,
-)
-from tunnel_lab.report import where
-from tunnel_lab.report.drawing import (
+from identification.show.drawing import (
     ACCENT,
     AFTER,
     BEFORE,
@@ -42,9 +30,19 @@ from tunnel_lab.report.drawing import (
     array,
     colour_bar,
     faded,
-    misfit_scale,
-    run_labels,
 )
+from identification.show.style import (
+    COLOURS,
+    INTERVAL,
+    MARKERS,
+    figure,
+    figure_text,
+    grid,
+    limit_to_known,
+    log_axis,
+    styled,
+)
+from tunnel_lab.report import where
 from tunnel_lab.report.friction import friction_figure
 from tunnel_lab.report.repeatability import repeatability_figure
 from tunnel_sim.vocabulary.record import Array

@@ -9,8 +9,8 @@ import numpy as np
 from diagnosis.findings.whole import Findings
 from diagnosis.words.numbers import plain
 from identification.printing import unit_mark
-from tunnel_lab.plotting.style import INTERVAL, figure, grid, log_axis, styled
-from tunnel_lab.report.drawing import AFTER, INK, NARROW, PAPER
+from identification.show.drawing import AFTER, INK, NARROW, PAPER
+from identification.show.style import INTERVAL, figure, grid, log_axis, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

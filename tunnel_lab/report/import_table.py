@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported

@@ -20,8 +20,8 @@ from diagnosis.words.captions import captioned
 from diagnosis.words.cards import key_figures
 from diagnosis.words.sections import sections
 from diagnosis.words.verdict import headline
-from identification.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
-from tunnel_lab.report.drawing import inline_svg, shown_text
+from identification.show.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
+from identification.show.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole

@@ -10,8 +10,8 @@ import numpy as np
 from diagnosis.findings.repeatability import RunRepeat
 from diagnosis.findings.whole import Findings
 from diagnosis.words.scatter import percent_of, scatters
-from tunnel_lab.plotting.style import INTERVAL, figure, figure_text, grid, styled
-from tunnel_lab.report.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
+from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
+from identification.show.style import INTERVAL, figure, figure_text, grid, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.findings.whole import Findings
-from diagnosis.words.numbers import unit_shown
+from diagnosis.words.numbers import misfit_scale, run_labels, unit_shown
 from identification.printing import Document
-from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
-from tunnel_lab.report.drawing import (
+from identification.show.drawing import (
     AFTER,
     BEFORE,
     MARK,
@@ -23,9 +22,8 @@ from tunnel_lab.report.drawing import (
     array,
     colour_bar,
     faded,
-    misfit_scale,
-    run_labels,
 )
+from identification.show.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_lab.plotting.style import with_breaks
+from identification.show.style import with_breaks
 from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig

@@ -14,7 +14,7 @@ from rich.cells import cell_len
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from identification.blocks import TextTable, as_markdown
+from identification.show.blocks import TextTable, as_markdown
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.table_format import TableFormat
 from tunnel_sim.vocabulary.text_cells import as_text_cell

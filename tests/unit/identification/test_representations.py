@@ -12,7 +12,7 @@ from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, RunGap, Wh
 from diagnosis.answer.held_out import ON_RUNS
 from diagnosis.findings.closure import Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
-from identification.blocks import (
+from identification.show.blocks import (
     Detail,
     Figure,
     Paragraph,

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.words.numbers import plain
-from identification.blocks import Block, Figure, Heading, Paragraph, TextTable, as_markdown
+from identification.show.blocks import Block, Figure, Heading, Paragraph, TextTable, as_markdown
+from identification.show.drawing import AFTER, BEFORE, INK, PAPER, QUIET
+from identification.show.style import WIDTH, figure, grid, styled
 from tunnel_lab.experiments.view import ExperimentView
-from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
-from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 from tunnel_sim.vocabulary.errors import counted
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from diagnosis.words import sections, tables
 from diagnosis.words.cards import cause_cards, effect_cards, key_figures
 from diagnosis.words.numbers import left_over, probability
 from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
-from identification.blocks import Block, Heading, Paragraph, TextTable, lines
+from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from tests.support.diagnosis_document import (
     CAUSE,
     CONDITIONS,

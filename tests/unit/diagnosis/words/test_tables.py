@@ -24,10 +24,10 @@ from diagnosis.words.tables import (
     waterfall_table,
 )
 from diagnosis.words.verdict import rival_lines, run_words
-from identification.blocks import Paragraph, TextTable
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs
+from identification.show.blocks import Paragraph, TextTable
 from identification.status import Status
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.support.shown_numbers import assert_shows, assert_units

@@ -21,8 +21,8 @@ from diagnosis.words.causes import said_size
 from diagnosis.words.lines import diagnosis_brief
 from diagnosis.words.tables import candidates_table, parameters_table, runs_table
 from diagnosis.words.verdict import headline, next_steps, rival_lines, undecided_words, verdict
-from identification.blocks import typeset
 from identification.estimate import Quantity
+from identification.show.blocks import typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with

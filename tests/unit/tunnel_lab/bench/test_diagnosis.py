@@ -16,7 +16,7 @@ from nicegui import Client, ui
 from starlette.requests import Request
 
 from diagnosis.words.verdict import next_steps, run_to_make
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tests.support.diagnosis_document import document
 from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.show.style import figure_text
 from tests.reference.free_decays import Setting, campaign
 from tests.support.command import Tunnel
 from tests.unit.tunnel_lab.conftest import PROGRESS
 from tunnel_lab.plotting.runs import run_label, spectrum_figure
-from tunnel_lab.plotting.style import figure_text
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 

@@ -10,12 +10,12 @@ import polars as pl
 import pytest
 
 from identification.estimators import ALL_ESTIMATORS
+from identification.show.style import styled
 from tests.marks import slow
 from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packaged_breakdown
 from tunnel_lab.experiments.score import Results, packaged_baseline
 from tunnel_lab.experiments.score_drawing import cell_labels, score_figure
 from tunnel_lab.experiments.score_grid import Cell, Grid
-from tunnel_lab.plotting.style import styled
 from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:

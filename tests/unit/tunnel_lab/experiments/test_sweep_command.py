@@ -12,6 +12,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from identification.show.style import styled
 from tests.marks import slow
 from tests.support.gone_reader import unheard
 from tests.support.small_sweep import SMALL
@@ -21,7 +22,6 @@ from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.sweep import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_view import ScoreLine, lines_of, summarise
 from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS, SCATTER_COLUMNS
-from tunnel_lab.plotting.style import styled
 
 EFFECT = 'name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }'
 

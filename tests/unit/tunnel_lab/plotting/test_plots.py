@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from identification.estimate import Quantity
+from identification.show import style
+from identification.show.style import figure, limit_to_known, log_axis, styled
 from tests.support.diagnosis_document import campaign
-from tunnel_lab.plotting import runs, style
+from tunnel_lab.plotting import runs
 from tunnel_lab.plotting.runs import deviations, thinned, windows_figure
-from tunnel_lab.plotting.style import figure, limit_to_known, log_axis, styled
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.words.numbers import run_labels
 from tests.support.diagnosis_document import IDS
-from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.where import charts
 
 Document = dict[str, Any]

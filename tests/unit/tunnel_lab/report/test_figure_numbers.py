@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from diagnosis.words.numbers import run_labels
+from identification.show.style import styled
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
 from tests.support.shown_numbers import numbers
-from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
-from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.figures import backbone_figure, law_figure
 from tunnel_lab.report.friction import friction_figure
 

@@ -19,10 +19,10 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.remainder.closable import Closable, Curve
 from diagnosis.result import Diagnosis
 from identification.estimate import Quantity
+from identification.show.drawing import THEMED, inline_svg
 from tests.support.diagnosis_document import scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
-from tunnel_lab.report.drawing import THEMED, inline_svg
 from tunnel_lab.report.figures import diagnosis_figures, waterfall_figure
 from tunnel_lab.report.page import DESCRIPTIONS
 from tunnel_sim.effects import effect_class, effect_from

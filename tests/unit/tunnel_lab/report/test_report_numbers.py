@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.words.cards import key_figures
 from diagnosis.words.sections import printed, sections
-from identification.blocks import Figure, TextTable, as_html, as_text, lines, typeset
+from identification.show.blocks import Figure, TextTable, as_html, as_text, lines, typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.shown_numbers import all_blocks
 from tunnel_lab.report import render_report

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tunnel_lab.cli import main
 from tunnel_lab.terminal.table_format import TableFormat
 from tunnel_lab.terminal.table_layout import rendered

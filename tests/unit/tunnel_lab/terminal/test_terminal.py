@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from identification.blocks import TextTable
+from identification.show.blocks import TextTable
 from tests.support.command import Tunnel
 from tunnel_lab.terminal import progress
 from tunnel_lab.terminal.table_layout import is_too_wide, stacked

@@ -60,7 +60,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     def drawn(*args: P.args, **named: P.kwargs) -> R:
         from matplotlib import style
 
-        file = resources.files("tunnel_lab.plotting") / "figures.mplstyle"
+        file = resources.files("identification.show") / "figures.mplstyle"
         with _STYLE, resources.as_file(file) as path, style.context(path):
             return draw(*args, **named)
 

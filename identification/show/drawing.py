@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from html import unescape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.findings.closure import Misfit
-from diagnosis.findings.whole import Findings
-from diagnosis.words.numbers import unit_shown
-from identification.printing import Document
-from tunnel_lab.plotting.style import styled
+from identification.show.style import styled
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -75,34 +71,6 @@ def colour_bar(figure: Figure, shown: ScalarMappable, axes: Axes, **given: Any) 
     bar = figure.colorbar(shown, ax=axes, **given)
     if bar.solids is not None:  # otherwise an image, in the colours of the light page
         bar.solids.set_rasterized(False)
-
-
-def run_labels(maps: Document) -> list[str]:
-    """The runs of ``maps`` with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
-
-    A spring is named where stated, and the wind speed where any run had wind.
-    """
-    windy = any(run["wind_speed"] > 0.0 for run in maps["runs"])
-    labels = []
-    for run in maps["runs"]:
-        parts = [str(run["id"])]
-        if run["spring_stiffness"]:
-            parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
-        if windy:
-            parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0.0 else "wind off")
-        labels.append(" · ".join(parts))
-    return labels
-
-
-def misfit_scale(answer: Findings) -> tuple[str, Callable[[float], float]]:
-    """The unit in which gaps are drawn, and the function from an excess in noise variances to this unit.
-
-    The unit is degrees for readings of angles, and standard deviations of the noise for a document without
-    ``misfit``.
-    """
-    misfit = answer.gap.misfit or Misfit(1.0, 0.0, "rad")
-    unit, factor = unit_shown(misfit.unit) if answer.gap.misfit else ("noise std", 1.0)
-    return unit, lambda excess: factor * misfit.rms(excess)
 
 
 @styled

@@ -1,0 +1,1 @@
+"""The ground of everything that presents: blocks, drawing and its style."""
