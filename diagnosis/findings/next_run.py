@@ -124,7 +124,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     # one instant, whatever the number in existing runs, and no deviation: it may have either sign
     data = fit.problem.data.with_runs((run,))
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
-    turns = np.array([bool(kind.line) for kind in problem.effects if kind.own_numbers(1)], bool)
+    turns = np.array([bool(kind.line) for kind in problem.effects if kind.per_run_parameters(1)], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
     first = len(problem.parameters.own) - problem.parameters.of_effects

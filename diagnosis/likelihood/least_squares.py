@@ -87,17 +87,17 @@ class Fit:
             return None
         return self.columns.likeliest(width_prior(self.problem), self.widths)
 
-    def scatter_cost(self, known: Array) -> float:
+    def scatter_cost(self, deviation_precision: Array) -> float:
         """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 without any.
 
         Args:
-            known: precision of these differences as the runs show them, as in `Between.cost`, shape
+            deviation_precision: precision of these differences as the runs show them, as in `Between.cost`, shape
                 (runs, kinds, kinds).
         """
-        return 0.0 if self.between is None else self.between.cost(known, self.shown)
+        return 0.0 if self.between is None else self.between.cost(deviation_precision, self.shown)
 
     @property
-    def compared(self) -> int:
+    def shown_between_runs(self) -> int:
         """Number of effects that chance differences between runs could imitate: no single run shows them."""
         return 0 if self.between is None else sum(not seen for seen in self._shown_by_runs.values())
 

@@ -34,7 +34,7 @@ class Problem:
         free_forms: free form parameters, as ``effect.parameter``; the others keep the textbook form.
         instants: number of instants in every run for an effect that skips samples.
         scatter: chance differences between runs beside the effects; each run has its own deviation of each.
-        rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the
+        resolve_rod_mode: whether a flexible rod is integrated with its ringing; else the ringing is added to the
             slow motion, which is much faster and exact for a linear rig.
     """
 
@@ -44,7 +44,7 @@ class Problem:
     free_forms: tuple[str, ...] = ()
     instants: int = 1
     scatter: Scatter = ()
-    rod_followed: bool = False
+    resolve_rod_mode: bool = False
 
     @cached_property
     def parameters(self) -> ParameterSet:
@@ -59,7 +59,7 @@ class Problem:
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))
-            for own in kind.own_numbers(self.instants):
+            for own in kind.per_run_parameters(self.instants):
                 found.append(Parameter(f"{kind.name}.{own}", "1", owner="per_run", effect=kind.name))
         return ParameterSet(tuple(found))
 
@@ -195,7 +195,7 @@ class Problem:
         if not reads_plainly(effects[0]) or any(physics.rod_twist):
             runs = [run.fine for run in runs]
         zero = values.get("zero", np.zeros(len(runs)))
-        return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.rod_followed)
+        return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.resolve_rod_mode)
 
     def _columns(self, common: Array, own: Array) -> dict[str, Array]:
         """Values of all parameters in several runs by name, fixed ones included, shape (runs,) each.

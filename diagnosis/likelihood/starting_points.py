@@ -82,7 +82,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if not _may_show(data, kind):
         return []
-    if kind.own_numbers(1):
+    if kind.per_run_parameters(1):
         tried = (_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one)
     else:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
@@ -159,7 +159,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
         Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
     """
     data = base.problem.data
-    if not _may_show(data, kind) or kind.own_numbers(1):
+    if not _may_show(data, kind) or kind.per_run_parameters(1):
         return
     for trial in kind.trials(_circumstances(base)):
         tried = _moderate(base, kind, trial)

@@ -83,7 +83,7 @@ class Chance:
         return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
-_KEEPING_TIME = tuple(kind.keeps_time for kind in ALL_EFFECTS if kind.keeps_time)
+_KEEPING_TIME = tuple(kind.frequency_by_wind for kind in ALL_EFFECTS if kind.frequency_by_wind)
 
 
 class RunDeparture(Effect):

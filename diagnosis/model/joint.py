@@ -101,10 +101,10 @@ class _OfLaw(NominalModel):
         """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
-            gone[OF_GEAR] = [kind for kind in kinds if kind.parts]
-            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.parts]
+            gone[OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.has_backlash]
         elif self.law.hangs:
-            gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
+            gone[_OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
         return gone | super().untried(campaign, left)
 

@@ -82,7 +82,7 @@ class _OfServo(NominalModel):
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
         """Effects of a spring, and play."""
-        play = [kind for kind in kinds if kind.parts]
+        play = [kind for kind in kinds if kind.has_backlash]
         of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
         left = [kind for kind in kinds if kind not in (*play, *of_spring)]
         return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)

@@ -11,7 +11,7 @@ from diagnosis.likelihood.residuals import gap_left, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.scatter import likelier, settled
+from diagnosis.search.scatter import likelier, with_likeliest_widths
 from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 
@@ -118,4 +118,4 @@ def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
         found = try_fit(start.problem, start.point)
     else:
         found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-    return settled(found, rounds=1) if found is not None and np.isfinite(found.total) else None
+    return with_likeliest_widths(found, rounds=1) if found is not None and np.isfinite(found.total) else None

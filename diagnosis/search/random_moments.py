@@ -35,7 +35,7 @@ from diagnosis.search.process_noise import (
 )
 from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
-from diagnosis.search.scatter import settled
+from diagnosis.search.scatter import with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from diagnosis.settings import RandomMomentSettings
@@ -166,9 +166,9 @@ class _Beside:
         names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
         share, by_channel = excess / view.repeating.gap, excess / view.base.gap * view.gap.excess
         # with a random motion taken for sensor noise, the runs would appear to differ
-        cost = self.top.fit.scatter_cost(view.gap.known)
-        numbers, compared = seen.further_numbers, self.top.fit.compared
-        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
+        cost = self.top.fit.scatter_cost(view.gap.deviation_precision)
+        numbers, between = seen.further_numbers, self.top.fit.shown_between_runs
+        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, shown_between_runs=between)
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
 
 
@@ -235,7 +235,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     gains = []
     for h in larger:
         kind = able[h.effects[-1]]
-        numbers = 1 + len(kind.own_numbers(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
+        numbers = 1 + len(kind.per_run_parameters(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
         gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
@@ -254,9 +254,9 @@ def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
         return False
     if still:
         left = misfit(best.fit, [np.zeros_like(r) if source.acts(run) else r for run, r in runs]).excess
-        count, compared = len(best.effects) + 1, best.fit.compared
-        costs = best.fit.scatter_cost(scale.known), scale.scatter_cost
-        weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, compared)
+        count, between = len(best.effects) + 1, best.fit.shown_between_runs
+        costs = best.fit.scatter_cost(scale.deviation_precision), scale.scatter_cost
+        weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, between)
         if weight > scale.weight(best):
             return not is_no_noise(best.fit)
     chosen = best.fit.settings.moment
@@ -389,7 +389,7 @@ def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypoth
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
-            base = settled(fit(replace(nominal.problem, data=noisy), nominal.point))
+            base = with_likeliest_widths(fit(replace(nominal.problem, data=noisy), nominal.point))
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
@@ -416,7 +416,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
-        if not kind.own_numbers(1):
+        if not kind.per_run_parameters(1):
             continue
         others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
         start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)

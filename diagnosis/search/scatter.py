@@ -114,7 +114,7 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
         return None
     layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
-    return None if layered is None else settled(layered)
+    return None if layered is None else with_likeliest_widths(layered)
 
 
 def evident(fitted: Fit) -> Fit:
@@ -217,7 +217,7 @@ def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
     return replace(prior, usual=usual, decades=decades)
 
 
-def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
+def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
     """A fit whose widths are the likeliest for its residuals; unchanged where it has no such differences."""
     for _ in range(rounds):
         between = fitted.between
@@ -252,7 +252,7 @@ def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
     least = width_prior(fitted.problem).least
     scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
     again = try_fit(*with_deviations(repeating.problem, repeating.point, scatter))
-    again = None if again is None else settled(again)
+    again = None if again is None else with_likeliest_widths(again)
     return again if again is not None and again.unlikelihood < fitted.unlikelihood else fitted
 
 

@@ -35,8 +35,8 @@ class Sets:
         random: answers with a random moment that passed its tests.
         rivals: causes from outside the vocabulary, weighed beside the sets.
         refused: by names of refused answers, the reason: effects that the runs do not confirm.
-        left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
-            None.
+        unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
+            else None.
         settled: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer is
             not a fitted set, or is not settled yet.
     """
@@ -46,7 +46,7 @@ class Sets:
     random: tuple[RandomAnswer, ...] = ()
     rivals: tuple[FoundRival, ...] = ()
     refused: Mapping[Names, Fact] = field(default_factory=dict)
-    left_by_all: float | None = None
+    unexplained_floor: float | None = None
     settled: Hypothesis | None = None
 
     @cached_property
@@ -75,7 +75,7 @@ class Sets:
         found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
         if drift is None:
             return found
-        cost = drift.cost(self.view.gap.known) + 2.0 * one.fit.settings.weighing.set_price
+        cost = drift.cost(self.view.gap.deviation_precision) + 2.0 * one.fit.settings.weighing.set_price
         return replace(found, scatter_cost=cost)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
@@ -141,8 +141,8 @@ class Sets:
         return found
 
 
-def compared(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> Sets:
-    """The sets with those that the answer is compared with, without those that the runs do not confirm.
+def with_near_rivals(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> Sets:
+    """Add near rivals; drop sets that the runs do not confirm.
 
     Args:
         rivals: from outside the vocabulary.

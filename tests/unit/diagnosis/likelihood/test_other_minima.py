@@ -50,7 +50,9 @@ def problem(compliance: float, share: float, *, driven: bool, noise: float = 4e-
     readings = read_motion(given, motion, [], np.random.default_rng(3))
     simulated = Simulated(CampaignDraw("single", given, (), 0), readings, 0.0, np.zeros(3), readings.T)
     campaign = as_campaign(simulated, "rod")
-    return Problem(prepare(campaign, {run.id: noise**2 for run in campaign.runs}), (ROD,), rod_followed=True)
+    return Problem(
+        prepare(campaign, {run.id: noise**2 for run in campaign.runs}), (ROD,), resolve_rod_mode=True
+    )
 
 
 def fitted_from(problem: Problem, compliance: float, share: float) -> Fit:

@@ -75,7 +75,7 @@ def test_a_rod_that_is_not_separated_takes_finite_differences(data):
     problem, point = at_example(data, effect_class("rod_flexibility"))
     every = point.common.size + point.release.shape[1]
     assert not without_derivative(problem, point)
-    assert len(without_derivative(dataclasses.replace(problem, rod_followed=True), point)) == every
+    assert len(without_derivative(dataclasses.replace(problem, resolve_rod_mode=True), point)) == every
     soft = point.common.copy()
     soft[problem.names.index("rod_flexibility.compliance")] = 0.05
     assert len(without_derivative(problem, Point(soft, point.release))) == every

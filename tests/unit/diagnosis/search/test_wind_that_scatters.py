@@ -145,10 +145,10 @@ def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_lit
 
 def test_which_effects_only_the_comparison_of_runs_shows() -> None:
     """A speed that is off does to every run what a deviation does; the vortices' line is in each of them."""
-    assert off()[1].compared == 1
+    assert off()[1].shown_between_runs == 1
     assert not off()[1].shown.any()
     base, shed = beside_scatter(blown(shedding=0.05), "vortex_shedding")
-    assert (base.compared, shed.compared) == (0, 0)
+    assert (base.shown_between_runs, shed.shown_between_runs) == (0, 0)
     of_effect = [name.startswith("vortex_shedding.") for name in shed.problem.names]
     assert any(of_effect)
     assert shed.shown.tolist() == of_effect
