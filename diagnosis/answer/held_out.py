@@ -115,14 +115,14 @@ def predict_held_out(whole: Fit) -> HeldOut:
             common = fit_seen(whole, seen)[0].common
             released, left = refit_releases(
                 replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
-                Point(common, whole.point.release[out]),
+                Point(common, whole.point.per_run[out]),
                 [whole.jacobian[i][1] for i in out],
             )
         except (FitError, np.linalg.LinAlgError):
             continue
         for k, i in enumerate(out):
             residuals[ids[i]] = left[k]
-            points[ids[i]] = (released.common, released.release[k])
+            points[ids[i]] = (released.common, released.per_run[k])
     return HeldOut(residuals, points)
 
 

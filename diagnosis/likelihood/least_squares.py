@@ -165,7 +165,7 @@ class Fit:
 
     def zero(self, index: int) -> float:
         """The sensor's zero in the run with an index."""
-        return self.problem.zero(self.point.common, self.point.release[index])
+        return self.problem.zero(self.point.common, self.point.per_run[index])
 
     def std(self, name: str) -> float:
         """Standard deviation of a common parameter, if the model is right."""
@@ -311,7 +311,7 @@ class _State:
                 *_, solutions = normal_equations(
                     self.jacobian, trial.residuals, self.damping, self.products, pull
                 )
-            point = Point(trial.point.common, trial.point.release + solutions[:, :, -1])
+            point = Point(trial.point.common, trial.point.per_run + solutions[:, :, -1])
             nearer = _Place.of(self.problem, point)
             if not nearer.cost < trial.cost:
                 break
@@ -338,7 +338,7 @@ class _State:
 def clip(problem: Problem, point: Point) -> Point:
     """The point with its common parameters inside their bounds."""
     lower, upper = problem.bounds
-    return Point(np.clip(point.common, lower, upper), point.release)
+    return Point(np.clip(point.common, lower, upper), point.per_run)
 
 
 def scaled_residuals(problem: Problem, point: Point) -> list[Array]:

@@ -83,7 +83,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            own: of the run, a row of ``Point.release``, shape (own,).
+            own: of the run, a row of ``Point.per_run``, shape (own,).
         """
         parameters = self.parameters
         if "zero" in parameters.names:
@@ -133,7 +133,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            own: the run's own parameters, a row of ``Point.release``, shape (own,).
+            own: the run's own parameters, a row of ``Point.per_run``, shape (own,).
             effects: from `effects_at`, where they are known already.
         """
         drawn = self._drawn(own[None])[0]
@@ -156,7 +156,7 @@ class Problem:
             (i, int(r))
             for i, point in enumerate(points)
             if np.all(np.isfinite(point.common))
-            for r in np.flatnonzero(np.all(np.abs(point.release) < _BEYOND, axis=1))
+            for r in np.flatnonzero(np.all(np.abs(point.per_run) < _BEYOND, axis=1))
         ]
         if places:
             for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):
@@ -173,7 +173,7 @@ class Problem:
         """
         runs = [self.data.runs[r] for _, r in places]
         common = np.stack([points[i].common for i, _ in places])
-        own = np.stack([points[i].release[r] for i, r in places])
+        own = np.stack([points[i].per_run[r] for i, r in places])
         values = self._columns(common, own)
         stated = self.data.model.settings(values, runs)
         at = {i: self.effects_at(points[i].common) for i in dict.fromkeys(i for i, _ in places)}
@@ -211,7 +211,7 @@ class Problem:
     def linear(self, point: Point) -> Array:
         """Inertia, damping and stiffness of every run, as in `Fit.linear`, shape (runs, 3)."""
         runs = self.data.runs
-        values = self._columns(np.tile(point.common, (len(runs), 1)), point.release[: len(runs)])
+        values = self._columns(np.tile(point.common, (len(runs), 1)), point.per_run[: len(runs)])
         stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
         speed = np.array([run.wind_speed if run.wind_on else np.inf for run in runs])
         stiffness = stated.spring_stiffness - pressure * stated["cn_beta"]
@@ -224,7 +224,7 @@ class Problem:
         """Random draws of the effects in several runs, by run.
 
         Args:
-            own: the runs' own parameters, rows of ``Point.release``, shape (runs, own).
+            own: the runs' own parameters, rows of ``Point.per_run``, shape (runs, own).
         """
         columns: list[list[Drawn]] = []
         for kind in self.effects:

@@ -115,7 +115,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLin
     if not concerned or metres <= 0.0:
         return None
     spectra = residual_spectra(fit)
-    chains = [fit.problem.chain(fit.point.common, fit.point.release[i], data.runs[i]) for i in concerned]
+    chains = [fit.problem.chain(fit.point.common, fit.point.per_run[i], data.runs[i]) for i in concerned]
     speeds = np.array([chain.physics().wind_speed for chain in chains])  # corrected by the effects of the fit
     spacing = 0.1 * metres / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
     grid = np.arange(least, greatest, spacing)

@@ -77,7 +77,7 @@ class ScatterColumns:
         """
         places = problem.parameters.places(problem.scatter)
         bases, deviations, common, seen = [], [], [], []
-        for residual, (of_common, own), values in zip(residuals, jacobian, point.release, strict=True):
+        for residual, (of_common, own), values in zip(residuals, jacobian, point.per_run, strict=True):
             basis = _orthonormal(np.delete(own, places, axis=1))
             chance = own[:, places]
             bases.append(basis)

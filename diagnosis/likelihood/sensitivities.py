@@ -64,16 +64,16 @@ def moves(problem: Problem, point: Point, known: int = 0, known_own: int = 0) ->
     Returns:
         The points, and their steps by run, in the parameters' units, shape (points, runs).
     """
-    count = len(point.release)
+    count = len(point.per_run)
     steps, points = problem.parameters.steps(point.common), []
     for i in range(known, steps.size):
         moved = point.common.copy()
         moved[i] += steps[i]
-        points.append(Point(moved, point.release))
-    amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
+        points.append(Point(moved, point.per_run))
+    amplitude = np.maximum(np.abs(point.per_run[:, 0]), 1e-3)
     own_steps = problem.parameters.own_steps(amplitude)
-    for j in range(known_own, point.release.shape[1]):
-        release = point.release.copy()
+    for j in range(known_own, point.per_run.shape[1]):
+        release = point.per_run.copy()
         release[:, j] += own_steps[j]
         points.append(Point(point.common, release))
     sizes = [np.full(count, step) for step in steps[known:]] + own_steps[known_own:]

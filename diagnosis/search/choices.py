@@ -98,4 +98,4 @@ def _exchanged(whole: Fit, severity: str) -> Point:
             common[place] *= factor
         else:
             common[place] = scaled.similar(common[place], one.unit)
-    return Point(common, whole.point.release)
+    return Point(common, whole.point.per_run)

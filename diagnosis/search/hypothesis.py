@@ -229,7 +229,7 @@ def turned_back(fitted: Fit) -> Fit:
     if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
         return fitted
     turn = np.pi if fitted.value("zero") < least else -np.pi
-    common, release = fitted.point.common.copy(), fitted.point.release.copy()
+    common, release = fitted.point.common.copy(), fitted.point.per_run.copy()
     common[problem.names.index("zero")] += turn
     common[[problem.names.index(name) for name in signs]] *= -1.0
     release[:, 0] -= turn
@@ -259,7 +259,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
     return dataclasses.replace(
         whole,
         problem=problem,
-        point=Point(whole.point.common[common], whole.point.release[:, own]),
+        point=Point(whole.point.common[common], whole.point.per_run[:, own]),
         covariance=whole.covariance[np.ix_(common, common)],
         jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
     )
@@ -365,7 +365,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     elif better.problem.free_forms:
         problem = dataclasses.replace(better.problem, free_forms=())
         values = dict(zip(better.problem.names, better.point.common.tolist(), strict=True))
-        start = Point(np.array([values[name] for name in problem.names]), better.point.release)
+        start = Point(np.array([values[name] for name in problem.names]), better.point.per_run)
         textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
 
@@ -406,7 +406,7 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     freed = dataclasses.replace(problem, free_forms=tuple(name for form in forms for name in form))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
     defaults = {f"{k.name}.{i.name}": i.form_start for k in problem.effects for i in k.parameters() if i.form}
-    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
+    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.per_run)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
         return None  # also where the runs determine no form

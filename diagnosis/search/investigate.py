@@ -163,7 +163,7 @@ def likeliest_lead(study: Study) -> float:
             for r in problem.data.runs
         )
         tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
-        fitted = try_fit(tried, Point(np.array([whole[name] for name in tried.names]), point.release))
+        fitted = try_fit(tried, Point(np.array([whole[name] for name in tried.names]), point.per_run))
         if fitted is None:
             return 0.0
         totals.append(fitted.total)

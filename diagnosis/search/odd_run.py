@@ -124,8 +124,8 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
         if run.reading.size - first < chosen.disturbed_kept * cycle:
             return None
         data = others.problem.data.with_runs((run.part(first),))
-        start = Point(others.point.common, np.zeros((1, others.point.release.shape[1])))
-        start.release[0, 0] = data.runs[0].reading[0]
+        start = Point(others.point.common, np.zeros((1, others.point.per_run.shape[1])))
+        start.per_run[0, 0] = data.runs[0].reading[0]
         problem = replace(others.problem, data=data)
         slopes = [slope for _, slope in sensitivities(problem, start)]
         _, (left,) = refit_releases(problem, start, slopes)

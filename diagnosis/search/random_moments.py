@@ -424,11 +424,11 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
             continue
         sought = fit(start.problem, start.point)
         tried = [known, sought]
-        if sought.point.release.shape == known.point.release.shape:  # else the number of instants differs
-            release = sought.point.release.copy()
+        if sought.point.per_run.shape == known.point.per_run.shape:  # else the number of instants differs
+            release = sought.point.per_run.copy()
             kept = known.chi2 < sought.chi2
             old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))
-            release[kept, new] = known.point.release[kept, old]
+            release[kept, new] = known.point.per_run[kept, old]
             tried.append(fit(sought.problem, Point(sought.point.common, release)))
         known = min(tried, key=lambda f: f.total)
     return replace(hypothesis, fit=known)

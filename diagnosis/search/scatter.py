@@ -51,8 +51,8 @@ def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[P
     """
     layered = replace(problem, scatter=scatter)
     first = len(problem.parameters.own) - problem.parameters.of_effects
-    none = np.zeros((len(point.release), len(scatter)))
-    release = np.hstack([point.release[:, :first], none, point.release[:, first:]])
+    none = np.zeros((len(point.per_run), len(scatter)))
+    release = np.hstack([point.per_run[:, :first], none, point.per_run[:, first:]])
     return layered, Point(point.common, release)
 
 
@@ -61,7 +61,7 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     names = fitted.problem.parameters.own_names
     own = fitted.problem.parameters.places(fitted.problem.scatter)
     kept = [place for place in range(len(names)) if place not in own]
-    return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.release[:, kept])
+    return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.per_run[:, kept])
 
 
 def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
@@ -70,7 +70,7 @@ def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
     Args:
         width: of the runs' deviations, relative, dimensionless.
     """
-    run = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
+    run = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 
 
@@ -189,7 +189,7 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
     problem, point = with_deviations(*without_deviations(fitted), scatter)
     for place, name in enumerate(problem.parameters.own_names):
         if name in names:
-            point.release[:, place] = fitted.point.release[:, names.index(name)]
+            point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
     return try_fit(problem, point, tolerance=_TOLERANCE) or fitted
 
 

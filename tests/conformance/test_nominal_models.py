@@ -158,7 +158,7 @@ def test_parameters_are_stated_once_with_units_and_a_start_inside_their_range(
     point = parameters.point(start.common, start.own)
     low, high = parameters.bounds
     assert np.all((low <= point.common) & (point.common <= high))
-    assert point.release.shape == (len(problem.data.runs), len(parameters.own))
+    assert point.per_run.shape == (len(problem.data.runs), len(parameters.own))
 
 
 def test_gradients_of_its_coefficients_are_their_slopes(fitted: tuple[Case, Fit]) -> None:

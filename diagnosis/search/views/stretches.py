@@ -122,7 +122,7 @@ def fit_longer(
     longest = max(run.reading.size for run in data.runs)
     goal = longest if length is None else min(length, longest)
     while stretches.length < goal:
-        known = dict(zip(stretches.places, found.point.release, strict=True))
+        known = dict(zip(stretches.places, found.point.per_run, strict=True))
         longer = in_stretches(data, min(stretches.length * _LONGER, goal)).only(known)
         if longer.length >= longest:
             longer = Stretches(data, tuple((i, 0) for i in range(len(data.runs))), longest)

@@ -205,7 +205,7 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     (left,) = (one.fit for one in pruned if one.effects == ("quadratic_damping",))
     direct = starting_points(base, effect_class("quadratic_damping"))[0]
     assert left.problem.effects == (effect_class("quadratic_damping"),)
-    assert left.point.release.shape == base.point.release.shape
+    assert left.point.per_run.shape == base.point.per_run.shape
     assert left.total == pytest.approx(fit(direct.problem, direct.point).total, rel=1e-4)
 
 
@@ -293,7 +293,7 @@ def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
 
 def textbook_point(found: Fit) -> Point:
     problem = replace(found.problem, free_forms=())
-    return Point(np.array([found.value(name) for name in problem.names]), found.point.release)
+    return Point(np.array([found.value(name) for name in problem.names]), found.point.per_run)
 
 
 def test_a_line_that_does_not_decay_is_no_mode() -> None:

@@ -20,7 +20,7 @@ def test_a_fit_that_ends_worse_than_without_the_effect_starts_again_nearby(monke
     (start,) = starting_points(base, kind)
     common = start.point.common.copy()
     common[start.scaled] = -40.0
-    far = replace(start, point=Point(common, start.point.release))
+    far = replace(start, point=Point(common, start.point.per_run))
     assert fit(far.problem, far.point, base=base).total > base.total
     monkeypatch.setattr(one_more, "starting_points", lambda *_: [far])
     assert within_noise(grow(whole_runs(base, [kind]))[0].fit)

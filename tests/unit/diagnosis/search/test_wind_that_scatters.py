@@ -86,7 +86,7 @@ def beside_scatter(found: Campaign, effect: str) -> tuple[Fit, Fit]:
     assert start.scaled is not None
     common = start.point.common.copy()
     common[start.scaled] *= 0.1
-    fitted = try_fit(start.problem, Point(common, start.point.release))
+    fitted = try_fit(start.problem, Point(common, start.point.per_run))
     assert fitted is not None
     return base, fitted
 
