@@ -27,6 +27,7 @@ from diagnosis.findings.coefficients import (
     possible_answers,
 )
 from diagnosis.findings.decision import Decision, Predictions, decision
+from diagnosis.findings.finding import Answered
 from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
@@ -54,6 +55,7 @@ from diagnosis.findings.units import (
     own_repeatability,
     sized_coefficients,
 )
+from diagnosis.findings.whole import findings_of
 from diagnosis.likelihood.compression import in_shorter_blocks
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.fact import Fact, as_stated
@@ -239,6 +241,7 @@ def composed(
             ),
         ),
         data=chosen.examined,
+        **findings_of(Answered(chosen.examined, study, named.coefficients)),
     )
 
 

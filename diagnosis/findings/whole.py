@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Any, Self, cast, get_args, get_type_hints
 
 from pydantic import TypeAdapter
 
@@ -15,6 +15,7 @@ from diagnosis.findings.candidates import Candidate, CauseSize
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
+from diagnosis.findings.finding import Answered, Finding, Picture
 from diagnosis.findings.found import Found
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judgements import Remainder
@@ -102,6 +103,16 @@ class Findings:
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     @property
+    def findings(self) -> dict[str, Finding]:
+        """The findings with a section of their own, by the field."""
+        return {name: one for name in finding_kinds() if (one := getattr(self, name)) is not None}
+
+    @property
+    def pictures(self) -> dict[str, Picture]:
+        """Their figures, by name."""
+        return {drawn.name: drawn for one in self.findings.values() for drawn in one.pictures(self)}
+
+    @property
     def settings(self) -> Settings:
         """The settings with which the diagnosis was made."""
         return Settings().changed(self.provenance.get("settings", {}))
@@ -134,7 +145,7 @@ class Findings:
             "candidates": as_json(self.candidates),
             "inclusion": dict(self.inclusion),
             **self.waterfall.to_json_dict(),
-            **{name: as_json(getattr(self, name)) for name in _LAST},
+            **{name: as_json(getattr(self, name)) for name in (*_LAST, *finding_kinds())},
         }
 
     @classmethod
@@ -161,6 +172,21 @@ class Findings:
                 json.dumps({**data, "waterfall": data, "decision": data}), strict=True
             )
         return cast(Self, found)
+
+
+@cache
+def finding_kinds() -> dict[str, type[Finding]]:
+    """The findings that a diagnosis has a field for, by the name of the field."""
+    kinds: dict[str, type[Finding]] = {}
+    for name, hint in get_type_hints(Findings).items():
+        found = [kind for kind in get_args(hint) if isinstance(kind, type) and issubclass(kind, Finding)]
+        kinds |= dict.fromkeys([name] * len(found), *found)
+    return kinds
+
+
+def findings_of(answered: Answered) -> dict[str, Any]:
+    """All findings with a section of their own, by the field."""
+    return {name: kind.find(answered) for name, kind in finding_kinds().items()}
 
 
 @cache

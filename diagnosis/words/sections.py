@@ -72,7 +72,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
         campaign: adds the conditions of the runs.
     """
     blown = any(run.wind_on for run in campaign.runs) if campaign else windy(answer)
-    return (
+    listed = (
         Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),
         _where(answer),
         _which(answer),
@@ -99,6 +99,10 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
             (Listing(tuple(next_steps(answer)), "What to do next", numbered=True),),
         ),
     )
+    own: dict[str, list[Section]] = {}
+    for one in answer.findings.values():
+        own.setdefault(one.after, []).append(one.section(answer))
+    return tuple(section for one in listed for section in (one, *own.get(one.key, ())))
 
 
 def printed(answer: Findings) -> tuple[Block, ...]:

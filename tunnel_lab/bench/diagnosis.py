@@ -230,7 +230,7 @@ class ShownAnswer:
             from diagnosis.words.scatter import repeats
             from identification.show.drawing import inline_svg
             from tunnel_lab.report.figures import waterfall_figure
-            from tunnel_lab.report.page import DESCRIPTIONS
+            from tunnel_lab.report.page import descriptions
             from tunnel_lab.report.repeatability import repeatability_figure
             from tunnel_lab.report.where import runs_figure
 
@@ -239,9 +239,9 @@ class ShownAnswer:
                 drawn["repeatability"] = repeatability_figure(answer)
             if answer.maps:
                 drawn["where-runs"] = runs_figure(answer)
-            return [
-                inline_svg(fig, name, DESCRIPTIONS[name]) for name, fig in drawn.items() if fig is not None
-            ]
+            drawn |= {name: one.draw() for name, one in answer.pictures.items()}
+            described = descriptions(answer)
+            return [inline_svg(fig, name, described[name]) for name, fig in drawn.items() if fig is not None]
 
         figures = await asyncio.to_thread(drawings)
         if self._figures.is_deleted:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnosis.findings.finding import Picture
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
@@ -102,6 +104,7 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
             "where-phase-plane": where.phase_plane_figure,
             "where-moment": where.moment_figure,
         }
+    makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return makers | {
         "which": candidates_figure,
         "friction": friction_figure,
@@ -110,6 +113,10 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
         "law": law_figure,
         "coefficients": coefficients_figure,
     }
+
+
+def _drawn(picture: Picture, _: Findings) -> Figure | None:
+    return picture.draw()
 
 
 def summary_figures(answer: Findings) -> dict[str, Figure]:

@@ -93,9 +93,9 @@ def render_report(
     byline, (words, kind) = byline or Byline(), headline(answer)
     if summary:
         drawings = summary_figures(answer)
-        page = _page(drawings, {}, ["style.css", "summary.css"], "summary.js")
+        page = _page(answer, drawings, {}, ["style.css", "summary.css"], "summary.js")
     else:
-        page = _page(diagnosis_figures(answer), fit_charts(answer) | charts(answer))
+        page = _page(answer, diagnosis_figures(answer), fit_charts(answer) | charts(answer))
     drawn, parts = page.pop("drawn"), {}
     for section in sections(answer, campaign):
         blocks = section.blocks
@@ -138,7 +138,7 @@ def render_fit(answer: Findings) -> str:
     from markupsafe import Markup
 
     drawing = fit_figure(answer)
-    page = _page({} if drawing is None else {"fit": drawing}, fit_charts(answer))
+    page = _page(answer, {} if drawing is None else {"fit": drawing}, fit_charts(answer))
     fit = Markup(as_html((captioned("fit"),), page.pop("drawn")))
     return _rendered("fit.html.j2", {"campaign": answer.campaign, "fit": fit} | page)
 
@@ -187,7 +187,13 @@ def _resource(name: str) -> str:
     return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
 
 
+def descriptions(answer: Findings) -> Mapping[str, str]:
+    """Text alternatives of the figures of a diagnosis, by name."""
+    return DESCRIPTIONS | {name: drawn.description for name, drawn in answer.pictures.items()}
+
+
 def _page(
+    answer: Findings,
     drawings: Mapping[str, Drawing],
     shown: dict[str, list[Chart]],
     sheets: Sequence[str] = ("vendor/uPlot.min.css", "style.css"),
@@ -196,10 +202,10 @@ def _page(
     """The figures as HTML, styles and scripts: text included in the page unchanged."""
     from markupsafe import Markup
 
-    drawn = {}
+    drawn, described = {}, descriptions(answer)
     for name, figure in drawings.items():
         # A figure in another height, such as ``fit-near-1``, has the text of the first. The SVG is already escaped.
-        text = DESCRIPTIONS.get(name) or DESCRIPTIONS[name.partition("-")[0]]
+        text = described.get(name) or described[name.partition("-")[0]]
         chart = '<div class="charts"></div>' if name in shown else ""
         drawn[name] = f'{chart}<div class="drawn" tabindex="0">{inline_svg(figure, name, text)}</div>'
     font = font_face(shown_text("".join(drawn.values())))
