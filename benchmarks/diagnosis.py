@@ -106,12 +106,12 @@ class SysidFit:
     def __init__(self, lead: StartingPoint) -> None:
         self.lead, self.problem = lead, lead.problem
         self.rig = campaign_rig(self.problem.data)
-        self.own = lead.point.release.shape[1]
+        self.own = lead.point.per_run.shape[1]
         self.params = sysid.ParameterDict()
         lower, upper = self.problem.bounds
         for name, value, low, high in zip(self.problem.names, lead.point.common, lower, upper, strict=True):
             self.params.add(sysid.Parameter(name, value, max(low, -UNBOUNDED), min(high, UNBOUNDED)))
-        for run, own in zip(self.problem.data.runs, lead.point.release, strict=True):
+        for run, own in zip(self.problem.data.runs, lead.point.per_run, strict=True):
             self.params.add(sysid.Parameter(run.id, own, own * 0.0 - 50.0, own * 0.0 + 50.0))
         self.models = [build_model(self.rig, self._settings(self.params, i)) for i in range(len(self._runs))]
         self.sequences = [self._sequence(i, model) for i, model in enumerate(self.models)]

@@ -97,7 +97,7 @@ for problem, point, prediction in calls[::2]:
         begun = time.process_time()
         work()
         taken.append(time.process_time() - begun)
-    ratios[len(problem.names) + point.release.shape[1]].append(1.0 + taken[1] / taken[0])
+    ratios[len(problem.names) + point.per_run.shape[1]].append(1.0 + taken[1] / taken[0])
 print(json.dumps({"counts": counts, "ratios": {p: statistics.median(r) for p, r in sorted(ratios.items())}}))
 """
 )

@@ -394,7 +394,11 @@ def _of_model(study: Study, unpatched: tuple[Fact, ...]) -> tuple[Fact, ...]:
         *map(as_stated, gain_words(study.campaign, study.chosen)),
         *unpatched,
         *map(as_stated, study.model.lead_words(study.similarity)),
-        *(() if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)),
+        *(
+            ()
+            if study.unexplained_floor is None
+            else (Fact("beyond reach", {"left": study.unexplained_floor}),)
+        ),
     )
 
 

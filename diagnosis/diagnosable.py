@@ -346,7 +346,7 @@ def refuse_indefinite(fit: Fit) -> None:
     """
     values = dict(zip(fit.problem.names, fit.point.common.tolist(), strict=True))
     numbers = np.concatenate(
-        (fit.point.common, fit.point.release.ravel(), fit.covariance.ravel(), [fit.total])
+        (fit.point.common, fit.point.per_run.ravel(), fit.covariance.ravel(), [fit.total])
     )
     if not np.isfinite(numbers).all():
         raise TunnelError(

@@ -80,7 +80,7 @@ def identifiability(kind: type[Effect]) -> Identifiability:
     with answering_with([kind]):
         others = [other for other in known_effects() if other.name != kind.name]
     for other in others:
-        if other.fitted and not other.own_numbers(1):
+        if other.fitted and not other.per_run_parameters(1):
             left = unabsorbed(base, other)
             if left is not None:
                 size = float(np.linalg.norm(own[0]) * np.linalg.norm(left[0]))

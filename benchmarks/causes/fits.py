@@ -12,7 +12,7 @@ from typing import Any
 from benchmarks.causes.entry import KINDS
 from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
-from diagnosis.model.run_data import Data
+from diagnosis.model.data import Data
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings

@@ -14,8 +14,8 @@ from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import FOLDS, folds
 from diagnosis.search.hypothesis import restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_moments import RandomAnswer
@@ -115,14 +115,14 @@ def predict_held_out(whole: Fit) -> HeldOut:
             common = fit_seen(whole, seen)[0].common
             released, left = refit_releases(
                 replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
-                Point(common, whole.point.release[out]),
+                Point(common, whole.point.per_run[out]),
                 [whole.jacobian[i][1] for i in out],
             )
         except (FitError, np.linalg.LinAlgError):
             continue
         for k, i in enumerate(out):
             residuals[ids[i]] = left[k]
-            points[ids[i]] = (released.common, released.release[k])
+            points[ids[i]] = (released.common, released.per_run[k])
     return HeldOut(residuals, points)
 
 

@@ -32,7 +32,7 @@ def wind_on_runs(fit: Fit) -> list[WindOnRun]:
         if not run.wind_on:
             continue
         inertia, _, stiffness = linear_coefficients(fit, i)
-        spring = fit.problem.stated(fit.point.common, fit.point.release[i], run).spring_stiffness
+        spring = fit.problem.stated(fit.point.common, fit.point.per_run[i], run).spring_stiffness
         if stiffness <= 0.0 or spring <= 0.0:
             continue
         load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
@@ -348,7 +348,7 @@ def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | N
     if not left.any():
         return None
     moves = -sum((c @ i for c, i in zip(change, influence, strict=True)), np.zeros(influence[0].shape[1]))
-    own = start.point.release.shape[1] - fit.point.release.shape[1]
+    own = start.point.per_run.shape[1] - fit.point.per_run.shape[1]
     least, greatest = 0.0, 1.0
     if own:
         least, greatest = 1.0 / _OWN_SIZE, _OWN_SIZE

@@ -285,7 +285,7 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         if kind.driven or severity not in problem.names:
             continue
         acts = [i for i, run in enumerate(data.runs) if kind.acts(wind_on=run.wind_on)]
-        release, without = fit.point.release.copy(), fit.point.common.copy()
+        release, without = fit.point.per_run.copy(), fit.point.common.copy()
         release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0
         both = problem.predict([Point(fit.point.common, release), Point(without, release)])
@@ -323,7 +323,7 @@ def damping_ratio(fit: Fit) -> float | None:
         Of the first run; None where its motion there is not a decay.
     """
     data = fit.problem.data
-    release = fit.point.release.copy()
+    release = fit.point.per_run.copy()
     release[:, :2] = _SHARE * data.swing, 0.0
     run, frequency = data.runs[0], resonance(fit, 0)
     count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))

@@ -192,7 +192,7 @@ def _strokes(fit: Fit) -> list[_Passed]:
         if run.derivative or turns.size < 2:
             continue
         stiffness, centre = float(fit.linear[place, 2]), fit.zero(place)
-        drive = problem.chain(fit.point.common, fit.point.release[place], run).physics().drive
+        drive = problem.chain(fit.point.common, fit.point.per_run[place], run).physics().drive
         moment = None if drive is None else _moment(drive, run.times)
         model, record = (strokes(one, turns, stiffness, moment, centre) for one in (predicted, run.reading))
         force = stiffness * (model.angle - centre) - (0.0 if moment is None else moment[turns])

@@ -111,7 +111,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
         None where no refit confirms a size, or the runs exclude no size at all.
     """
     assert start.scaled is not None
-    if start.point.release.shape[1] > fit.point.release.shape[1]:
+    if start.point.per_run.shape[1] > fit.point.per_run.shape[1]:
         return found
     limit = fit.unlikelihood - found.lowered
     least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
@@ -156,7 +156,7 @@ def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | N
     name, problem = start.problem.names[start.scaled], start.problem
     problem = replace(problem, fixed=(*problem.fixed, (name, size)), scatter=fit.problem.scatter)
     own = np.delete(start.point.common, start.scaled)[common.size :]
-    point = Point(np.concatenate([common, own]), fit.point.release.copy())
+    point = Point(np.concatenate([common, own]), fit.point.per_run.copy())
     return try_fit(problem, point, base=fit, max_iterations=_STEPS)
 
 
@@ -295,15 +295,15 @@ def _profiled(
     common = start.point.common.copy()
     common[: fit.point.common.size] = fit.point.common
     common[start.scaled] = part * start.point.common[start.scaled]
-    effect, release = common[fit.point.common.size :], start.point.release.copy()
-    release[:, : fit.point.release.shape[1]] = fit.point.release
+    effect, release = common[fit.point.common.size :], start.point.per_run.copy()
+    release[:, : fit.point.per_run.shape[1]] = fit.point.per_run
     change = change_to(fit, start.problem, Point(common, release))
     whole = float(np.linalg.norm(np.concatenate(change)))
     if not np.isfinite(whole):
         return None
     there = absorbed(fit, change)
     moved = _moved(fit, start, np.concatenate([there.common, effect]))
-    own = np.column_stack([there.release, release[:, there.release.shape[1] :]])
+    own = np.column_stack([there.per_run, release[:, there.per_run.shape[1] :]])
     change = change_to(fit, start.problem, Point(np.concatenate([there.common, effect]), own))
     if not all(np.all(np.isfinite(one)) for one in change):
         return None

@@ -55,7 +55,7 @@ def other_hold(study: Study) -> OtherHold | None:
     effects = tuple(kind for kind in problem.effects if kind is not DELAY)
     tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
     whole = dict(zip(problem.names, fit.point.common.tolist(), strict=True))
-    start = Point(np.array([whole[name] for name in tried.names]), fit.point.release)
+    start = Point(np.array([whole[name] for name in tried.names]), fit.point.per_run)
     fitted = try_fit(tried, start)
     if fitted is None:
         return None

@@ -11,8 +11,9 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.normal_equations import project_release
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
@@ -123,7 +124,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     # one instant, whatever the number in existing runs, and no deviation: it may have either sign
     data = fit.problem.data.with_runs((run,))
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
-    turns = np.array([bool(kind.line) for kind in problem.effects if kind.own_numbers(1)], bool)
+    turns = np.array([bool(kind.line) for kind in problem.effects if kind.per_run_parameters(1)], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
     first = len(problem.parameters.own) - problem.parameters.of_effects

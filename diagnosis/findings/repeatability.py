@@ -212,7 +212,7 @@ class _Runs:
         names = fitted.problem.parameters.own_names
         for place, name in enumerate(problem.parameters.own_names):
             if name in own:
-                point.release[:, place] = fitted.point.release[:, names.index(name)]
+                point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
         jacobian = sensitivities(problem, point)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
             return None
@@ -340,7 +340,7 @@ class _Runs:
         """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""
         problem = self.fitted.problem
         run = problem.data.runs[index]
-        stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
+        stated = problem.stated(self.fitted.point.common, self.fitted.point.per_run[index], run)
         table = SettingsTable.of([stated])
         return np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
 

@@ -169,7 +169,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
         The residuals. Those of the nominal model's held-out runs are from the fits' integrator, corrected by the
         difference to MuJoCo in the similar fit of all runs.
     """
-    before = compare(nominal.problem, nominal.point.common, nominal.point.release)
+    before = compare(nominal.problem, nominal.point.common, nominal.point.per_run)
     before_out = {
         run: nominal_out.residuals[run] - shift
         for run, shift in zip(before.ids, before.shifts, strict=True)
@@ -181,7 +181,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
     else:
         runs = chosen.problem.data.runs
         points = [
-            chosen_out.points.get(run.id, (chosen.point.common, chosen.point.release[i]))
+            chosen_out.points.get(run.id, (chosen.point.common, chosen.point.per_run[i]))
             for i, run in enumerate(runs)
         ]
         held = compare(chosen.problem, np.array([c for c, _ in points]), np.array([r for _, r in points]))

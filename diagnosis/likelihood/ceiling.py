@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
-from diagnosis.model.run_data import folds
+from diagnosis.model.data import folds
 from diagnosis.settings import RemainderSettings
 from tunnel_sim.vocabulary.record import Array
 

@@ -87,17 +87,17 @@ class Fit:
             return None
         return self.columns.likeliest(width_prior(self.problem), self.widths)
 
-    def scatter_cost(self, known: Array) -> float:
+    def scatter_cost(self, deviation_precision: Array) -> float:
         """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 without any.
 
         Args:
-            known: precision of these differences as the runs show them, as in `Between.cost`, shape
+            deviation_precision: precision of these differences as the runs show them, as in `Between.cost`, shape
                 (runs, kinds, kinds).
         """
-        return 0.0 if self.between is None else self.between.cost(known, self.shown)
+        return 0.0 if self.between is None else self.between.cost(deviation_precision, self.shown)
 
     @property
-    def compared(self) -> int:
+    def shown_between_runs(self) -> int:
         """Number of effects that chance differences between runs could imitate: no single run shows them."""
         return 0 if self.between is None else sum(not seen for seen in self._shown_by_runs.values())
 
@@ -165,7 +165,7 @@ class Fit:
 
     def zero(self, index: int) -> float:
         """The sensor's zero in the run with an index."""
-        return self.problem.zero(self.point.common, self.point.release[index])
+        return self.problem.zero(self.point.common, self.point.per_run[index])
 
     def std(self, name: str) -> float:
         """Standard deviation of a common parameter, if the model is right."""
@@ -277,7 +277,8 @@ class _State:
 
     def linearise(self, base: Fit | None) -> None:
         """Compute sensitivities, reusing those of a smaller fit where given."""
-        self.jacobian = sensitivities(self.problem, self.here.point, base, self.here.prediction)
+        known = None if base is None else base.jacobian
+        self.jacobian = sensitivities(self.problem, self.here.point, known, self.here.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
         self.products = Products.of(self.jacobian, self.problem.parameters.precision)
@@ -310,7 +311,7 @@ class _State:
                 *_, solutions = normal_equations(
                     self.jacobian, trial.residuals, self.damping, self.products, pull
                 )
-            point = Point(trial.point.common, trial.point.release + solutions[:, :, -1])
+            point = Point(trial.point.common, trial.point.per_run + solutions[:, :, -1])
             nearer = _Place.of(self.problem, point)
             if not nearer.cost < trial.cost:
                 break
@@ -337,7 +338,7 @@ class _State:
 def clip(problem: Problem, point: Point) -> Point:
     """The point with its common parameters inside their bounds."""
     lower, upper = problem.bounds
-    return Point(np.clip(point.common, lower, upper), point.release)
+    return Point(np.clip(point.common, lower, upper), point.per_run)
 
 
 def scaled_residuals(problem: Problem, point: Point) -> list[Array]:

@@ -12,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.data import Data
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
@@ -52,7 +53,7 @@ class Asked:
         effects: that act in each run.
         drawn: the random part of each of these effects.
         zero: of the sensor, in the unit of the reading, shape (n,).
-        rod_followed: as in `Problem`.
+        resolve_rod_mode: as in `Problem`.
     """
 
     data: Data
@@ -62,7 +63,7 @@ class Asked:
     effects: Sequence[tuple[Effect, ...]]
     drawn: Sequence[tuple[Drawn, ...]]
     zero: Array
-    rod_followed: bool
+    resolve_rod_mode: bool
 
     def chain(self, place: int) -> EffectChain:
         """The effects of one of the runs."""
@@ -355,7 +356,7 @@ def _apart(
         added, where it was separated.
     """
     run = physics.row(place)
-    slow = None if asked.rod_followed else slow_motion(released_by_spring_end(run), rig)
+    slow = None if asked.resolve_rod_mode else slow_motion(released_by_spring_end(run), rig)
     if slow is None:
         physics.put(place, released_by_spring_end(condensed(run, asked.data)))
         return None

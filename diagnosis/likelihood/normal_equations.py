@@ -122,7 +122,7 @@ def damped_step(
         scaled, gradient / scale, (lower - point.common) * scale, (upper - point.common) * scale
     )
     release = solutions[:, :, -1] - solutions[:, :, :-1] @ (step / scale)
-    return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
+    return Point(np.clip(point.common + step / scale, lower, upper), point.per_run + release)
 
 
 def bounded_step(matrix: Array, gradient: Vector, lower: Array, upper: Array) -> Array:

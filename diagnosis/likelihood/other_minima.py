@@ -71,7 +71,7 @@ def _elsewhere(fitted: Fit) -> list[_Elsewhere]:
             at[[problem.names.index(name) for name in names]] = list(names.values())
             if np.all((lower <= at) & (at <= upper)):
                 held = [problem.names.index(n) for n in names if n != f"{effect.name}.{trial.scaled}"]
-                tried.append((Point(at, fitted.point.release), held))
+                tried.append((Point(at, fitted.point.per_run), held))
     moved: list[_Elsewhere] = []
     for first in range(0, len(tried), _TOGETHER):
         some = tried[first : first + _TOGETHER]
@@ -92,7 +92,7 @@ def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: l
         free[:, held] = 0.0
         jacobian.append((free, own))
     there = damped_step(fitted.problem, point, residuals, jacobian, 0.0)
-    step, release = there.common - point.common, there.release - point.release
+    step, release = there.common - point.common, there.per_run - point.per_run
     left = [
         r - columns @ step - own @ release[i]
         for i, (r, (columns, own)) in enumerate(zip(residuals, jacobian, strict=True))

@@ -41,7 +41,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
                 rows = np.vstack([slope, np.diag(root)])
                 values = np.append(residual, away / np.where(root > 0.0, root, 1.0))
             steps.append(np.linalg.lstsq(rows, values, rcond=1e-10)[0])
-        trial = Point(best.common, best.release + np.stack(steps))
+        trial = Point(best.common, best.per_run + np.stack(steps))
         moved = scaled_residuals(problem, trial)
         with np.errstate(invalid="ignore"):  # a diverging prediction is kept unchanged
             saved = problem.parameters.surprises(best) - problem.parameters.surprises(trial)
@@ -49,7 +49,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
         if not any(better):
             break
-        best = Point(best.common, np.where(np.array(better)[:, None], trial.release, best.release))
+        best = Point(best.common, np.where(np.array(better)[:, None], trial.per_run, best.per_run))
         residuals = [m if keep else r for m, r, keep in zip(moved, residuals, better, strict=True)]
     return best, residuals
 

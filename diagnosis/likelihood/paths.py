@@ -115,7 +115,7 @@ class Path:
     @cached_property
     def _stated(self) -> RunSettings:
         point = self.fit.point
-        return self.fit.problem.stated(point.common, point.release[self.index], self.run)
+        return self.fit.problem.stated(point.common, point.per_run[self.index], self.run)
 
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear between samples."""

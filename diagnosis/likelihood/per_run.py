@@ -121,7 +121,7 @@ def excited(fit: Fit) -> Sought | None:
     # products of the input's spectrum with the residual's and with itself
     sums: dict[tuple[int, float], tuple[Array, np.ndarray, Array]] = {}
     for number, run in enumerate(runs):
-        stated = fit.problem.stated(fit.point.common, fit.point.release[number], run)
+        stated = fit.problem.stated(fit.point.common, fit.point.per_run[number], run)
         if run.drive is None or stated.drive is None or not stated.spring_stiffness > 0.0:
             continue
         size = 2 ** int(np.ceil(np.log2(2 * run.reading.size)))

@@ -10,8 +10,9 @@ import numpy as np
 
 from diagnosis.likelihood.motions import Asked, readings
 from diagnosis.model.chance import RunDeparture, Scatter, departure
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, ParameterSet, Point
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
@@ -33,7 +34,7 @@ class Problem:
         free_forms: free form parameters, as ``effect.parameter``; the others keep the textbook form.
         instants: number of instants in every run for an effect that skips samples.
         scatter: chance differences between runs beside the effects; each run has its own deviation of each.
-        rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the
+        resolve_rod_mode: whether a flexible rod is integrated with its ringing; else the ringing is added to the
             slow motion, which is much faster and exact for a linear rig.
     """
 
@@ -43,7 +44,7 @@ class Problem:
     free_forms: tuple[str, ...] = ()
     instants: int = 1
     scatter: Scatter = ()
-    rod_followed: bool = False
+    resolve_rod_mode: bool = False
 
     @cached_property
     def parameters(self) -> ParameterSet:
@@ -58,7 +59,7 @@ class Problem:
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))
-            for own in kind.own_numbers(self.instants):
+            for own in kind.per_run_parameters(self.instants):
                 found.append(Parameter(f"{kind.name}.{own}", "1", owner="per_run", effect=kind.name))
         return ParameterSet(tuple(found))
 
@@ -82,7 +83,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            own: of the run, a row of ``Point.release``, shape (own,).
+            own: of the run, a row of ``Point.per_run``, shape (own,).
         """
         parameters = self.parameters
         if "zero" in parameters.names:
@@ -132,7 +133,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            own: the run's own parameters, a row of ``Point.release``, shape (own,).
+            own: the run's own parameters, a row of ``Point.per_run``, shape (own,).
             effects: from `effects_at`, where they are known already.
         """
         drawn = self._drawn(own[None])[0]
@@ -155,7 +156,7 @@ class Problem:
             (i, int(r))
             for i, point in enumerate(points)
             if np.all(np.isfinite(point.common))
-            for r in np.flatnonzero(np.all(np.abs(point.release) < _BEYOND, axis=1))
+            for r in np.flatnonzero(np.all(np.abs(point.per_run) < _BEYOND, axis=1))
         ]
         if places:
             for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):
@@ -172,7 +173,7 @@ class Problem:
         """
         runs = [self.data.runs[r] for _, r in places]
         common = np.stack([points[i].common for i, _ in places])
-        own = np.stack([points[i].release[r] for i, r in places])
+        own = np.stack([points[i].per_run[r] for i, r in places])
         values = self._columns(common, own)
         stated = self.data.model.settings(values, runs)
         at = {i: self.effects_at(points[i].common) for i in dict.fromkeys(i for i, _ in places)}
@@ -194,7 +195,7 @@ class Problem:
         if not reads_plainly(effects[0]) or any(physics.rod_twist):
             runs = [run.fine for run in runs]
         zero = values.get("zero", np.zeros(len(runs)))
-        return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.rod_followed)
+        return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.resolve_rod_mode)
 
     def _columns(self, common: Array, own: Array) -> dict[str, Array]:
         """Values of all parameters in several runs by name, fixed ones included, shape (runs,) each.
@@ -210,7 +211,7 @@ class Problem:
     def linear(self, point: Point) -> Array:
         """Inertia, damping and stiffness of every run, as in `Fit.linear`, shape (runs, 3)."""
         runs = self.data.runs
-        values = self._columns(np.tile(point.common, (len(runs), 1)), point.release[: len(runs)])
+        values = self._columns(np.tile(point.common, (len(runs), 1)), point.per_run[: len(runs)])
         stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
         speed = np.array([run.wind_speed if run.wind_on else np.inf for run in runs])
         stiffness = stated.spring_stiffness - pressure * stated["cn_beta"]
@@ -223,7 +224,7 @@ class Problem:
         """Random draws of the effects in several runs, by run.
 
         Args:
-            own: the runs' own parameters, rows of ``Point.release``, shape (runs, own).
+            own: the runs' own parameters, rows of ``Point.per_run``, shape (runs, own).
         """
         columns: list[list[Drawn]] = []
         for kind in self.effects:

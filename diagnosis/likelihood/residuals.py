@@ -115,7 +115,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLin
     if not concerned or metres <= 0.0:
         return None
     spectra = residual_spectra(fit)
-    chains = [fit.problem.chain(fit.point.common, fit.point.release[i], data.runs[i]) for i in concerned]
+    chains = [fit.problem.chain(fit.point.common, fit.point.per_run[i], data.runs[i]) for i in concerned]
     speeds = np.array([chain.physics().wind_speed for chain in chains])  # corrected by the effects of the fit
     spacing = 0.1 * metres / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
     grid = np.arange(least, greatest, spacing)
@@ -184,7 +184,7 @@ class ChannelMisfit:
             dimensionless.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless; 0 where
             they repeat.
-        known: precision of these differences, as in `Between.cost`, shape (runs, kinds, kinds).
+        deviation_precision: precision of these differences, as in `Between.cost`, shape (runs, kinds, kinds).
         repeats: whether the runs of the fit repeat exactly.
     """
 
@@ -192,7 +192,7 @@ class ChannelMisfit:
     count: Array
     motion: float
     scatter_cost: float = 0.0
-    known: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    deviation_precision: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     repeats: bool = True
 
     @property
@@ -222,8 +222,10 @@ def gap_left(fit: Fit) -> ChannelMisfit:
     """The reference of the weights: a fit's misfit, with the cost of chance differences between its runs."""
     if not fit.problem.scatter:
         return misfit(fit)
-    known = fit.columns.products.own
-    return dataclasses.replace(misfit(fit), scatter_cost=fit.scatter_cost(known), known=known)
+    precision = fit.columns.products.own
+    return dataclasses.replace(
+        misfit(fit), scatter_cost=fit.scatter_cost(precision), deviation_precision=precision
+    )
 
 
 #: Cached per fit: they depend on the fit alone, and its residuals are split many times.

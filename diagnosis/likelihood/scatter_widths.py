@@ -77,7 +77,7 @@ class ScatterColumns:
         """
         places = problem.parameters.places(problem.scatter)
         bases, deviations, common, seen = [], [], [], []
-        for residual, (of_common, own), values in zip(residuals, jacobian, point.release, strict=True):
+        for residual, (of_common, own), values in zip(residuals, jacobian, point.per_run, strict=True):
             basis = _orthonormal(np.delete(own, places, axis=1))
             chance = own[:, places]
             bases.append(basis)
@@ -183,7 +183,7 @@ class Between:
         """
         return np.asarray(values**2 >= stds**2 * np.diag(self.most.covariance), np.bool_)
 
-    def cost(self, known: Array, given: Kept | None = None) -> float:
+    def cost(self, deviation_precision: Array, given: Kept | None = None) -> float:
         """−2 ln of the evidence without the residuals' χ²: the cost of letting the runs differ so much.
 
         It is 0 for runs that repeat exactly. The deviations count as if they were known as well as under one
@@ -193,12 +193,12 @@ class Between:
         zero.
 
         Args:
-            known: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
+            deviation_precision: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
             given: the common parameters that are not integrated out, shape (common,): those of effects that the
                 runs show by themselves, which cannot align runs by chance. None: there are none.
         """
         identity = np.eye(self.widths.size)
-        scaled = identity + self.widths[None, :, None] * known * self.widths
+        scaled = identity + self.widths[None, :, None] * deviation_precision * self.widths
         away = self.found.deviations / self.widths
         seen = np.einsum("rk,rkl,rl->", away, identity - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)

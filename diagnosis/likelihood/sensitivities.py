@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,24 +11,20 @@ from diagnosis.likelihood.slopes import changes
 from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
-if TYPE_CHECKING:
-    from diagnosis.likelihood.least_squares import Fit
+#: Derivatives by run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
+Jacobian: TypeAlias = list[tuple[Array, Array]]
 
 
 def sensitivities(
-    problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
-) -> list[tuple[Array, Array]]:
+    problem: Problem, point: Point, base: Jacobian | None = None, prediction: list[Array] | None = None
+) -> Jacobian:
     """Derivatives of the scaled prediction.
 
     Args:
-        base: a fit of the same runs; its derivatives are reused for the parameters it has.
+        base: derivatives of a fit of the same runs with fewer parameters, which come first; they are reused.
         prediction: at the point, by run, where it is known.
-
-    Returns:
-        By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
     """
-    known = 0 if base is None else len(base.problem.names)
-    known_own = 0 if base is None else base.point.release.shape[1]
+    known, known_own = (0, 0) if base is None else (base[0][0].shape[1], base[0][1].shape[1])
     points, steps = moves(problem, point, known, known_own)
     found = motion_changes(problem, point, points)
     lost = np.flatnonzero([any(np.isnan(change[i, 0]) for change in found) for i in range(len(points))])
@@ -49,7 +45,7 @@ def sensitivities(
             scaled = run.scaled((found[r] / steps[:, r, None]).T)
         by_common, by_own = scaled[:, :common], scaled[:, common:]
         if base is not None:
-            known_common, known_ends = base.jacobian[r]
+            known_common, known_ends = base[r]
             by_common, by_own = (
                 np.column_stack([known_common, by_common]),
                 np.column_stack([known_ends, by_own]),
@@ -68,16 +64,16 @@ def moves(problem: Problem, point: Point, known: int = 0, known_own: int = 0) ->
     Returns:
         The points, and their steps by run, in the parameters' units, shape (points, runs).
     """
-    count = len(point.release)
+    count = len(point.per_run)
     steps, points = problem.parameters.steps(point.common), []
     for i in range(known, steps.size):
         moved = point.common.copy()
         moved[i] += steps[i]
-        points.append(Point(moved, point.release))
-    amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
+        points.append(Point(moved, point.per_run))
+    amplitude = np.maximum(np.abs(point.per_run[:, 0]), 1e-3)
     own_steps = problem.parameters.own_steps(amplitude)
-    for j in range(known_own, point.release.shape[1]):
-        release = point.release.copy()
+    for j in range(known_own, point.per_run.shape[1]):
+        release = point.per_run.copy()
         release[:, j] += own_steps[j]
         points.append(Point(point.common, release))
     sizes = [np.full(count, step) for step in steps[known:]] + own_steps[known_own:]

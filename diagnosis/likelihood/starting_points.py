@@ -15,8 +15,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit
 from diagnosis.likelihood.scatter_widths import Between, width_prior
 from diagnosis.model.chance import Scatter
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
@@ -71,7 +71,7 @@ class StartingPoint:
             return None
         common = self.point.common.copy()
         common[self.scaled] *= _NEARER
-        return dataclasses.replace(self, point=Point(common, self.point.release))
+        return dataclasses.replace(self, point=Point(common, self.point.per_run))
 
 
 def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
@@ -82,7 +82,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if not _may_show(data, kind):
         return []
-    if kind.own_numbers(1):
+    if kind.per_run_parameters(1):
         tried = (_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one)
     else:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
@@ -105,7 +105,7 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     values = [np.clip(value, info.lower, info.upper) for value, info in infos]
     if values[0] == 0.0:
         return None
-    release = np.column_stack([base.point.release, one.numbers])
+    release = np.column_stack([base.point.per_run, one.numbers])
     point = Point(np.concatenate([base.point.common, values]), release)
     predicted = misfit(base).excess
     predicted[CHANNELS.index(kind.gains_in())] -= one.drop
@@ -159,7 +159,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
         Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
     """
     data = base.problem.data
-    if not _may_show(data, kind) or kind.own_numbers(1):
+    if not _may_show(data, kind) or kind.per_run_parameters(1):
         return
     for trial in kind.trials(_circumstances(base)):
         tried = _moderate(base, kind, trial)
@@ -179,7 +179,7 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
         moved = base.point
         for _ in range(_ABSORBED):
             moved = absorbed(base, change, moved)
-            change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
+            change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.per_run))
     added = _added(base, change)
     if added is None or (moved is not None and added.slope <= 0.0):
         return None
@@ -192,11 +192,11 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
             start[scaled], drop = 0.01 * sizes[scaled], 0.0
         if replaced is not None:
             start[scaled] = min(start[scaled], base.point.common[replaced])
-    point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
+    point = Point(_with_effect(base, start, scaled, replaced), base.point.per_run)
     if moved is not None and scaled is not None:
         part = start[scaled] / sizes[scaled]
         point.common[: moved.common.size] += part * (moved.common - base.point.common)
-        release = point.release + part * (moved.release - base.point.release)
+        release = point.per_run + part * (moved.per_run - base.point.per_run)
         point = clip(problem, Point(point.common, release))
     place = None if scaled is None else base.point.common.size + scaled
     problem = dataclasses.replace(problem, scatter=added.scatter)
@@ -275,7 +275,7 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
             own = _own_parameters(problem, kind)
             sizes = np.array([trial.values.get(info.name, info.default) for info in own])
-            point = Point(np.concatenate([base.point.common, sizes]), base.point.release)
+            point = Point(np.concatenate([base.point.common, sizes]), base.point.per_run)
             place = base.point.common.size + [info.name for info in own].index(trial.scaled)
             found.append(StartingPoint(problem, point, 0.0, np.zeros(len(CHANNELS)), place, True))
     return found
@@ -302,7 +302,7 @@ def _circumstances(base: Fit) -> Circumstances:
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
     moment, rate = 0.0, 0.0
-    for run, own in zip(data.runs, base.point.release, strict=True):
+    for run, own in zip(data.runs, base.point.per_run, strict=True):
         if run.drive is not None and run.drive.through_actuator:
             drive = base.problem.stated(base.point.common, own, run).drive
             assert drive is not None
@@ -360,7 +360,7 @@ def _moderate_change(
     limit = (_SMALL if base.problem.scatter and not second_order else _MODERATE) * np.sqrt(base.total)
     for _ in range(12):
         change = change_to(
-            base, problem, Point(_with_effect(base, values, scaled, replaced), base.point.release)
+            base, problem, Point(_with_effect(base, values, scaled, replaced), base.point.per_run)
         )
         size = float(np.sqrt(sum(float(c @ c) for c in change)))
         if np.isfinite(size) and (size <= limit or scaled is None):

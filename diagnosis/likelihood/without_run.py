@@ -72,5 +72,5 @@ def refitted_without(fitted: Fit, index: int) -> Fit | None:
     """
     data = fitted.problem.data
     others = data.with_runs(tuple(run for place, run in enumerate(data.runs) if place != index))
-    start = Point(fitted.point.common, np.delete(fitted.point.release, index, axis=0))
+    start = Point(fitted.point.common, np.delete(fitted.point.per_run, index, axis=0))
     return try_fit(replace(fitted.problem, data=others), start, max_iterations=_ITERATIONS)

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.data import Data
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.run_data import Data, RunData, UnevenSamples, means_of
+from diagnosis.model.run_data import RunData, UnevenSamples, means_of
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings

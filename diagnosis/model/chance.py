@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, RunParameterPrior
-from diagnosis.model.run_data import Data
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import RunSettings
@@ -83,7 +83,7 @@ class Chance:
         return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
-_KEEPING_TIME = tuple(kind.keeps_time for kind in ALL_EFFECTS if kind.keeps_time)
+_KEEPING_TIME = tuple(kind.frequency_by_wind for kind in ALL_EFFECTS if kind.frequency_by_wind)
 
 
 class RunDeparture(Effect):

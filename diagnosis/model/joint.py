@@ -13,6 +13,7 @@ from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.rig import SpringModel
+from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
@@ -26,7 +27,6 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Actuator, JointLaw
 
 if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data, RunData
     from tunnel_sim.engine.joint_model import Recorded
 
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
@@ -76,7 +76,7 @@ class _OfLaw(NominalModel):
         )
         return replace(self, law=similar)
 
-    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+    def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The parameters of a rig, and a stiffness beside the law's stiffness."""
         return *super().inertial(data), Parameter("added_stiffness", "N m/rad")
 
@@ -101,10 +101,10 @@ class _OfLaw(NominalModel):
         """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
-            gone[OF_GEAR] = [kind for kind in kinds if kind.parts]
-            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.parts]
+            gone[OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.has_backlash]
         elif self.law.hangs:
-            gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
+            gone[_OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
         return gone | super().untried(campaign, left)
 
@@ -174,7 +174,7 @@ class Joint(_OfLaw, SpringModel):
         **LooseBody.coefficient_units, **SpringModel.coefficient_units,
     }  # fmt: skip
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """For driven runs, which may lack a resonance, the response to known moments first; then as for a rig."""
         if data.driven and not self.own_zeros:
             yield self._driven_start(data)
@@ -182,7 +182,7 @@ class Joint(_OfLaw, SpringModel):
         else:
             yield from super().starts(data)
 
-    def _driven_start(self, data: Data) -> FitStart:
+    def _driven_start(self, data: PreparedRuns) -> FitStart:
         """The readings count as positions of the joint."""
         law = self.law
         found = [
@@ -212,7 +212,7 @@ class Joint(_OfLaw, SpringModel):
         own = (name for name in LooseBody.coefficient_units if name in names)
         return *own, *SpringModel.coefficient_units
 
-    def unseen(self, data: Data) -> Sequence[str]:
+    def unseen(self, data: PreparedRuns) -> Sequence[str]:
         """The limits of a single spring."""
         if data.driven:
             return ("structural as opposed to viscous damping: the joint has one stiffness",)
@@ -242,7 +242,7 @@ class ServoJoint(Joint):
         """The joint and the kp of the similar campaign."""
         return replace(super().similar(change), kp=change.similar(self.kp, "N m/rad"))  # type: ignore[call-arg]
 
-    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+    def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The joint's, and the kp."""
         return *super().inertial(data), Parameter("servo_kp", "N m/rad", lower=0.0, size=self.kp)
 
@@ -260,7 +260,7 @@ class ServoJoint(Joint):
                 table.drive[place] = replace(drive, scale=drive.scale * kp / self.kp, offset=offset)
         return table
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """From the kp of the model."""
         for start in super().starts(data):
             yield replace(start, common={**start.common, "servo_kp": self.kp})

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
+from diagnosis.model.run_data import PreparedRuns
 from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,
     REFERENCE_INERTIA,
@@ -21,9 +22,6 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
-
-if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data
 
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 _NO_MOMENT = (
@@ -84,7 +82,7 @@ class LooseBody(NominalModel):
             )
         return REFERENCE_INERTIA / (inertia * time**2)
 
-    def offset(self, data: Data) -> tuple[Parameter, ...]:
+    def offset(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """A constant moment; the zero cannot be separated from the initial angle."""
         return (Parameter("moment_offset", "N m", size=REFERENCE_STIFFNESS * data.swing),)
 
@@ -93,7 +91,7 @@ class LooseBody(NominalModel):
         """The means of the runs differ."""
         return False
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Inertia and damping by the response to known moments, and no other moment."""
         found = [
             (run.drive.scale / response[2], 2.0 * response[0])
@@ -128,7 +126,7 @@ class LooseBody(NominalModel):
         """Inertia, damping and constant moment, as far as they are fitted."""
         return tuple(name for name in self.coefficient_units if name in names)
 
-    def unseen(self, data: Data) -> Sequence[str]:
+    def unseen(self, data: PreparedRuns) -> Sequence[str]:
         """The zero."""
         del data
         return ("the sensor's zero, and its drift as opposed to a constant moment: there is no spring",)

@@ -10,11 +10,12 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from diagnosis.model.parameters import GAIN, Parameter, released
+from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -26,9 +27,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
-
-if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data, RunData
 
 #: Moments of the air in the strongest wind, by which a coefficient's size is judged whatever the air.
 _AIR_STIFFNESS, _AIR_DAMPING = 4.0, 0.02  # N m/rad and N m s/rad
@@ -152,13 +150,13 @@ class NominalModel:
         """Values of parameters that are not fitted, by name."""
         return {}
 
-    def parameters(self, data: Data) -> tuple[Parameter, ...]:
+    def parameters(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """Its parameters, those common to the runs in the order of a fit's vectors."""
         named = (*self.inertial(data), *self.air(data), *self.input_gain(data), *self.offset(data))
         own_zero = Parameter("zero", "rad", owner="per_run") if self.own_zeros else None
         return *(one for one in named if one.name not in self.held), *released(own_zero)
 
-    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+    def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """Inertia, damping and stiffness, as far as they are fitted."""
         del data
         return (
@@ -166,7 +164,7 @@ class NominalModel:
             Parameter("mechanical_damping", "N m s/rad", lower=0.0, size=0.02),
         )
 
-    def air(self, data: Data) -> tuple[Parameter, ...]:
+    def air(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The aerodynamic derivatives; none in still air."""
         if not self.windy:
             return ()
@@ -180,7 +178,7 @@ class NominalModel:
             Parameter("cn_r", "1/rad", size=_AIR_DAMPING / damping),
         )
 
-    def input_gain(self, data: Data) -> tuple[Parameter, ...]:
+    def input_gain(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The gain of an input, where it is not known."""
         if not self.unknown_gain:
             return ()
@@ -188,7 +186,7 @@ class NominalModel:
         size = 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0)
         return (Parameter(GAIN, "N m", size=size),)
 
-    def offset(self, data: Data) -> tuple[Parameter, ...]:
+    def offset(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The sensor's zero, where the runs have one in common."""
         del data
         return () if self.own_zeros else (Parameter("zero", "rad"),)
@@ -292,7 +290,7 @@ class NominalModel:
         del change
         return ()
 
-    def springs_at(self, data: Data, amplitude: AnglePerRun) -> Array:
+    def springs_at(self, data: PreparedRuns, amplitude: AnglePerRun) -> Array:
         """Stiffness of every run's spring at an amplitude, by harmonic balance, N m/rad, shape (runs,)."""
         spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
         if not self.moment:
@@ -309,7 +307,7 @@ class NominalModel:
 
     # ---- its starting points ----
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Starting points for its fit; the second where the fit from the first misses the motion."""
         raise NotImplementedError
 
@@ -389,17 +387,17 @@ class NominalModel:
 
     # ---- what its runs cannot show, and what to do next ----
 
-    def blind_spots(self, data: Data) -> tuple[str, ...]:
+    def blind_spots(self, data: PreparedRuns) -> tuple[str, ...]:
         """The limits of these runs, as clauses; those of every campaign are last."""
         speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
         found = [*self.unseen(data)]
-        if not data.wind_on:
+        if not self.windy:
             found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
             found.append(
                 "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
             )
-        if data.wind_on and all(run.wind_on for run in data.runs):
+        if self.windy and all(run.wind_on for run in data.runs):
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
         common = [one for one in self.parameters(data) if one.owner == "common" and one.name != "zero"]
         if len(data.runs) == 1:
@@ -408,13 +406,13 @@ class NominalModel:
             found.append(
                 "how well runs repeat: no run tests another one, and ± is for runs that repeat exactly"
             )
-        last = (_OF_WIND,) if data.wind_on else ()
+        last = (_OF_WIND,) if self.windy else ()
         if data.driven:
             found.append("a lag of the sensor as opposed to a delay of the input: only their sum is visible")
             return *found, ALWAYS_BLIND[1], self.unseen_scale, *last
         return *found, *ALWAYS_BLIND, *last
 
-    def unseen(self, data: Data) -> Sequence[str]:
+    def unseen(self, data: PreparedRuns) -> Sequence[str]:
         """Clauses on what the springs of these runs cannot show."""
         if len(data.springs) > 1:
             return ()
@@ -427,7 +425,7 @@ class NominalModel:
         """The clause on a common scale that driven runs cannot show."""
         return ALWAYS_BLIND[2]
 
-    def planned_springs(self, data: Data) -> tuple[float, ...]:
+    def planned_springs(self, data: PreparedRuns) -> tuple[float, ...]:
         """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
         return data.springs
 

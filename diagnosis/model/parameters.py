@@ -74,11 +74,11 @@ class Point:
 
     Args:
         common: parameters common to the runs, in the order of `ParameterSet.names`, shape (common,).
-        release: of every run its own parameters, in the order of `ParameterSet.own_names`, shape (runs, own).
+        per_run: of every run its own parameters, in the order of `ParameterSet.own_names`, shape (runs, own).
     """
 
     common: Array
-    release: Array
+    per_run: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class ParameterSet:
     def pull(self, point: Point) -> Array:
         """Half the fall of `surprise` with each own parameter, shape (runs, own)."""
         means = np.array([0.0 if one.prior is None else one.prior.mean for one in self.own])
-        return np.asarray(self.precision * (means - point.release), np.float64)
+        return np.asarray(self.precision * (means - point.per_run), np.float64)
 
     def surprise(self, point: Point) -> float:
         """How far the own parameters are from their priors, in variances, summed; a part of χ²."""
@@ -150,7 +150,7 @@ class ParameterSet:
     def surprises(self, point: Point) -> Array:
         """The same by run, shape (runs,); 0 without priors."""
         if not self.precision.any():
-            return np.zeros(len(point.release))
+            return np.zeros(len(point.per_run))
         away = self.pull(point)
         return np.asarray(np.sum(away**2 / np.where(self.precision > 0.0, self.precision, 1.0), axis=1))
 
@@ -162,7 +162,7 @@ class ParameterSet:
         """
         if name in self.names:
             return float(point.common[self.names.index(name)])
-        return float(point.release[run, self.own_names.index(name)]) if name in self.own_names else None
+        return float(point.per_run[run, self.own_names.index(name)]) if name in self.own_names else None
 
     def point(self, common: Mapping[str, float], own: Sequence[Mapping[str, float]]) -> Point:
         """The point of some values; those not given are 0.

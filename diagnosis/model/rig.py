@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.parameters import Parameter
+from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.starts import Shown, decay_squares
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -17,9 +18,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.dimensions import dimension, in_si, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-
-if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data, RunData
 
 _STEP = 1e-5  # of a derivative by central differences, as a share of the parameter
 _LOSS = 0.01  # of a start, in angular frequencies: a small damping
@@ -75,14 +73,14 @@ class SpringModel(NominalModel):
                 remedy="state spring_stiffness, or leave the model out",
             )
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """From the runs' spectra; then from their own decays, as `identify` finds them."""
         yield self._start(data, Shown.of(data))
         squares = decay_squares(data)
         if squares is not None:
             yield self._start(data, Shown.of(data, squares))
 
-    def _start(self, data: Data, shown: Shown) -> FitStart:
+    def _start(self, data: PreparedRuns, shown: Shown) -> FitStart:
         zero = float(np.median(shown.zeros))
         zeros = shown.zeros if self.own_zeros else [zero] * len(shown.zeros)
         own = [
@@ -91,7 +89,7 @@ class SpringModel(NominalModel):
         ]
         return FitStart({**self.dynamics(data, shown), "zero": zero}, own)
 
-    def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
+    def dynamics(self, data: PreparedRuns, shown: Shown) -> dict[str, float]:
         """Starting values by name, of the zero apart.
 
         Inertia and aerodynamic stiffness are found by linear regression of the runs' frequencies.
@@ -147,7 +145,7 @@ class PerInertia(SpringModel):
         del campaign
         return time**-2
 
-    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+    def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
         """The common stiffness in place of the inertia."""
         del data
         return (
@@ -160,7 +158,7 @@ class PerInertia(SpringModel):
         del run
         return values[self.of_spring]
 
-    def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
+    def dynamics(self, data: PreparedRuns, shown: Shown) -> dict[str, float]:
         """Starting values by name, of the zero apart."""
         del data
         loss = _LOSS * float(np.sqrt(shown.typical)) if shown.loss is None else shown.loss
@@ -221,12 +219,12 @@ class PerInertia(SpringModel):
         """The parameters whose sum is the stiffness of small swings; a pendulum's only spring is gravity."""
         return (self.of_spring, *(name for name in _STIFFNESSES if name in names))
 
-    def unseen(self, data: Data) -> Sequence[str]:
+    def unseen(self, data: PreparedRuns) -> Sequence[str]:
         """The spring is not stated."""
         del data
         return ("an error of a single spring: the runs state no stiffness",)
 
-    def planned_springs(self, data: Data) -> tuple[float, ...]:
+    def planned_springs(self, data: PreparedRuns) -> tuple[float, ...]:
         """None: no stiffness is known."""
         del data
         return ()

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.model.nominal import NominalModel
 from diagnosis.model.run_noise import RunNoise
-from diagnosis.model.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
-from diagnosis.settings import Settings
+from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
-
-FOLDS = 3  # groups of runs left out in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,28 +348,20 @@ class RunData:
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
-    """A campaign as the fits see it.
+class PreparedRuns:
+    """Runs of a campaign as the fits see them, with the sizes of the rig.
 
     Args:
         runs: prepared runs.
         frontal_area: A, m². This and the two lengths are 1 in the measured campaign's units where not stated.
         reference_length: l, m.
         width: m.
-        model: nominal model of the campaign, whose parameters a part of its runs has, too.
-        similarity: how the campaign was made from the measured one.
-        settings: of the diagnosis.
-        repeatability: stated relative standard deviations between runs, by what scatters; empty: none is stated.
     """
 
     runs: tuple[RunData, ...]
     frontal_area: float
     reference_length: float
     width: float
-    model: NominalModel
-    similarity: Similarity = AS_MEASURED
-    settings: Settings = field(default_factory=Settings)
-    repeatability: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def driven(self) -> bool:
@@ -400,11 +386,6 @@ class Data:
         return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness}))
 
     @property
-    def wind_on(self) -> bool:
-        """Whether any run of the campaign has the wind on."""
-        return self.model.windy
-
-    @property
     def _sizes(self) -> dict[str, float]:
         return {"frontal_area": self.frontal_area, "reference_length": self.reference_length}
 
@@ -419,65 +400,3 @@ class Data:
         return aerodynamic_stiffness(
             1.0, air_density=runs.air_density, wind_speed=runs.wind_speed, **self._sizes
         )
-
-    def with_runs(self, runs: tuple[RunData, ...]) -> Data:
-        """Other runs of the same campaign, whose model has the same parameters."""
-        return dataclasses.replace(self, runs=runs)
-
-    def undriven(self) -> Data:
-        """The same runs as free decays, whose model has the same parameters."""
-        if not self.driven:
-            return self
-        return self.with_runs(tuple(run.undriven() for run in self.runs))
-
-    def subset(self, keep: tuple[str, ...]) -> Data:
-        """The runs of the given ids."""
-        return self.with_runs(tuple(run for run in self.runs if run.id in keep))
-
-    def alone(self, keep: tuple[str, ...]) -> Data:
-        """The runs of the given ids by themselves, whose model has only the parameters that they show."""
-        runs = self.subset(keep).runs
-        return dataclasses.replace(self, runs=runs, model=self.model.among(runs))
-
-
-def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
-    """Groups of runs to leave out in turn.
-
-    Args:
-        count: number of groups, fewer where there are few runs.
-
-    Returns:
-        Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
-        every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
-        without them. The only run of its kind is in no group.
-    """
-    setting = speed_groups(run.wind_speed for run in data.runs)
-    order = sorted(
-        data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, setting[run.wind_speed])
-    )
-    free = [run for run in order if _covers(data, [run])]
-    count = min(count, len(free))
-    if count < 2:
-        return []
-    groups: list[list[RunData]] = [[] for _ in range(count)]
-    for i, run in enumerate(free):
-        for turn in range(count):
-            group = groups[(i + turn) % count]
-            if _covers(data, [*group, run]):
-                group.append(run)
-                break
-    return [tuple(run.id for run in group) for group in groups if group]
-
-
-def _covers(data: Data, left_out: list[RunData]) -> bool:
-    """Whether the other runs have every spring, wind on and off, and an input of unknown gain, as all runs have."""
-    gone = {run.id for run in left_out}
-
-    def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
-        return (
-            {run.multiplied_by for run in runs},
-            {run.spring_stiffness for run in runs},
-            {run.wind_on for run in runs},
-        )
-
-    return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])

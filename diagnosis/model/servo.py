@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.rig import PerInertia, SpringModel
+from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import Similarity
 from diagnosis.model.starts import responses
 from tunnel_sim.effects import Effect
@@ -21,9 +22,6 @@ from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-
-if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data, RunData
 
 _NO_SPRING = "These effects of a spring are not tried, because the servo is not a spring: {}."
 #: Why play is not tried where a servo holds the joint.
@@ -84,7 +82,7 @@ class _OfServo(NominalModel):
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
         """Effects of a spring, and play."""
-        play = [kind for kind in kinds if kind.parts]
+        play = [kind for kind in kinds if kind.has_backlash]
         of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
         left = [kind for kind in kinds if kind not in (*play, *of_spring)]
         return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)
@@ -95,7 +93,7 @@ class _OfServo(NominalModel):
             {**values, "mechanical_damping": values["mechanical_damping"] + self.kv}, runs
         )
 
-    def unseen(self, data: Data) -> Sequence[str]:
+    def unseen(self, data: PreparedRuns) -> Sequence[str]:
         """The two dampers."""
         del data
         which = (
@@ -103,7 +101,7 @@ class _OfServo(NominalModel):
         )
         return (f"{which}: only its sum with the joint's damping is visible",)
 
-    def planned_springs(self, data: Data) -> tuple[float, ...]:
+    def planned_springs(self, data: PreparedRuns) -> tuple[float, ...]:
         """None: the servo cannot be exchanged."""
         del data
         return ()
@@ -130,7 +128,7 @@ class Servo(_OfServo, SpringModel):
         """The kv of the similar campaign."""
         return replace(self, kv=change.similar(self.kv, "N m s/rad"))
 
-    def starts(self, data: Data) -> Iterator[FitStart]:
+    def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Inertia and damping by the response to the command, whose gain is the kp; then as a rig."""
         shown = [
             (run.spring_stiffness / one[1], 2.0 * one[0])

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis.model.parameters import GAIN
+from diagnosis.model.run_data import PreparedRuns, RunData
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
-
-if TYPE_CHECKING:
-    from diagnosis.model.run_data import Data, RunData
 
 _STILL = 0.02  # of the largest swing, below which a run counts as at rest
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
@@ -46,7 +43,7 @@ class Shown:
         return float(np.median(self.squares[self.moving > 0.0]))
 
     @classmethod
-    def of(cls, data: Data, squares: list[float] | None = None) -> Shown:
+    def of(cls, data: PreparedRuns, squares: list[float] | None = None) -> Shown:
         """The quantities shown by the runs of a campaign.
 
         Args:
@@ -76,7 +73,7 @@ class Shown:
         )
 
 
-def decay_squares(data: Data) -> list[float] | None:
+def decay_squares(data: PreparedRuns) -> list[float] | None:
     """Angular frequency squared of the runs by their own decays, 1/s²; None where a run has none, or is driven.
 
     A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
@@ -95,7 +92,7 @@ def decay_squares(data: Data) -> list[float] | None:
     return found
 
 
-def responses(data: Data) -> list[tuple[float, float, float] | None]:
+def responses(data: PreparedRuns) -> list[tuple[float, float, float] | None]:
     """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of every run; None where it shows no resonance.
 
     Of a body without a spring the gain must be positive, in N m of the input.

@@ -19,7 +19,7 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.model.run_data import Data
+from diagnosis.model.data import Data
 from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
 from identification.signal.colour import CYCLES, HANN, LOWEST, Periodogram, levinson, steady
 from tunnel_sim.vocabulary.record import Array

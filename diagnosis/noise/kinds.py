@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.model.data import Data
 from diagnosis.model.fact import Fact
-from diagnosis.model.run_data import Data
 from diagnosis.noise.colour import Colour
 from diagnosis.noise.rounding import Rounding
 from tunnel_sim.vocabulary.record import Array

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.data import Data
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.bands import TESTS, powers
 from tunnel_sim.vocabulary.record import Array

@@ -24,9 +24,9 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.data import FOLDS
 from diagnosis.model.fact import Fact
 from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
-from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.native_friction import native_friction, nearest_polynomial
@@ -267,7 +267,7 @@ def native_closure(
                 continue
             for i, left in enumerate(out):
                 if left.any():
-                    start = point.release[i]
+                    start = point.per_run[i]
                     seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
@@ -412,10 +412,10 @@ def _written_model(
     def actuated(common: Array) -> ActuatorPatch | None:
         if actuator is None or at is None:
             return None
-        return native_actuator(problem, common, chosen.point.release[at], at, actuator, change)
+        return native_actuator(problem, common, chosen.point.per_run[at], at, actuator, change)
 
     def law(common: Array) -> FoundLaw:
-        release = chosen.point.release[still]
+        release = chosen.point.per_run[still]
         made = actuated(common)
         identified = found_law(problem, common, release, noise, still, made, native_only=native_only)
         if given is None:
@@ -445,14 +445,14 @@ def _written_model(
     if (made := identified.patch.actuator) is not None and made.delay > 0.0:
         samples = history_of(made.delay, model.law.step)
         differences += (Fact("delayed control", {"index": made.index, "samples": samples}),)
-    own = list(chosen.point.release)
+    own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         common = chosen.point.common
         own = [_restarted(problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
     spec, written = patched(model, identified.patch, starts)
-    zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
+    zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.per_run]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
     found = PatchedModel.of(EngineModel(model, spec, closure), written, differences, zero)
     return found, identified.patch.by_plugin

@@ -287,7 +287,7 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
     found = []
     for first in (moved, start.common) if formula.delta.any() else (start.common,):
         with suppress(FitError, np.linalg.LinAlgError):
-            found.append(fit(problem, Point(first, base.point.release), base=base))
+            found.append(fit(problem, Point(first, base.point.per_run), base=base))
             if found[-1].excess < base.settings.remainder.first_start * base.excess:
                 break
     best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
@@ -313,7 +313,7 @@ def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Pro
     start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
     own = [start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]]
-    return table, problem, Point(np.concatenate([base.point.common, own]), base.point.release)
+    return table, problem, Point(np.concatenate([base.point.common, own]), base.point.per_run)
 
 
 def effect_table(formula: Formula, name: str) -> dict[str, Any]:

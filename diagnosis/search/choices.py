@@ -53,7 +53,7 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
     sets = [chosen, *others]
     weighing = chosen.fit.settings.weighing
     if chosen.fit.problem.scatter:
-        gap = replace(gap, known=chosen.fit.columns.products.own)
+        gap = replace(gap, deviation_precision=chosen.fit.columns.products.own)
     scale = Scale.of(sets, gap, weighing)
     logs = np.array([scale.weight(one) for one in sets])
     weights = np.exp(logs - logs.max())
@@ -98,4 +98,4 @@ def _exchanged(whole: Fit, severity: str) -> Point:
             common[place] *= factor
         else:
             common[place] = scaled.similar(common[place], one.unit)
-    return Point(common, whole.point.release)
+    return Point(common, whole.point.per_run)

@@ -81,7 +81,7 @@ class Hypothesis:
         problem = self.fit.problem
         found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
         for kind in problem.effects:
-            count = len(kind.own_numbers(problem.instants)) * len(problem.data.runs)
+            count = len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
             if count:
                 found[CHANNELS.index(kind.gains_in())] += gain * count
         return found
@@ -111,9 +111,9 @@ class Hypothesis:
         """
         by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
-        cost = self.fit.scatter_cost(gap.known)
-        compared = self.fit.compared
-        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost, compared)
+        cost = self.fit.scatter_cost(gap.deviation_precision)
+        between = self.fit.shown_between_runs
+        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost, between)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,31 +125,31 @@ class Scale:
         least: χ² by channel, shape (6,), 0 or less.
         chosen: how sets are weighed.
         scatter_cost: of the nominal model, as `ChannelMisfit` has it, dimensionless.
-        known: as `ChannelMisfit` has it, shape (runs, kinds, kinds).
+        deviation_precision: as `ChannelMisfit` has it, shape (runs, kinds, kinds).
     """
 
     misfit: Array
     least: Array
     chosen: WeighingSettings
     scatter_cost: float
-    known: Array
+    deviation_precision: Array
 
     @classmethod
     def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit, chosen: WeighingSettings) -> Scale:
         """The scale of some sets, from the misfit of the nominal model."""
         least = least_excess([h.excess for h in sets])
-        return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost, gap.known)
+        return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost, gap.deviation_precision)
 
     def weight(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of a set."""
-        cost = hypothesis.fit.scatter_cost(self.known)
+        cost = hypothesis.fit.scatter_cost(self.deviation_precision)
         return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
     def weight_of(self, given: FittedSet) -> float:
         """Logarithm of the weight of a set whose misfit is known."""
         costs, left = (given.scatter_cost, self.scatter_cost), given.excess - self.least
         return log_weight(
-            left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.compared
+            left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.shown_between_runs
         )
 
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
@@ -158,12 +158,12 @@ class Scale:
         Args:
             repeating: whether the runs then repeat; else they differ by chance as before.
         """
-        cost = 0.0 if repeating else hypothesis.fit.scatter_cost(self.known)
+        cost = 0.0 if repeating else hypothesis.fit.scatter_cost(self.deviation_precision)
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def with_form(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of the set with one more form and no residual."""
-        cost = hypothesis.fit.scatter_cost(self.known)
+        cost = hypothesis.fit.scatter_cost(self.deviation_precision)
         return self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
 
     def _log_weight(
@@ -172,7 +172,7 @@ class Scale:
         """Logarithm of the weight of a set with a misfit ``left`` and further effects and parameters."""
         count, further = len(of.effects) + effects, of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
-        return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.compared)
+        return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.shown_between_runs)
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
@@ -229,7 +229,7 @@ def turned_back(fitted: Fit) -> Fit:
     if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
         return fitted
     turn = np.pi if fitted.value("zero") < least else -np.pi
-    common, release = fitted.point.common.copy(), fitted.point.release.copy()
+    common, release = fitted.point.common.copy(), fitted.point.per_run.copy()
     common[problem.names.index("zero")] += turn
     common[[problem.names.index(name) for name in signs]] *= -1.0
     release[:, 0] -= turn
@@ -252,14 +252,14 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         tuple(name for name in large.free_forms if name.split(".")[0] in names),
         large.instants,
         large.scatter,
-        large.rod_followed,
+        large.resolve_rod_mode,
     )
     common = [large.names.index(name) for name in problem.names]
     own = [large.parameters.own_names.index(name) for name in problem.parameters.own_names]
     return dataclasses.replace(
         whole,
         problem=problem,
-        point=Point(whole.point.common[common], whole.point.release[:, own]),
+        point=Point(whole.point.common[common], whole.point.per_run[:, own]),
         covariance=whole.covariance[np.ix_(common, common)],
         jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
     )
@@ -347,7 +347,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
         fails.
     """
     first = chosen.fit
-    problem = dataclasses.replace(first.problem, rod_followed=True)
+    problem = dataclasses.replace(first.problem, resolve_rod_mode=True)
     followed = zip(scaled_residuals(problem, first.point), first.residuals, strict=True)
     if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
         # adding the ringing to the slow motion is not exact enough; the confirmation states the error
@@ -365,7 +365,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     elif better.problem.free_forms:
         problem = dataclasses.replace(better.problem, free_forms=())
         values = dict(zip(better.problem.names, better.point.common.tolist(), strict=True))
-        start = Point(np.array([values[name] for name in problem.names]), better.point.release)
+        start = Point(np.array([values[name] for name in problem.names]), better.point.per_run)
         textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
 
@@ -406,7 +406,7 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     freed = dataclasses.replace(problem, free_forms=tuple(name for form in forms for name in form))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
     defaults = {f"{k.name}.{i.name}": i.form_start for k in problem.effects for i in k.parameters() if i.form}
-    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
+    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.per_run)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
         return None  # also where the runs determine no form

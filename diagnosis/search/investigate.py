@@ -16,7 +16,7 @@ from diagnosis.search.disturbed import prepared_undisturbed, together, undisturb
 from diagnosis.search.odd_run import odd_runs
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
-from diagnosis.search.sets import Sets, compared
+from diagnosis.search.sets import Sets, with_near_rivals
 from diagnosis.search.study import Gap, Study
 from diagnosis.search.views import VIEWS
 from diagnosis.search.views.view import View
@@ -70,7 +70,7 @@ def investigate(
         for kind in views:
             view = kind.after(prepared, sets, clock)
             if view is not None:
-                sets = compared(view.sets(clock), rivals, clock)
+                sets = with_near_rivals(view.sets(clock), rivals, clock)
         if sets is None:
             raise ValueError("no view of the runs applies")
         return replace(Study.of_sets(sets, gap, clock), disturbed=disturbed)
@@ -163,7 +163,7 @@ def likeliest_lead(study: Study) -> float:
             for r in problem.data.runs
         )
         tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
-        fitted = try_fit(tried, Point(np.array([whole[name] for name in tried.names]), point.release))
+        fitted = try_fit(tried, Point(np.array([whole[name] for name in tried.names]), point.per_run))
         if fitted is None:
             return 0.0
         totals.append(fitted.total)

@@ -20,11 +20,11 @@ from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, resonance
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import acts_by, likeliest, random_moments, with_response
 from diagnosis.search.random_spectra import SOURCES
 from diagnosis.search.scatter import scattered
@@ -124,8 +124,8 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
         if run.reading.size - first < chosen.disturbed_kept * cycle:
             return None
         data = others.problem.data.with_runs((run.part(first),))
-        start = Point(others.point.common, np.zeros((1, others.point.release.shape[1])))
-        start.release[0, 0] = data.runs[0].reading[0]
+        start = Point(others.point.common, np.zeros((1, others.point.per_run.shape[1])))
+        start.per_run[0, 0] = data.runs[0].reading[0]
         problem = replace(others.problem, data=data)
         slopes = [slope for _, slope in sensitivities(problem, start)]
         _, (left,) = refit_releases(problem, start, slopes)

@@ -16,8 +16,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.blocks import prepare, without_rest, without_start
+from diagnosis.model.data import Data
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour
@@ -33,8 +33,8 @@ from diagnosis.noise.sensor_noise import (
     typical_step,
 )
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.one_more import second_mode_alone
 from diagnosis.search.scatter import as_stated
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate

@@ -15,7 +15,8 @@ from scipy.optimize import minimize
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.data import Data
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.search.random_spectra import (
     BROAD,

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import fdtrc
@@ -21,10 +20,11 @@ from diagnosis.likelihood.normal_equations import by_run
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
-from diagnosis.search.grow import grow, sets_with_one_more
+from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
     ProcessNoise,
     acts_by,
@@ -34,14 +34,12 @@ from diagnosis.search.process_noise import (
     with_response,
 )
 from diagnosis.search.random_spectra import SOURCES, MomentSource
-from diagnosis.search.scatter import settled
+from diagnosis.search.runs_in_view import RunsInView
+from diagnosis.search.scatter import with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from diagnosis.settings import RandomMomentSettings
 from tunnel_sim.effects import Effect
-
-if TYPE_CHECKING:
-    from diagnosis.search.views.view import View
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
@@ -74,7 +72,7 @@ class RandomAnswer:
         return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
 
 
-def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
+def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
     """Try turbulence, vortices with a wandering phase, and the surroundings, under all sets of effects.
 
     Args:
@@ -117,10 +115,10 @@ class _Beside:
     alike: tuple[ProcessNoise, ...]
     top: Hypothesis
     seen: Hypothesis
-    view: View
+    view: RunsInView
 
     @classmethod
-    def found(cls, source: MomentSource, best: Hypothesis, view: View) -> _Beside | None:
+    def found(cls, source: MomentSource, best: Hypothesis, view: RunsInView) -> _Beside | None:
         """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
         top = _settled(best, view, source)
@@ -168,9 +166,9 @@ class _Beside:
         names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
         share, by_channel = excess / view.repeating.gap, excess / view.base.gap * view.gap.excess
         # with a random motion taken for sensor noise, the runs would appear to differ
-        cost = self.top.fit.scatter_cost(view.gap.known)
-        numbers, compared = seen.further_numbers, self.top.fit.compared
-        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, compared=compared)
+        cost = self.top.fit.scatter_cost(view.gap.deviation_precision)
+        numbers, between = seen.further_numbers, self.top.fit.shown_between_runs
+        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, shown_between_runs=between)
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
 
 
@@ -237,7 +235,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     gains = []
     for h in larger:
         kind = able[h.effects[-1]]
-        numbers = 1 + len(kind.own_numbers(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
+        numbers = 1 + len(kind.per_run_parameters(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
         gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
@@ -256,9 +254,9 @@ def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
         return False
     if still:
         left = misfit(best.fit, [np.zeros_like(r) if source.acts(run) else r for run, r in runs]).excess
-        count, compared = len(best.effects) + 1, best.fit.compared
-        costs = best.fit.scatter_cost(scale.known), scale.scatter_cost
-        weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, compared)
+        count, between = len(best.effects) + 1, best.fit.shown_between_runs
+        costs = best.fit.scatter_cost(scale.deviation_precision), scale.scatter_cost
+        weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, between)
         if weight > scale.weight(best):
             return not is_no_noise(best.fit)
     chosen = best.fit.settings.moment
@@ -372,7 +370,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, view: View, source: MomentSource) -> Hypothesis:
+def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypothesis:
     """The best set of effects on rows whose noise includes the response to the random moment.
 
     The given set where no random moment acts or its filter does not settle. The random moment is estimated from
@@ -391,7 +389,7 @@ def _settled(best: Hypothesis, view: View, source: MomentSource) -> Hypothesis:
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
-            base = settled(fit(replace(nominal.problem, data=noisy), nominal.point))
+            base = with_likeliest_widths(fit(replace(nominal.problem, data=noisy), nominal.point))
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
@@ -418,7 +416,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
-        if not kind.own_numbers(1):
+        if not kind.per_run_parameters(1):
             continue
         others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
         start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)
@@ -426,11 +424,11 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
             continue
         sought = fit(start.problem, start.point)
         tried = [known, sought]
-        if sought.point.release.shape == known.point.release.shape:  # else the number of instants differs
-            release = sought.point.release.copy()
+        if sought.point.per_run.shape == known.point.per_run.shape:  # else the number of instants differs
+            release = sought.point.per_run.copy()
             kept = known.chi2 < sought.chi2
             old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))
-            release[kept, new] = known.point.release[kept, old]
+            release[kept, new] = known.point.per_run[kept, old]
             tried.append(fit(sought.problem, Point(sought.point.common, release)))
         known = min(tried, key=lambda f: f.total)
     return replace(hypothesis, fit=known)

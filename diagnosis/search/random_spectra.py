@@ -14,7 +14,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from diagnosis.likelihood.paths import COMMON
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.data import Data
+from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.traits import Condition
 

@@ -22,7 +22,9 @@ _NULL = 1e-9  # singular value, relative to the largest, that counts as zero
 _RANK = 1e-6  # the same for the columns of all effects, which are finite differences
 
 
-def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]) -> float:
+def unexplained_floor(
+    base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]
+) -> float:
     """The least share of the gap that all effects together leave, by linear theory.
 
     Args:
@@ -37,7 +39,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
         return 0.0
     able = may_scatter(between_runs, base.problem.data)
     problem, point = with_deviations(base.problem, base.point, tuple(usual(base, kind) for kind in able))
-    jacobian = sensitivities(problem, point, base)
+    jacobian = sensitivities(problem, point, base.jacobian)
     bases = [_orthonormal(own) for _, own in jacobian]
 
     def beside(change: Sequence[Array]) -> Array:
@@ -59,7 +61,7 @@ def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence
 
 def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:
     """χ² explained by an effect's phase or instants in every run; 0 for an effect without them."""
-    if not kind.own_numbers(1):
+    if not kind.per_run_parameters(1):
         return 0.0
     return max((start.predicted_drop for start in starting_points(base, kind)), default=0.0)
 

@@ -18,8 +18,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Chance, Scatter
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import ScatterSettings
 from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import Effect
@@ -51,8 +51,8 @@ def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[P
     """
     layered = replace(problem, scatter=scatter)
     first = len(problem.parameters.own) - problem.parameters.of_effects
-    none = np.zeros((len(point.release), len(scatter)))
-    release = np.hstack([point.release[:, :first], none, point.release[:, first:]])
+    none = np.zeros((len(point.per_run), len(scatter)))
+    release = np.hstack([point.per_run[:, :first], none, point.per_run[:, first:]])
     return layered, Point(point.common, release)
 
 
@@ -61,7 +61,7 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     names = fitted.problem.parameters.own_names
     own = fitted.problem.parameters.places(fitted.problem.scatter)
     kept = [place for place in range(len(names)) if place not in own]
-    return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.release[:, kept])
+    return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.per_run[:, kept])
 
 
 def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
@@ -70,7 +70,7 @@ def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
     Args:
         width: of the runs' deviations, relative, dimensionless.
     """
-    run = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
+    run = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 
 
@@ -114,7 +114,7 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
         return None
     layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
-    return None if layered is None else settled(layered)
+    return None if layered is None else with_likeliest_widths(layered)
 
 
 def evident(fitted: Fit) -> Fit:
@@ -189,7 +189,7 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
     problem, point = with_deviations(*without_deviations(fitted), scatter)
     for place, name in enumerate(problem.parameters.own_names):
         if name in names:
-            point.release[:, place] = fitted.point.release[:, names.index(name)]
+            point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
     return try_fit(problem, point, tolerance=_TOLERANCE) or fitted
 
 
@@ -217,7 +217,7 @@ def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
     return replace(prior, usual=usual, decades=decades)
 
 
-def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
+def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
     """A fit whose widths are the likeliest for its residuals; unchanged where it has no such differences."""
     for _ in range(rounds):
         between = fitted.between
@@ -252,7 +252,7 @@ def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
     least = width_prior(fitted.problem).least
     scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
     again = try_fit(*with_deviations(repeating.problem, repeating.point, scatter))
-    again = None if again is None else settled(again)
+    again = None if again is None else with_likeliest_widths(again)
     return again if again is not None and again.unlikelihood < fitted.unlikelihood else fitted
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,17 +13,14 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
+from diagnosis.search.one_more import same_change, sets_with_one_more
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival, Rival
+from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import drifting, with_scatter
 from diagnosis.search.surviving import refusal, refusal_with_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
-
-if TYPE_CHECKING:
-    from diagnosis.search.views.view import View
-
 
 Names = tuple[str, ...]
 
@@ -39,18 +35,18 @@ class Sets:
         random: answers with a random moment that passed its tests.
         rivals: causes from outside the vocabulary, weighed beside the sets.
         refused: by names of refused answers, the reason: effects that the runs do not confirm.
-        left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
-            None.
+        unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
+            else None.
         settled: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer is
             not a fitted set, or is not settled yet.
     """
 
-    view: View
+    view: RunsInView
     hypotheses: tuple[Hypothesis, ...]
     random: tuple[RandomAnswer, ...] = ()
     rivals: tuple[FoundRival, ...] = ()
     refused: Mapping[Names, Fact] = field(default_factory=dict)
-    left_by_all: float | None = None
+    unexplained_floor: float | None = None
     settled: Hypothesis | None = None
 
     @cached_property
@@ -79,7 +75,7 @@ class Sets:
         found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
         if drift is None:
             return found
-        cost = drift.cost(self.view.gap.known) + 2.0 * one.fit.settings.weighing.set_price
+        cost = drift.cost(self.view.gap.deviation_precision) + 2.0 * one.fit.settings.weighing.set_price
         return replace(found, scatter_cost=cost)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
@@ -145,8 +141,8 @@ class Sets:
         return found
 
 
-def compared(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> Sets:
-    """The sets with those that the answer is compared with, without those that the runs do not confirm.
+def with_near_rivals(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> Sets:
+    """Add near rivals; drop sets that the runs do not confirm.
 
     Args:
         rivals: from outside the vocabulary.

@@ -90,8 +90,8 @@ class Study:
         disturbed: disturbed runs, which are left out from the disturbance on.
         between_runs: for an unknown cause, the nominal fit to runs that differ; None where they do not.
         caution: key of the caution about answers found in the view of the runs; empty: none.
-        left_by_all: the least share of the gap that all effects together leave, where that ended the search; else
-            None.
+        unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
+            else None.
         single: by effect of the answer that one run alone can show, that run.
         seconds: wall time by step, s.
     """
@@ -105,7 +105,7 @@ class Study:
     disturbed: tuple[Disturbance, ...] = ()
     between_runs: Fit | None = None
     caution: str = ""
-    left_by_all: float | None = None
+    unexplained_floor: float | None = None
     single: Mapping[str, str] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
 
@@ -240,7 +240,7 @@ class Study:
             rivals=sets.rivals,
             between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
             caution=sets.view.caution,
-            left_by_all=sets.left_by_all,
+            unexplained_floor=sets.unexplained_floor,
             single=single,
             seconds=clock.seconds,
         )

@@ -50,7 +50,7 @@ class FittedSet:
         numbers: number of further parameters: freed forms and instants, less two where gravity replaces a spring.
         outside: whether it is from outside the vocabulary: its probability is added to that of ``unknown``.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
-        compared: number of its effects that only the comparison of runs shows.
+        shown_between_runs: number of its effects that only the comparison of runs shows.
     """
 
     effects: tuple[str, ...]
@@ -59,7 +59,7 @@ class FittedSet:
     numbers: int = 0
     outside: bool = False
     scatter_cost: float = 0.0
-    compared: int = 0
+    shown_between_runs: int = 0
 
 
 def weigh(
@@ -96,7 +96,7 @@ def weigh(
                 s.numbers,
                 chosen,
                 (s.scatter_cost, nominal.scatter_cost),
-                s.compared,
+                s.shown_between_runs,
             )
             for key, s in best.items()
         ]
@@ -194,7 +194,7 @@ def log_weight(
     numbers: int,
     chosen: WeighingSettings,
     scatter_cost: tuple[float, float] = (0.0, 0.0),
-    compared: int = 0,
+    shown_between_runs: int = 0,
 ) -> float:
     """Logarithm of the weight of a set among all sets.
 
@@ -205,10 +205,10 @@ def log_weight(
         numbers: number of further parameters.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, and that of the nominal model.
             The reduction that superfluous effects may bring does not count.
-        compared: number of effects that could reduce it: those that only the comparison of runs shows.
+        shown_between_runs: number of effects that could reduce it: those that only the comparison of runs shows.
     """
     own, nominal = scatter_cost
-    cost = min(own + chosen.needless_scatter * compared, max(own, nominal))
+    cost = min(own + chosen.needless_scatter * shown_between_runs, max(own, nominal))
     price = chosen.set_price * effects + chosen.form_price * numbers + 0.5 * chosen.scatter_exponent * cost
     return -chosen.steepness * log_misfit(left, scale, OF_MOTION, chosen.leak) - price
 

@@ -83,7 +83,7 @@ def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
     values = dict(zip(nominal.problem.names, nominal.point.common.tolist(), strict=True))
     for name, given in parameters.items():
         values[name] = study.similarity.similar(given["value"], infos[name].unit)
-    start = Point(np.array([values[name] for name in problem.names]), nominal.point.release)
+    start = Point(np.array([values[name] for name in problem.names]), nominal.point.per_run)
     return nominal, fit(problem, start)
 
 

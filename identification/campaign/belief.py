@@ -18,15 +18,9 @@ import numpy as np
 from identification.campaign.derivatives import Design, derivatives, loads
 from identification.estimate import PARAMETERS
 from identification.policy import LEAST_ENERGY, SAFE_DEVIATIONS
-from identification.signal.decay_fit import (
-    Reading,
-    RunFit,
-    SharedPrior,
-    fit_decays,
-    information_at,
-    linearised_at,
-)
+from identification.signal.decay_fit import Reading, SharedPrior, fit_decays, information_at, linearised_at
 from identification.signal.free_decay import Decay
+from identification.signal.run_unknowns import RunFit
 from identification.statistics import determined, eliminate, embed, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.record import Array

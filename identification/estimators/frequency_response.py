@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Status
 from identification.signal.decay_fit import Reading, project_run
-from identification.signal.forcing import ANGLE, ANGULAR_RATE, Forced, RunUnknowns
+from identification.signal.forcing import Forced
+from identification.signal.frequency import starting_decay
 from identification.signal.run_fit import Gained, describe_run, identify_run
+from identification.signal.run_unknowns import ANGLE, ANGULAR_RATE, RunUnknowns
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -59,7 +61,7 @@ class FrequencyResponse(RunByRun):
         reading, forcing = bare.reading, bare.reading.forcing
         if bare.fit is None or bare.noise is None or not isinstance(forcing, Forced):
             return RunDecay(bare.estimate)
-        start = forcing.start(run.record)
+        start = forcing.start(run.record, starting_decay)
         lines = _Lines.of(forcing.values, self.segments)
         found = None if start is None else _fitted(reading, forcing, start[forcing.sought], lines)
         if found is not None:

@@ -22,11 +22,12 @@ from identification.campaign.combination import Found, RunByRun, run_estimate
 from identification.estimate import Status, WindowEstimate
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.show.quantity import Quantity
-from identification.signal.decay_fit import Reading, RunFit, even_reading, project_run
+from identification.signal.decay_fit import Reading, even_reading, project_run
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
 from identification.signal.noise import reading_noise
 from identification.signal.run_fit import CYCLES, modal_quantities, residual_check
+from identification.signal.run_unknowns import RunFit
 from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.quantities import Angles

@@ -9,33 +9,23 @@ iterated. With white Gaussian noise this is maximum likelihood. Sources: Golub &
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.policy import LEAST_SAMPLES
-from identification.signal.forcing import (
-    ANGLE,
-    ANGULAR_RATE,
-    FREE,
-    GAIN,
-    RATE,
-    STIFFNESS,
-    ZERO,
-    Free,
-    Rows,
-    RunUnknowns,
-    forcing_of,
-)
+from identification.signal.forcing import FREE, Free, Rows, forcing_of
 from identification.signal.free_decay import Decay
+from identification.signal.run_unknowns import (
+    GAIN,
+    RunFit,
+    RunUnknowns,
+    ZeroKind,
+)
 from identification.statistics import eliminate, embed, inner, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.quantities import Angles, Gain, PerParameter, Vector
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
-
-ZeroKind = Literal["shared", "own", "known"]
-"""Whether the sensor's zero is an unknown of all runs together, of every run, or known."""
 
 _ZERO_FIRST = np.ix_([4, 0, 1], [4, 0, 1])  # of the rows: the zero, unit angle, unit rate
 _TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the iteration ends
@@ -82,33 +72,6 @@ class Reading:
     def from_record(cls, record: Record) -> Reading:
         """The whole record."""
         return cls(read_only(record.time_s - record.time_s[0]), record.yaw_rad)
-
-
-@dataclass(frozen=True, eq=False)
-class RunFit(RunUnknowns):
-    """One run at the optimum.
-
-    Args:
-        residual: reading less model, shape (n,), rad.
-        information: JᵀJ in the local order, shape (5, 5), or (6, 6) with a gain; divide by the noise variance for
-            Fisher's.
-        score: Jᵀ residual, shape (5,) or (6,).
-    """
-
-    residual: Array = field(kw_only=True)
-    information: Array = field(kw_only=True)
-    score: Array = field(kw_only=True)
-
-    @property
-    def coefficients(self) -> list[int]:
-        """Places of a and k, and of the gain where there is one, in the local order."""
-        return [RATE, STIFFNESS, GAIN][: len(self.score) - 3]
-
-    def reduced(self, zero: ZeroKind) -> tuple[Array, Array]:
-        """Information and score of the coefficients, and of a shared zero last; the other unknowns eliminated."""
-        kept = [*self.coefficients, *([ZERO] if zero == "shared" else [])]
-        order = [*kept, *([ZERO] if zero == "own" else []), ANGLE, ANGULAR_RATE]
-        return eliminate(self.information[np.ix_(order, order)], self.score[order], len(kept))
 
 
 @dataclass(frozen=True, eq=False)

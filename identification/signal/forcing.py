@@ -13,25 +13,31 @@ discretisation error, for any damping and any stiffness, zero included.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from scipy.linalg import expm
 
 from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
+from identification.signal.run_unknowns import (
+    ANGLE,
+    ANGULAR_RATE,
+    GAIN,
+    RATE,
+    STIFFNESS,
+    ZERO,
+    RunFit,
+    RunUnknowns,
+    Zero,
+)
 from identification.statistics import determined, eliminate
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.inputs import KnownGain
-from tunnel_sim.vocabulary.quantities import Angles, Gain, Rad, RadPerS, Times, Vector
+from tunnel_sim.vocabulary.quantities import Angles, Gain, Times, Vector
 from tunnel_sim.vocabulary.record import Array, Record
 
-if TYPE_CHECKING:
-    from identification.signal.decay_fit import RunFit
-
-# Local order of one run's unknowns throughout: decay rate, stiffness | zero (or constant acceleration) | initial
-# angle, initial rate | gain of its input, where it has one.
-RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE, GAIN = range(6)
 _OWN = 3  # unknowns of each run besides its coefficients
 _LEAST_SAMPLES = 4  # per unknown; with fewer the residual does not show the noise
 _STATE = 6  # β, β̇, and their derivatives with respect to a and to k
@@ -42,25 +48,9 @@ _GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start o
 
 
 _NO_GAIN = KnownGain()
-Zero: TypeAlias = Annotated[float, "rad, the sensor's; without a spring the constant acceleration, rad/s²"]
 Rows: TypeAlias = Annotated[Array, "shape (rows, n), SI"]
-
-
-@dataclass(frozen=True, eq=False)
-class RunUnknowns:
-    """The unknowns of one run.
-
-    Args:
-        angle: initial angle from the sensor's zero, rad.
-        rate: initial rate, rad/s.
-        gain: of its input; 0 where there is none.
-    """
-
-    decay: Decay
-    zero: Zero
-    angle: Rad
-    rate: RadPerS
-    gain: Gain = 0.0
+FreeStart: TypeAlias = Callable[[Record], Decay | None]
+"""Finds a decay close enough for the fit of a free decay to converge; None where none fits or nothing moves."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,11 +91,13 @@ class Free:
             link[2, 1] = self.known.per_stiffness
         return link
 
-    def start(self, record: Record) -> Array | None:
-        """(a, k, g) from which a fit converges, shape (3,), in SI units; None where nothing oscillates."""
-        from identification.signal.frequency import starting_decay  # only here: it compares fits
+    def start(self, record: Record, free_start: FreeStart) -> Array | None:
+        """(a, k, g) from which a fit converges, shape (3,), in SI units; None where nothing oscillates.
 
-        decay = starting_decay(record)
+        Args:
+            free_start: finds the decay that starts the fit of a free decay.
+        """
+        decay = free_start(record)
         return None if decay is None else np.array([decay.rate, decay.stiffness, 0.0])
 
     def at(self, coefficients: Array) -> tuple[Decay, float]:
@@ -176,8 +168,9 @@ class Forced(Free):
         of_decay = decay.rate, decay.stiffness
         return driven_rows(time, self.values, *of_decay, held=self.held, derivative=self.derivative)
 
-    def start(self, record: Record, *, sprung: bool = True) -> Array | None:
+    def start(self, record: Record, free_start: FreeStart, *, sprung: bool = True) -> Array | None:
         """(a, k, g) from which a fit converges, shape (3,), in SI units; None where nothing oscillates."""
+        del free_start
         reading = record.time_s, record.yaw_rad
         start = driven_start(*reading, self.values, sprung=sprung, derivative=self.derivative)
         return None if start is None or (sprung and not start[1] > 0.0) else np.array(start)
@@ -230,9 +223,9 @@ class Loose(Forced):
         """Places in (a, k, g) of the unknowns of the run alone."""
         return [0, 2]
 
-    def start(self, record: Record, *, sprung: bool = False) -> Array | None:
+    def start(self, record: Record, free_start: FreeStart, *, sprung: bool = False) -> Array | None:
         """(a, 0, g) from which a fit converges, shape (3,), in SI units; None where nothing moves."""
-        start = super().start(record, sprung=sprung)
+        start = super().start(record, free_start, sprung=sprung)
         if start is not None:
             start[0] = max(start[0], -_GROWTH / record.duration)
         return start

@@ -22,11 +22,11 @@ from identification.policy import (
 )
 from identification.show.quantity import Quantity
 from identification.signal.colour import Autoregression
-from identification.signal.decay_fit import DecayFit, Reading, RunFit, fit_decays, fit_run
-from identification.signal.forcing import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO
+from identification.signal.decay_fit import DecayFit, Reading, fit_decays, fit_run
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
 from identification.signal.noise import ReadingNoise, Residual, noise_of, samples_in_cycle, slow_power
+from identification.signal.run_unknowns import ANGLE, ANGULAR_RATE, RATE, STIFFNESS, ZERO, RunFit
 from identification.statistics import determined, eliminate, inner, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -112,7 +112,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     forcing = reading.forcing
     if reading.time.size < forcing.least_samples:
         return FittedRun.failed(run, reading, Status.NOT_DETERMINED)
-    start = forcing.start(run.record)
+    start = forcing.start(run.record, starting_decay)
     if start is None:
         return FittedRun.failed(run, reading, Status.NO_OSCILLATION)
     fit = fit_from(run, reading, start)

@@ -22,8 +22,8 @@ from identification.campaign.run_scatter import moves_of
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import Reading, information_at, run_at, shared_system
 from identification.signal.filter import discretised, steady_filters
-from identification.signal.forcing import RunUnknowns
 from identification.signal.free_decay import Decay
+from identification.signal.run_unknowns import RunUnknowns
 from identification.statistics import eliminate, inverse
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, Run

@@ -1,8 +1,12 @@
 // Elementary functions: by arithmetic alone for runs side by side, which compute them together, and by the library for
-// one run. They differ by the last digits. law.h includes this file for its width.
+// one run. They differ by the last digits.
 
 #ifndef VWT_ELEMENTARY_H_
 #define VWT_ELEMENTARY_H_
+
+#include <math.h>
+
+#include "lane.h"
 
 #ifndef LAW_LANES
 INLINE Lane sine(Lane angle) { return sin(angle); }

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "expression.h"
 #include "lanes.h"
 
 // Of x > 0 by arithmetic; elsewhere by the library, with its signs and its values that are not finite. Only the lanes

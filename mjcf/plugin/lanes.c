@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "expression.h"
 #include "lanes.h"
 
 // Whether the root of a spring moves as far as the input says, where it moves.

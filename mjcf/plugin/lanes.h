@@ -6,6 +6,8 @@
 
 #include <math.h>
 
+#include "moment.h"
+#include "plain.h"
 #include "step.h"
 
 #define LAW_LANES VWT_LANES

@@ -7,6 +7,7 @@
 
 #include <math.h>
 
+#include "forward.h"
 #include "stages.h"
 
 // What a step makes of a change of its start, and of a term's at its stages, in the angle or in the rate at its end.

@@ -1,9 +1,10 @@
-// The state of one run within a step of the forward integrator, which forward.c and lanes.c share.
+// The state of one run within a step of the forward integrator, which forward.c and lanes.c share (step.c).
 
 #ifndef VWT_STEP_H_
 #define VWT_STEP_H_
 
-#include "forward.h"
+#include "parameters.h"
+#include "run.h"
 
 typedef struct {
   double angle, rate, twist, twist_rate;
@@ -53,28 +54,14 @@ Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weight
 // The drive from the step's start on. Returns the time of its next sample, s, or infinity after the last.
 double vwt_set_drive(Step* s);
 
+// One step without Coulomb friction.
+void vwt_step(Step* s, double h);
+
 // One step with Coulomb friction: it ends early at each reversal, where the body sticks or slips back.
 void vwt_step_with_friction(Step* s, double h);
 
 // Samples within a step of length h that covers `stride` of them, from sample `at` on; cubic (Hermite).
 void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
               double* rate);
-
-// Runs that `vwt_forward` may integrate side by side: no imposed moment, a wind that is constant where the air has a
-// lag or sheds vortices, a drive whose samples are at the starts of steps, and neither a lag nor Dahl's friction with
-// a rod that twists.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define VWT_WIDE 1  // a loader that chooses code by processor; a sanitizer is not ready when it does
-enum { VWT_LANES = 8 };
-#else
-#define VWT_WIDE 0
-enum { VWT_LANES = 4 };
-#endif
-int vwt_is_plain(const vwt_parameters* p, const vwt_run* run);
-int vwt_alike(const vwt_parameters* p, const vwt_run* one, const vwt_parameters* q, const vwt_run* other);
-
-// Integrates up to `VWT_LANES` plain runs that are alike. Returns as `vwt_forward`.
-int vwt_integrate_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
-                        double* const* rate);
 
 #endif  // VWT_STEP_H_

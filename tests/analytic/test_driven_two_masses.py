@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model
@@ -104,7 +105,7 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool, on_body: bool, t
     problem = Problem(
         Data((data,), body.frontal_area, body.length, body.width, SpringModel().among((data,))),
         (effect_class("rod_flexibility"),),
-        rod_followed=followed,
+        resolve_rod_mode=followed,
     )
     common = np.array([INERTIA, DAMPING, 0.5, -0.11, 0.0, COMPLIANCE, SHARE])
     found = problem.predict([Point(common, np.array([start]))])[0][0]

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.support.sources import ROOT, parsed
+
 PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["root_packages"]
 STEPPED_IN_PLACE = 2
 STILL_COMPARED = {"diagnosis/likelihood/problem.py: Point", "diagnosis/likelihood/residuals.py: Line"}
@@ -18,7 +19,7 @@ STILL_COMPARED = {"diagnosis/likelihood/problem.py: Point", "diagnosis/likelihoo
 
 def dataclasses_of(path: Path) -> Iterator[tuple[str, tuple[ast.ClassDef, dict[str, str]]]]:
     """Name of every dataclass of a module, its class, and the options it is made with."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(parsed(path)):
         for mark in getattr(node, "decorator_list", []) if isinstance(node, ast.ClassDef) else []:
             call = mark if isinstance(mark, ast.Call) else ast.Call(mark, [], [])
             if ast.unparse(call.func).rpartition(".")[2] == "dataclass":

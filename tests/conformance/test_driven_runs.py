@@ -183,7 +183,7 @@ def test_a_part_of_a_run_keeps_its_input() -> None:
     data = prepare(similar, {run.id: NOISE["angle"] ** 2 for run in similar.runs}, change)
     found = fit(Problem(data), nominal_start(data))
     later = data.with_runs(tuple(run.part(300) for run in data.runs))
-    again = fit(Problem(later), Point(found.point.common, np.zeros_like(found.point.release)))
+    again = fit(Problem(later), Point(found.point.common, np.zeros_like(found.point.per_run)))
     assert abs(again.excess) < 0.15
 
 

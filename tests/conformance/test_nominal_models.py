@@ -14,10 +14,10 @@ from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
+from diagnosis.model.data import Data
 from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.prepared import fit_nominal
@@ -158,7 +158,7 @@ def test_parameters_are_stated_once_with_units_and_a_start_inside_their_range(
     point = parameters.point(start.common, start.own)
     low, high = parameters.bounds
     assert np.all((low <= point.common) & (point.common <= high))
-    assert point.release.shape == (len(problem.data.runs), len(parameters.own))
+    assert point.per_run.shape == (len(problem.data.runs), len(parameters.own))
 
 
 def test_gradients_of_its_coefficients_are_their_slopes(fitted: tuple[Case, Fit]) -> None:

@@ -12,9 +12,10 @@ from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour

@@ -26,10 +26,11 @@ from identification.campaign.belief import (
     update_belief,
 )
 from identification.estimate import PARAMETERS, UNITS
-from identification.signal.decay_fit import Reading, RunFit
+from identification.signal.decay_fit import Reading
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.noise import stated_noise
 from identification.signal.run_fit import identify_run
+from identification.signal.run_unknowns import RunFit
 from tunnel_lab.envs.menu import WHERE, Costs, Menu, RunChoice, refusal
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate

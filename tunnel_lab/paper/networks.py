@@ -30,7 +30,7 @@ from identification.show.style import (
     styled,
 )
 from identification.signal.free_decay import Decay, response_rows
-from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
+from tunnel_lab.paper.paper_page import PaperPicture, PaperSection, signed
 from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -85,7 +85,7 @@ def figure_3(folder: Path) -> PaperSection:
             "least possible where the damping is light: see the tutorial on the paper's networks.",
         ),
         pictures=(
-            Picture(
+            PaperPicture(
                 file="network-errors.png", caption="Errors of both networks; each point is one response."
             ),
         ),
@@ -136,7 +136,7 @@ def table_3(folder: Path) -> PaperSection:
         ),
         rows=rows,
         pictures=(
-            Picture(file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."),
+            PaperPicture(file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."),
         ),
     )  # fmt: skip
 
@@ -226,7 +226,7 @@ def figures_4_to_6(folder: Path) -> PaperSection:
             "mean over windows, which follow the decay to small amplitudes, and not the network itself.",
         ),
         pictures=(
-            Picture(
+            PaperPicture(
                 file="responses.png",
                 caption="The record; a magnified part with the responses; and the residuals.",
             ),

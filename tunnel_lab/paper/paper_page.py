@@ -26,7 +26,7 @@ Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 
 @dataclass(frozen=True)
-class Picture:
+class PaperPicture:
     """A PNG in the page's folder, for figures with a PDF beside it, and its caption."""
 
     __pydantic_config__ = _STRICT
@@ -49,7 +49,7 @@ class PaperSection:
     words: tuple[str, ...]
     headings: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[PaperPicture, ...] = ()
 
 
 def signed(value: float, digits: int) -> str:

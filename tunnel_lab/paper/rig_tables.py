@@ -17,7 +17,7 @@ from identification.show.numbers import concise, with_std
 from identification.show.style import BLUE, COLOURS, VERMILION, WIDTH, figure, grid, save_both, styled
 from identification.signal.free_decay import Decay, free_decay
 from tunnel_lab.paper.networks import paper_run_plan
-from tunnel_lab.paper.paper_page import PaperSection, Picture, scaled, signed
+from tunnel_lab.paper.paper_page import PaperPicture, PaperSection, scaled, signed
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -122,7 +122,9 @@ def table_2(folder: Path) -> PaperSection:
         ),
         rows=rows,
         pictures=(
-            Picture(file="springs.png", caption="Table II with its line, and the residuals of the springs."),
+            PaperPicture(
+                file="springs.png", caption="Table II with its line, and the residuals of the springs."
+            ),
         ),
     )
 
@@ -170,11 +172,13 @@ def figure_1(folder: Path) -> PaperSection:
     from tunnel_lab.show.film import Look, Request, write_film
 
     words = "The paper shows a photograph. This is the virtual rig of the same sizes."
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[PaperPicture, ...] = ()
     try:
         write_film(Request(), Look(height=600, trace=False), folder / "rig.png", at=0.0)
         pictures = (
-            Picture(file="rig.png", caption="The virtual rig: the Davis model on its rod, yawed by 20°."),
+            PaperPicture(
+                file="rig.png", caption="The virtual rig: the Davis model on its rod, yawed by 20°."
+            ),
         )
     except TunnelError as error:
         words += f" It could not be drawn here: {error}."
@@ -203,7 +207,9 @@ def figure_2(folder: Path) -> PaperSection:
             "complete depend on ζ too. The networks here divide the record at its zero crossings instead, "
             "so that ωn need not be known.",
         ),
-        pictures=(Picture(file="impulse.png", caption="Impulse responses, scaled to a largest value of 1."),),
+        pictures=(
+            PaperPicture(file="impulse.png", caption="Impulse responses, scaled to a largest value of 1."),
+        ),
     )
 
 

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Option
 
+from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet
 from tunnel_sim.vocabulary.errors import (
     TunnelError,
     did_you_mean,
@@ -118,8 +118,6 @@ def parse_effect(text: str) -> EffectSetting:
 
 EVERY = "As for every command"
 """The part of the help that lists the options common to all commands."""
-quiet: ContextVar[bool] = ContextVar("quiet", default=False)
-"""Whether this command prints errors only."""
 
 
 def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
@@ -261,19 +259,6 @@ def output_file(flag: str, *endings: str, help: str, panel: str | None = None) -
     """An option for a file to write, with one of these endings, such as ``.html``."""
     path = f"FILE{endings[0]}"
     return Option(flag, callback=ending(*endings), metavar=path, help=help, rich_help_panel=panel)
-
-
-class TableFormat(StrEnum):
-    """Format of printed tables."""
-
-    TEXT = "text"
-    CSV = "csv"
-    MD = "md"
-    JSON = "json"
-
-
-chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
-"""The format of this command's tables."""
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from identification.show.blocks import Block, TextTable, brief, lines
-from tunnel_lab.terminal.arguments import TableFormat, chosen, quiet
+from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet
 from tunnel_lab.terminal.table_layout import in_columns, is_too_wide, rendered, stacked
 
 

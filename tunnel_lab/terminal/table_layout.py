@@ -15,8 +15,8 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from identification.show.blocks import TextTable, as_markdown
-from tunnel_lab.terminal.arguments import TableFormat
 from tunnel_lab.terminal.encoding import printable_json
+from tunnel_lab.terminal.table_format import TableFormat
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 PROSE = 30

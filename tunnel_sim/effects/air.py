@@ -326,7 +326,7 @@ class VortexShedding(Effect):
     example = (0.1, 0.02)
     autonomous = False
     line = "shedding"
-    keeps_time = "strouhal_number"
+    frequency_by_wind = "strouhal_number"
     random = "narrow_band"
 
     amplitude: float = parameter(

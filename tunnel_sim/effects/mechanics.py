@@ -82,7 +82,7 @@ class FreePlay(Effect):
     on_spring = True
     jumps = True
     size = "play of {half_width} to each side between spring and rod"
-    parts = True
+    has_backlash = True
     advice = "Remove the play between spring and rod"
     advice_for_joint = "Remove the play in the gear of the joint, or add it to the model"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"

@@ -64,7 +64,7 @@ def check_described(kind: object) -> None:
         except TunnelError as error:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-    if kind.own_numbers(1) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
+    if kind.per_run_parameters(1) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
         what = "has a phase or instants in every run, and does not state how they are found"
         raise TunnelError(what, where=where, remedy="override sought")
     if kind.random and len(kind.parameters()) != _OF_SPECTRUM:

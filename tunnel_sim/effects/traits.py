@@ -37,7 +37,7 @@ class Traits:
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
     - ``fitted``: whether a fit of the deterministic motion can find it; else records or spectra show it.
     - ``on_spring``: whether its moment is proportional to the spring's stiffness.
-    - ``parts``: whether it separates the body from its support, as play does.
+    - ``has_backlash``: whether it separates the body from its support, as play does.
     - ``driven``: whether it acts on driven runs only.
     - ``delays``: whether it shifts the input of driven runs in time.
     - ``of_moment``: whether it changes an input that an actuator exerts, not the motion of a root or a base.
@@ -46,8 +46,8 @@ class Traits:
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the property of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
       ``mechanical_damping``; empty: none.
-    - ``keeps_time``: the parameter of the moment law whose frequency is proportional to the wind speed; empty:
-      none.
+    - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
+      empty: none.
     - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
       integration step across it is less accurate, and the tests allow for this.
     - ``remembers``: whether a reading depends on earlier samples.
@@ -80,14 +80,14 @@ class Traits:
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     on_spring: ClassVar[bool] = False
-    parts: ClassVar[bool] = False
+    has_backlash: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     delays: ClassVar[bool] = False
     of_moment: ClassVar[bool] = False
     by_angle_in_room: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""
-    keeps_time: ClassVar[str] = ""
+    frequency_by_wind: ClassVar[str] = ""
     jumps: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
@@ -150,7 +150,7 @@ class Traits:
         return float(getattr(self, self.parameters()[0].name))
 
     @classmethod
-    def own_numbers(cls, instants: int) -> tuple[str, ...]:
+    def per_run_parameters(cls, instants: int) -> tuple[str, ...]:
         """Names of the effect's unknowns of every run: the phase of a periodic effect, or instants.
 
         Args:
@@ -167,7 +167,7 @@ class Traits:
         Args:
             instants: number of instants of an effect that skips samples.
         """
-        return len(cls.own_numbers(instants)) if cls.skips else 0
+        return len(cls.per_run_parameters(instants)) if cls.skips else 0
 
     @classmethod
     def gains_in(cls) -> Literal["frequency", "harmonics"]:

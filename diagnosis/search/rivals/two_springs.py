@@ -16,8 +16,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.rivals.rival import Rival
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import misfit
-from diagnosis.model.run_data import Data
+from diagnosis.model.data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, converged, polish, restricted
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
@@ -74,21 +74,25 @@ class Beginnings(WholeRuns):
         begun = try_fit(replace(problem, data=beginnings(problem.data, length)), view.base.point)
         return None if begun is None else replace(view, base=begun)
 
-    def holds(self, sets: Sets) -> bool:
+    def holds(self, answer: Hypothesis | None, settled: Hypothesis | None) -> bool:
         """Whether the answer is a set that explains whole runs as well as their beginnings.
 
         If not, an effect that acts later on could pay its price. Chance differences between the runs imitate an
         effect that seldom acts, so that whole runs decide between the two.
+
+        Args:
+            answer: fitted to the beginnings; None: the answer is not a fitted set.
+            settled: the same, fitted to whole runs.
         """
-        begun, whole, weighing = sets.answer, sets.settled, self.base.settings.weighing
+        weighing = self.base.settings.weighing
 
         def left(fit: Fit, nominal: Fit) -> float:
             scale = misfit_scale(misfit(nominal), weighing)
             return log_misfit(misfit(fit).excess, scale, OF_MOTION, weighing.leak)
 
-        if begun is None or whole is None or begun.fit.problem.scatter or whole.fit.problem.scatter:
+        if answer is None or settled is None or answer.fit.problem.scatter or settled.fit.problem.scatter:
             return False
-        more = left(whole.fit, self.prepared.nominal) - left(begun.fit, self.repeating)
+        more = left(settled.fit, self.prepared.nominal) - left(answer.fit, self.repeating)
         return weighing.steepness * more < weighing.set_price
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
@@ -138,7 +142,9 @@ class AfterBeginnings(View):
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The view after that of the beginnings, where their answer holds in whole runs."""
         del prepared, clock
-        if known is None or not isinstance(known.view, Beginnings) or not known.view.holds(known):
+        if known is None or not isinstance(known.view, Beginnings):
+            return None
+        if not known.view.holds(known.answer, known.settled):
             return None
         return cls(known.view.prepared, known.view.prepared.nominal, known)
 

@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.model.run_data import Data
+from diagnosis.model.data import Data
 from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis

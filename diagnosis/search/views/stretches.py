@@ -18,12 +18,12 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.starting_points import misses_motion
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import Progress, StepClock
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, with_forms
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared, fit_nominal
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
@@ -122,7 +122,7 @@ def fit_longer(
     longest = max(run.reading.size for run in data.runs)
     goal = longest if length is None else min(length, longest)
     while stretches.length < goal:
-        known = dict(zip(stretches.places, found.point.release, strict=True))
+        known = dict(zip(stretches.places, found.point.per_run, strict=True))
         longer = in_stretches(data, min(stretches.length * _LONGER, goal)).only(known)
         if longer.length >= longest:
             longer = Stretches(data, tuple((i, 0) for i in range(len(data.runs))), longest)

@@ -18,13 +18,13 @@ from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
-from diagnosis.search.reach import left_by_all
+from diagnosis.search.reach import unexplained_floor
 from diagnosis.search.scatter import (
     evident,
     likelier,
     scattered,
-    settled,
     with_deviations,
+    with_likeliest_widths,
     without_deviations,
 )
 from diagnosis.search.sets import Sets, prune
@@ -50,7 +50,7 @@ class WholeRuns(View):
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view, or one after a view whose answer does not hold in whole runs."""
         del clock
-        if known is not None and known.view.holds(known):
+        if known is not None and known.view.holds(known.answer, known.settled):
             return None
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
@@ -117,7 +117,7 @@ class WholeRuns(View):
             ]
         if explained:
             return _with_moments(self._beside_scatter(likely, self.likeliest_part(explained), clock), clock)
-        found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
+        found = Sets(self, tuple(grown), unexplained_floor=beyond[0] if beyond else None)
         beside: Sets | None = None
         if found.weighed[0].effects == UNKNOWN and not beyond and self.scattering is not None:
             beside = self._beside_scatter(likely, None, clock)
@@ -137,7 +137,7 @@ class WholeRuns(View):
         chosen, gap = self.base.settings.search, self.base.total - self.base.count
         if any(not one.effects or one.fit.total - one.fit.count < chosen.reach_from * gap for one in level):
             return []
-        left = left_by_all(self.base, self.able, self.prepared.kinds)
+        left = unexplained_floor(self.base, self.able, self.prepared.kinds)
         return [left] if left > chosen.out_of_reach else []
 
     def beside(self, one: Hypothesis) -> Hypothesis | None:
@@ -160,11 +160,11 @@ class WholeRuns(View):
         fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, scatter))
         if fitted is None:
             return None
-        found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
+        found = replace(one, fit=with_likeliest_widths(fitted), textbook=None, repeating=one.fit)
         share = self.base.settings.search.nearly_explained
         if not found.explains_runs and self._leaves_less(found, share):
             (found,) = with_forms([found], self._scattering_gap, 0.0)
-        return replace(found, fit=settled(found.fit))
+        return replace(found, fit=with_likeliest_widths(found.fit))
 
     def _leaves_less(self, beside: Hypothesis, share: float) -> bool:
         """Whether a set beside chance differences leaves less than a share of the gap within runs."""
@@ -188,7 +188,9 @@ class WholeRuns(View):
 
     def _settled_beside(self, part: Hypothesis) -> Hypothesis:
         """A part of a set beside chance differences between the runs, with its own widths."""
-        return replace(part, fit=settled(part.fit), repeating=try_fit(*without_deviations(part.fit)))
+        return replace(
+            part, fit=with_likeliest_widths(part.fit), repeating=try_fit(*without_deviations(part.fit))
+        )
 
     def _explains(self, beside: Hypothesis) -> bool:
         """Whether a set beside chance differences explains the runs up to chance and an error of its form."""

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import Data, folds
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData, folds
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.patch.patched_model import native_closure
 from tests.support.gap_campaigns import nominal

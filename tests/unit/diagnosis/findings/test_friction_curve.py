@@ -27,7 +27,7 @@ def fitted(records, *forms):
         base.problem.data, (FRICTION,), free_forms=tuple(f"coulomb_friction.{f}" for f in forms)
     )
     start = np.concatenate([base.point.common, [0.004, 0.5, 0.5][: 1 + len(forms)]])
-    return base, fit(problem, Point(start, base.point.release))
+    return base, fit(problem, Point(start, base.point.per_run))
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ def refitted(base, one):
     kind = effect_class(one.effect)
     severity = f"{kind.name}.{one.parameter}"
     problem = Problem(base.problem.data, (kind,), ((severity, one.size.value),))
-    return fit(problem, Point(base.point.common.copy(), base.point.release.copy()))
+    return fit(problem, Point(base.point.common.copy(), base.point.per_run.copy()))
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_a_refit_at_the_largest_size_is_four_units_above_the_least(name):
     again = refitted(base, found[name])
     free = fit(
         Problem(base.problem.data, (effect_class(name),)),
-        Point(np.append(base.point.common, 0.5 * found[name].size.value), base.point.release),
+        Point(np.append(base.point.common, 0.5 * found[name].size.value), base.point.per_run),
     )
     likeliest = free.value(f"{name}.{found[name].parameter}")
     least = (
@@ -113,7 +113,7 @@ def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
         start = chosen.point.common.copy()
         start[chosen.problem.names.index("cn_r")] += factor * lag.size.value * CN_BETA
         rises.append(
-            fit(problem, Point(start, chosen.point.release.copy())).unlikelihood - chosen.unlikelihood
+            fit(problem, Point(start, chosen.point.per_run.copy())).unlikelihood - chosen.unlikelihood
         )
     assert 1.0 <= rises[0] + lag.significance**2 <= 7.0
     assert rises[1] > 16.0

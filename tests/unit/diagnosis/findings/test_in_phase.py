@@ -23,7 +23,7 @@ def test_the_sum_is_determined_far_better_than_its_parts(lag):
     data = campaign(effect_from(LAG.name, {"lag": lag}))
     base = nominal(data)
     found = fit(
-        Problem(base.problem.data, (LAG,)), Point(np.append(base.point.common, lag), base.point.release)
+        Problem(base.problem.data, (LAG,)), Point(np.append(base.point.common, lag), base.point.per_run)
     )
     estimates, covariance = in_phase(found)
     matrix = np.array(covariance)

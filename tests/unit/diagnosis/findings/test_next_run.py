@@ -74,7 +74,7 @@ def shedding():
     common = np.append(base.point.common, [values[name] for name in problem.effect_names])
 
     def at(phase):
-        release = np.column_stack([base.point.release, np.full(len(base.problem.data.runs), phase)])
+        release = np.column_stack([base.point.per_run, np.full(len(base.problem.data.runs), phase)])
         return replace(base, problem=problem, point=Point(common, release))
 
     return base, at
@@ -98,7 +98,7 @@ def test_a_rival_s_phase_is_refitted(shedding):
     column = weak.problem.names.index("vortex_shedding.amplitude")
     common = strong.point.common.copy()
     common[column] *= 1.5
-    strong = replace(strong, point=Point(common, strong.point.release))
+    strong = replace(strong, point=Point(common, strong.point.per_run))
     alone = separation(base, weak, run, 0.35)
     assert separation(weak, strong, run, 0.35) == pytest.approx(0.5 * alone, rel=0.05)
 
@@ -112,7 +112,7 @@ def test_the_separation_is_the_least_over_the_rival_s_phases(shedding):
     common[second.problem.names.index("vortex_shedding.strouhal_number")] += (
         0.5 * 0.225 / (20.0 * np.pi * 10.0)
     )
-    second = replace(second, point=Point(common, second.point.release))
+    second = replace(second, point=Point(common, second.point.per_run))
 
     def reading(one, phase, angle=0.35, rate=0.0):
         problem = Problem(one.problem.data.with_runs((run,)), one.problem.effects)

@@ -14,10 +14,11 @@ from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.data import Data
 from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import SpringModel
-from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.settings import Settings
@@ -207,7 +208,7 @@ def test_a_wrong_forward_integrator_would_be_found_out(fits, monkeypatch):
     honest = Problem.predict
 
     def off(self, points):
-        moved = [Point(np.concatenate([[p.common[0] * 1.0005], p.common[1:]]), p.release) for p in points]
+        moved = [Point(np.concatenate([[p.common[0] * 1.0005], p.common[1:]]), p.per_run) for p in points]
         return honest(self, moved)
 
     monkeypatch.setattr(Problem, "predict", off)
@@ -219,13 +220,13 @@ def test_a_wrong_forward_integrator_would_be_found_out(fits, monkeypatch):
 
 def test_releases_are_refitted_run_by_run(fits):
     base, _ = fits
-    point = Point(base.point.common, base.point.release + np.array([[2e-3, 0.0]]))
+    point = Point(base.point.common, base.point.per_run + np.array([[2e-3, 0.0]]))
     slopes = [release for _, release in sensitivities(base.problem, base.point)]
     found, residuals = refit_releases(base.problem, point, slopes)
     assert isinstance(base, Fit)
     chi2 = [float(r @ r) for r in residuals]
     np.testing.assert_allclose(chi2, base.chi2, rtol=1e-4)
-    np.testing.assert_allclose(found.release, base.point.release, atol=2e-5)
+    np.testing.assert_allclose(found.per_run, base.point.per_run, atol=2e-5)
 
 
 def test_a_run_that_grows_without_bound_keeps_its_release(fits):
@@ -234,6 +235,6 @@ def test_a_run_that_grows_without_bound_keeps_its_release(fits):
     common = base.point.common.copy()
     common[base.problem.names.index("mechanical_damping")] = -50.0
     slopes = [release for _, release in base.jacobian]
-    found, residuals = refit_releases(base.problem, Point(common, base.point.release), slopes)
+    found, residuals = refit_releases(base.problem, Point(common, base.point.per_run), slopes)
     assert not any(np.all(np.isfinite(r)) for r in residuals)
-    assert np.array_equal(found.release, base.point.release)
+    assert np.array_equal(found.per_run, base.point.per_run)

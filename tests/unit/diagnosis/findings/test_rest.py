@@ -46,7 +46,7 @@ def halves(base, select):
     runs = base.problem.data.runs
     chosen = [i for i, run in enumerate(runs) if select(run)]
     part = Problem(base.problem.data.with_runs(tuple(runs[i] for i in chosen)))
-    return fit(part, Point(base.point.common, base.point.release[chosen]))
+    return fit(part, Point(base.point.common, base.point.per_run[chosen]))
 
 
 def test_the_move_is_half_the_difference_between_halves_of_the_data(base):
@@ -125,7 +125,7 @@ def test_what_chance_explains_is_never_material(data, base):
 
 
 def with_effect(base):
-    return Point(np.append(base.point.common, 0.003), base.point.release)
+    return Point(np.append(base.point.common, 0.003), base.point.per_run)
 
 
 def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
@@ -247,7 +247,7 @@ def only(fitted, data):
 def test_a_spring_at_its_bound_does_not_matter_where_gravity_holds_the_body(data):
     runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])
     base = nominal(replace(data, runs=runs))
-    least = Point(np.array([0.0, 0.0, *base.point.common[2:]]), base.point.release)
+    least = Point(np.array([0.0, 0.0, *base.point.common[2:]]), base.point.per_run)
     alone = only(replace(base, point=least), data)
     assert [alone[name].bound for name in ("omega_n", "zeta")] == ["lower", "lower"]
     assert alone["zeta"].std is None
@@ -255,7 +255,7 @@ def test_a_spring_at_its_bound_does_not_matter_where_gravity_holds_the_body(data
     values = dict(zip(base.problem.names, least.common, strict=True))
     values["gravity_stiffness.stiffness"] = base.value("stiffness")
     common = np.array([values.get(name, 0.0) for name in problem.names])
-    held = fit(problem, Point(common, base.point.release), max_iterations=1)
+    held = fit(problem, Point(common, base.point.per_run), max_iterations=1)
     found = only(held, data)["omega_n"]
     assert found.bound is None
     assert found.value == pytest.approx(np.sqrt(base.value("stiffness")), rel=0.01)

@@ -21,7 +21,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.model.run_data import FOLDS
+from diagnosis.model.data import FOLDS
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.random_moments import RandomAnswer
@@ -102,7 +102,7 @@ def test_what_is_left_out_of_a_fit_cannot_change_it(base):
     point, _ = fit_seen(base, seen)
     spoilt_point, _ = fit_seen(other, seen)
     assert np.array_equal(point.common, spoilt_point.common)
-    assert np.array_equal(point.release, spoilt_point.release)
+    assert np.array_equal(point.per_run, spoilt_point.per_run)
     assert not np.array_equal(point.common, base.point.common)
 
 

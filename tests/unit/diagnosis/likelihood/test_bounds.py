@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.record import Record
 def _at(value: float) -> Fit:
     fit = nominal(campaign())
     problem = Problem(fit.problem.data, (effect_class("coulomb_friction"),))
-    point = Point(np.append(fit.point.common, value), fit.point.release)
+    point = Point(np.append(fit.point.common, value), fit.point.per_run)
     return replace(fit, problem=problem, point=point)
 
 
@@ -73,7 +73,7 @@ def test_damping_that_would_feed_the_motion_stays_at_none(name):
     driven = kind(**{severity.name: -0.5 * severity.scale})
     base = nominal(campaign(driven))
     problem = Problem(base.problem.data, (kind,))
-    start = Point(np.append(base.point.common, severity.scale), base.point.release)
+    start = Point(np.append(base.point.common, severity.scale), base.point.per_run)
     found = fit(problem, start)
     assert found.value(f"{name}.{severity.name}") == 0.0
     assert found.bound(f"{name}.{severity.name}") == "lower"

@@ -14,8 +14,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import SelectionSettings, Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import SIX
@@ -64,7 +64,7 @@ def test_a_wider_block_is_predicted_as_the_mean_of_its_shorter_ones(nominal: Fit
         "sensor_nonlinearity": [0.2],
     }.items():
         kinds = (effect_class(name),)
-        point = Point(np.concatenate([nominal.point.common, values]), nominal.point.release)
+        point = Point(np.concatenate([nominal.point.common, values]), nominal.point.per_run)
         found = Problem(wider, kinds).predict([point])[0]
         shorter = Problem(wider.with_runs(tuple(run.fine for run in wider.runs)), kinds).predict([point])[0]
         for run, one, many in zip(wider.runs, found, shorter, strict=True):
@@ -135,7 +135,7 @@ def test_a_run_not_yet_made_is_predicted_in_the_shorter_blocks_too(nominal: Fit)
     """Of effects on the reading, whose predictions are in shorter blocks."""
     wider = compressed(nominal)
     (kind,) = (effect_class("sensor_nonlinearity"),)
-    point = Point(np.append(wider.point.common, 0.2), wider.point.release)
+    point = Point(np.append(wider.point.common, 0.2), wider.point.per_run)
     seen = fit_at(Problem(wider.problem.data, (kind,)), point)
     run = planned_run(wider, spring_stiffness=30.0, wind_speed=0.0, air_density=1.2, duration=4.0)
     assert run.fine.reading.size == run.merges * run.reading.size

@@ -41,7 +41,7 @@ def test_the_truth_is_recovered_from_closed_form_records():
         expected = 0.004 if name == "zero" else getattr(truth, name)
         assert abs(found.value(name) - expected) < 4.0 * found.std(name)
     assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
-    np.testing.assert_allclose(found.point.release[:, 0], 0.35, atol=5 * NOISE)
+    np.testing.assert_allclose(found.point.per_run[:, 0], 0.35, atol=5 * NOISE)
 
 
 def test_without_noise_the_truth_is_exact():
@@ -157,7 +157,7 @@ def test_borrowed_sensitivities_lead_to_the_same_optimum(name):
               "unsteady_aero_lag": {"lag": 1.0}}[name]  # fmt: skip
     base = nominal(campaign(effect_from(name, values)))
     problem = Problem(base.problem.data, (effect_class(name),))
-    start = Point(np.append(base.point.common, 0.5 * next(iter(values.values()))), base.point.release)
+    start = Point(np.append(base.point.common, 0.5 * next(iter(values.values()))), base.point.per_run)
     full = fit(problem, start, tolerance=1e-6)
     borrowed = fit(problem, start, base=base, tolerance=1e-6)
     assert borrowed.total == pytest.approx(full.total, abs=1.0)
@@ -169,9 +169,9 @@ def test_borrowed_sensitivities_lead_to_the_same_optimum(name):
 def test_a_fit_stays_inside_its_bounds():
     base = nominal(campaign())
     problem = Problem(base.problem.data, (effect_class("coulomb_friction"),))
-    low = clip(problem, Point(np.append(base.point.common, -1.0), base.point.release))
+    low = clip(problem, Point(np.append(base.point.common, -1.0), base.point.per_run))
     assert low.common[-1] == 0.0
-    found = fit(problem, Point(np.append(base.point.common, 1e-4), base.point.release), base=base)
+    found = fit(problem, Point(np.append(base.point.common, 1e-4), base.point.per_run), base=base)
     assert 0.0 <= found.value("coulomb_friction.friction_moment") < 1e-4
 
 
@@ -181,7 +181,7 @@ def test_a_model_that_grows_without_bound_is_refused():
     wild = start.common.copy()
     wild[3] = 5e4  # Cnr; the mechanical damping is not negative in a fit
     with pytest.raises(FitError):
-        fit(Problem(data), Point(wild, start.release))
+        fit(Problem(data), Point(wild, start.per_run))
 
 
 @pytest.mark.parametrize("greatest", [1e160, 1e308])
@@ -196,10 +196,10 @@ def test_a_motion_whose_square_overflows_costs_without_bound(monkeypatch, greate
 
 def test_a_parameter_that_is_not_finite_predicts_what_grows_without_bound():
     base = nominal(campaign())
-    release = base.point.release.copy()
+    release = base.point.per_run.copy()
     release[2, 0] = np.nan
     common = np.where(np.arange(base.point.common.size) == 0, np.nan, base.point.common)
-    spoilt = [Point(base.point.common, release), Point(common, base.point.release), base.point]
+    spoilt = [Point(base.point.common, release), Point(common, base.point.per_run), base.point]
     one, all_of_them, none = base.problem.predict(spoilt)
     assert [bool(np.all(np.isposinf(values))) for values in one] == [r == 2 for r in range(len(one))]
     assert all(np.all(np.isposinf(values)) for values in all_of_them)
@@ -291,12 +291,12 @@ def test_a_stiff_rod_condensed_moves_as_the_two_inertias_do(speed, share):
     truth = Truth()
     common = [truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.0, compliance, share]
     point = Point(np.array(common), np.array([[0.35, 0.0]]))
-    physics = problem.chain(point.common, point.release[0], data.runs[0]).physics()
+    physics = problem.chain(point.common, point.per_run[0], data.runs[0]).physics()
     assert condensed(physics, data).rod_twist is None
     moved = problem.predict([point])[0][0]
     time = np.arange(1000) / 500.0
     expected = two_inertias(data.runs[0], compliance, share, time).reshape(500, 2).mean(axis=1)
-    rigid = Problem(data).predict([Point(point.common[:5], point.release)])[0][0]
+    rigid = Problem(data).predict([Point(point.common[:5], point.per_run)])[0][0]
     effect = np.max(np.abs(rigid - expected))
     assert effect > 2.0 * NOISE
     assert np.max(np.abs(moved - expected)) < min(0.1 * effect, 0.25 * NOISE)

@@ -9,8 +9,8 @@ import pytest
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.model.run_data import Data
 from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting
@@ -63,7 +63,7 @@ def test_a_run_has_the_same_bits_in_any_company_and_any_number_of_threads(data: 
         )
     for i, r in ((0, 0), (5, 3), (7, 5)):
         alone = Problem(data.with_runs((data.runs[r],)), kinds(name))
-        point = Point(asked[i].common, asked[i].release[r : r + 1])
+        point = Point(asked[i].common, asked[i].per_run[r : r + 1])
         assert np.array_equal(alone.predict([point])[0][0], together[i][r])
     assert all(np.isinf(one).all() for one in together[2])
 
@@ -72,7 +72,7 @@ def test_a_motion_that_grows_leaves_the_others_as_they_are(data: Data) -> None:
     asked = points([])
     wild = asked[4].common.copy()
     wild[1] = -5.0  # N m s/rad: the damper drives the body
-    found = Problem(data).predict([*asked[:4], Point(wild, asked[4].release), *asked[5:]])
+    found = Problem(data).predict([*asked[:4], Point(wild, asked[4].per_run), *asked[5:]])
     usual = Problem(data).predict(asked)
     assert all(np.isinf(one).all() for one in found[4])
     for i in (0, 1, 3, 5, 6, 7):

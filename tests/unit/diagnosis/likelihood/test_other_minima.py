@@ -50,12 +50,14 @@ def problem(compliance: float, share: float, *, driven: bool, noise: float = 4e-
     readings = read_motion(given, motion, [], np.random.default_rng(3))
     simulated = Simulated(CampaignDraw("single", given, (), 0), readings, 0.0, np.zeros(3), readings.T)
     campaign = as_campaign(simulated, "rod")
-    return Problem(prepare(campaign, {run.id: noise**2 for run in campaign.runs}), (ROD,), rod_followed=True)
+    return Problem(
+        prepare(campaign, {run.id: noise**2 for run in campaign.runs}), (ROD,), resolve_rod_mode=True
+    )
 
 
 def fitted_from(problem: Problem, compliance: float, share: float) -> Fit:
     start = nominal_start(problem.data)
-    return fit(problem, Point(np.append(start.common, [compliance, share]), start.release))
+    return fit(problem, Point(np.append(start.common, [compliance, share]), start.per_run))
 
 
 @pytest.mark.parametrize(
@@ -92,7 +94,7 @@ def test_an_effect_of_one_minimum_stays_as_it_is() -> None:
     data = problem(1.1e-4, 0.16, driven=False).data
     cubic = Problem(data, (effect_class("cubic_stiffness"),))
     start = nominal_start(data)
-    fitted = fit(cubic, Point(np.append(start.common, 0.0), start.release))
+    fitted = fit(cubic, Point(np.append(start.common, 0.0), start.per_run))
     found = deepest(fitted)
     assert found.total == fitted.total
     assert np.array_equal(found.stated_covariance, fitted.covariance)

@@ -66,19 +66,19 @@ def test_friction_without_derivatives_takes_finite_differences(data, form):
     common = point.common.copy()
     for name, value in form.items():
         common[problem.names.index(f"coulomb_friction.{name}")] = value
-    moved = Point(common, point.release)
-    assert len(without_derivative(problem, moved)) == common.size + point.release.shape[1]
+    moved = Point(common, point.per_run)
+    assert len(without_derivative(problem, moved)) == common.size + point.per_run.shape[1]
 
 
 def test_a_rod_that_is_not_separated_takes_finite_differences(data):
     """One that is followed, and one that rings almost as slowly as the body swings."""
     problem, point = at_example(data, effect_class("rod_flexibility"))
-    every = point.common.size + point.release.shape[1]
+    every = point.common.size + point.per_run.shape[1]
     assert not without_derivative(problem, point)
-    assert len(without_derivative(dataclasses.replace(problem, rod_followed=True), point)) == every
+    assert len(without_derivative(dataclasses.replace(problem, resolve_rod_mode=True), point)) == every
     soft = point.common.copy()
     soft[problem.names.index("rod_flexibility.compliance")] = 0.05
-    assert len(without_derivative(problem, Point(soft, point.release))) == every
+    assert len(without_derivative(problem, Point(soft, point.per_run))) == every
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,8 @@ def test_first_order_changes_are_those_of_predictions(data, name, tolerance):
     points, _ = moves(problem, point)
     found = motion_changes(problem, point, points)
     for i, there in enumerate(points):
-        common, release = there.common - point.common, there.release - point.release
-        ends = [Point(point.common + s * common, point.release + s * release) for s in (4.0, -4.0)]
+        common, release = there.common - point.common, there.per_run - point.per_run
+        ends = [Point(point.common + s * common, point.per_run + s * release) for s in (4.0, -4.0)]
         after, before = problem.predict(ends)
         for r, change in enumerate(found):
             expected = (after[r] - before[r]) / 8.0

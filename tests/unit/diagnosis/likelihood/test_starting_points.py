@@ -40,7 +40,7 @@ def test_the_nominal_start_is_within_a_fifth_of_a_radian_of_phase():
     assert cn_beta == pytest.approx(truth.cn_beta, abs=0.05)
     assert (damping > 0.0, cn_r) == (True, 0.0)
     assert zero == pytest.approx(0.004, abs=0.004)
-    np.testing.assert_allclose(start.release[:, 0], 0.35, atol=0.01)
+    np.testing.assert_allclose(start.per_run[:, 0], 0.35, atol=0.01)
 
 
 def test_the_nominal_start_of_runs_without_wind_or_stiffness():
@@ -77,7 +77,7 @@ def test_nothing_that_the_fit_can_absorb_is_left_of_a_change():
     base = nominal(campaign())
     rng = np.random.default_rng(3)
     weights = rng.normal(size=len(base.point.common))
-    own = rng.normal(size=base.point.release.shape)
+    own = rng.normal(size=base.point.per_run.shape)
     columns = [c @ weights + r @ o for (c, r), o in zip(base.jacobian, own, strict=True)]
     size = np.sqrt(sum(float(c @ c) for c in columns))
     assert np.sqrt(sum(float(c @ c) for c in project_out(base, columns))) < 1e-6 * size
@@ -202,7 +202,7 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     found = fit(lead.problem, lead.point, base=base)
     assert abs(found.excess) < 5.0 * np.sqrt(2.0 / found.count)
     windy = [i for i, run in enumerate(data.runs) if run.wind_on]
-    turn = found.point.release[windy, 2] - phases[windy]
+    turn = found.point.per_run[windy, 2] - phases[windy]
     np.testing.assert_allclose(np.angle(np.exp(1j * turn)), 0.0, atol=0.3)
 
 
@@ -277,7 +277,7 @@ def test_an_effect_of_size_zero_is_no_start(monkeypatch):
 def test_a_start_beyond_any_motion_has_no_prediction(angle: float):
     """A fit may try one; a rod would be released at an angle that is no number."""
     base = nominal(campaign())
-    release = base.point.release.copy()
+    release = base.point.per_run.copy()
     release[0, 0] = angle
     rod = starting_points(base, effect_class("rod_flexibility"))[0]
     first, second, *_ = rod.problem.predict([Point(rod.point.common, release)])[0]

@@ -134,7 +134,7 @@ def test_samples_skipped_are_read_sample_by_sample():
     data = prepared(uneven_campaign())
     plain = fitted(data)
     problem = Problem(data, (DroppedSamples,))
-    release = np.column_stack([plain.point.release, np.full(len(data.runs), 0.5)])
+    release = np.column_stack([plain.point.per_run, np.full(len(data.runs), 0.5)])
     for lost, apart in ((0.0, 1e-6), (1e-9, 1e-3)):
         point = Point(np.append(plain.point.common, lost), release)
         for one, other in zip(plain.residuals, scaled_residuals(problem, point), strict=True):
@@ -143,7 +143,7 @@ def test_samples_skipped_are_read_sample_by_sample():
 
 def test_mujoco_reads_the_samples_at_their_times():
     found = fitted(prepared(uneven_campaign()))
-    comparison = compare(found.problem, found.point.common, found.point.release)
+    comparison = compare(found.problem, found.point.common, found.point.per_run)
     assert comparison.failure == ""
     for difference in comparison.differences:
         assert np.abs(difference).max() < 0.02 * NOISE
@@ -159,7 +159,7 @@ def test_rates_and_accelerations_give_the_same_rig(derivative, noise, jitter):
     assert found.excess == pytest.approx(0.0, abs=4.0 * np.sqrt(2.0 / found.count))
     for name, value in {"yaw_inertia": 0.1014, "cn_beta": 0.49, "cn_r": -0.11}.items():
         assert abs(found.value(name) - value) < 4.0 * found.std(name)
-    comparison = compare(found.problem, found.point.common, found.point.release)
+    comparison = compare(found.problem, found.point.common, found.point.per_run)
     assert sum(float(r @ r) for r in comparison.residuals) == pytest.approx(found.total, rel=1e-4)
 
 

@@ -105,9 +105,9 @@ def test_what_is_not_free_is_held_at_the_models_value(tmp_path: Path) -> None:
     joint = joint.of(stated).similar(change)
     found = fit_nominal(prepare(similar, {run.id: NOISE**2 for run in data.runs}, change, model=joint))
     assert found.problem.names == ("mechanical_damping",)
-    stated = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
+    stated = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
     assert change.own(stated.yaw_inertia, "kg m2") == pytest.approx(INERTIA)
-    assert found.problem.zero(found.point.common, found.point.release[0]) == pytest.approx(-change.rest)
+    assert found.problem.zero(found.point.common, found.point.per_run[0]) == pytest.approx(-change.rest)
 
 
 def test_wind_needs_the_rigs_sizes(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def test_gravity_counts_in_the_frequency(without_spring):
 def test_gravity_that_needs_no_spring_counts_as_two_numbers_less(without_spring, share, further):
     common = without_spring.point.common.copy()
     common[without_spring.problem.names.index("stiffness")] = share / (1.0 - share) * GRAVITY
-    found = fit_at(without_spring.problem, Point(common, without_spring.point.release))
+    found = fit_at(without_spring.problem, Point(common, without_spring.point.per_run))
     assert Hypothesis(("gravity_stiffness",), found).further_numbers == further
 
 

@@ -25,7 +25,8 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from diagnosis.model.run_data import Data, RunData
+    from diagnosis.model.data import Data
+    from diagnosis.model.run_data import RunData
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.05, 2e-4, 200.0
 SPRINGS = (16.0, 16.0, 30.0, 30.0, 44.0, 44.0)
@@ -80,7 +81,7 @@ def test_deviations_and_inertia_are_within_their_standard_deviations() -> None:
     for seed in range(8):
         found, deviations = fitted(ClampedAgain(), SCATTER, seed)
         z.append((found.value("yaw_inertia") - INERTIA) / found.std("yaw_inertia"))
-        own = found.point.release[:, found.problem.parameters.own_names.index("spring_deviation")]
+        own = found.point.per_run[:, found.problem.parameters.own_names.index("spring_deviation")]
         apart.append(own - deviations)
         # the springs' scatter, not the noise, limits the inertia
         assert found.std("yaw_inertia") == pytest.approx(INERTIA * SCATTER / np.sqrt(len(SPRINGS)), rel=0.05)
@@ -106,18 +107,18 @@ def test_a_run_that_is_not_seen_returns_to_its_prior() -> None:
     blind = replace(data, runs=tuple(replace(run, noise=WhiteNoise(1e12)) for run in data.runs))
     problem = replace(found.problem, data=blind)
     place = problem.parameters.own_names.index("spring_deviation")
-    moved = found.point.release.copy()
+    moved = found.point.per_run.copy()
     moved[:, place] = 5.0 * SCATTER
     start = Point(found.point.common, moved)
     slopes = [1e-9 * own for _, own in found.jacobian]
     back, _ = refit_releases(problem, start, slopes)
-    assert np.abs(back.release[:, place]).max() < 1e-3 * SCATTER
+    assert np.abs(back.per_run[:, place]).max() < 1e-3 * SCATTER
 
 
 def test_a_prior_is_a_part_of_chi2() -> None:
     found, _ = fitted(ClampedAgain(), SCATTER, 7)
     parameters = found.problem.parameters
-    own = found.point.release[:, parameters.own_names.index("spring_deviation")]
+    own = found.point.per_run[:, parameters.own_names.index("spring_deviation")]
     assert found.total - found.chi2.sum() == pytest.approx(np.sum((own / SCATTER) ** 2))
     assert parameters.surprise(found.point) == pytest.approx(np.sum((own / SCATTER) ** 2))
     assert Problem(replace(found.problem.data, model=SpringModel())).parameters.surprise(found.point) == 0.0

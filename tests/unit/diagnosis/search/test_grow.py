@@ -127,7 +127,7 @@ def left(*effects, damping):
         excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]),
         further_numbers=0,
         explains_runs=False,
-        fit=SimpleNamespace(settings=Settings(), scatter_cost=lambda _: 0.0, compared=0),
+        fit=SimpleNamespace(settings=Settings(), scatter_cost=lambda _: 0.0, shown_between_runs=0),
     )
 
 
@@ -182,19 +182,6 @@ def test_of_effects_that_do_the_same_one_is_grown_and_the_others_are_weighed_bes
     assert exchange(best, [*known, *others], base) == []
 
 
-def test_a_fit_that_ends_worse_than_without_the_effect_starts_again_nearby(monkeypatch):
-    """From an offset that leaves no wind, derivatives run away."""
-    kind = effect_class("wind_speed_offset")
-    base = nominal(campaign(effect_from(kind.name, {"offset": 0.5})))
-    (start,) = starting_points(base, kind)
-    common = start.point.common.copy()
-    common[start.scaled] = -40.0
-    far = replace(start, point=Point(common, start.point.release))
-    assert fit(far.problem, far.point, base=base).total > base.total
-    monkeypatch.setattr(growth, "starting_points", lambda *_: [far])
-    assert within_noise(grow(whole_runs(base, [kind]))[0].fit)
-
-
 @pytest.mark.parametrize("offset", [-13.0, slow(6.0)])
 def test_an_offset_of_most_of_the_wind_is_found(offset):
     """The slowest wind is 15 m/s."""
@@ -218,7 +205,7 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     (left,) = (one.fit for one in pruned if one.effects == ("quadratic_damping",))
     direct = starting_points(base, effect_class("quadratic_damping"))[0]
     assert left.problem.effects == (effect_class("quadratic_damping"),)
-    assert left.point.release.shape == base.point.release.shape
+    assert left.point.per_run.shape == base.point.per_run.shape
     assert left.total == pytest.approx(fit(direct.problem, direct.point).total, rel=1e-4)
 
 
@@ -306,7 +293,7 @@ def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
 
 def textbook_point(found: Fit) -> Point:
     problem = replace(found.problem, free_forms=())
-    return Point(np.array([found.value(name) for name in problem.names]), found.point.release)
+    return Point(np.array([found.value(name) for name in problem.names]), found.point.per_run)
 
 
 def test_a_line_that_does_not_decay_is_no_mode() -> None:
@@ -318,10 +305,3 @@ def test_a_line_that_does_not_decay_is_no_mode() -> None:
         for r in ratios
     ]
     assert [mode.plausible(12.0) for mode in modes] == [False, True, True]
-
-
-def test_a_second_effect_is_added_to_the_textbook_form_as_well(monkeypatch):
-    tried = []
-    monkeypatch.setattr(growth, "_worth_fitting", lambda parent, _kinds: tried.append(parent) or [])
-    growth.sets_with_one_more([Hypothesis(("a",), 1, 2), Hypothesis(("a", "b"), 3, 4)], [], None)
-    assert [(h.effects, h.fit) for h in tried] == [(("a",), 1), (("a", "b"), 3), (("a",), 2)]

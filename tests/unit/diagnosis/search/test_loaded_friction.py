@@ -41,7 +41,7 @@ def test_a_fit_finds_the_share_of_the_load(base):
     begin = {"gravity_stiffness.stiffness": 1.0, "coulomb_friction.friction_moment": 0.005, LOAD: 0.02}
     known = dict(zip(base.problem.names, base.point.common.tolist(), strict=True)) | begin
     start = np.array([known.get(name, 0.0) for name in problem.names])
-    found = fit(problem, Point(start, base.point.release))
+    found = fit(problem, Point(start, base.point.per_run))
     for name, truth in {LOAD: 0.04, "coulomb_friction.friction_moment": 0.003}.items():
         assert abs(found.value(name) - truth) < 4.0 * found.std(name)
     assert found.std(LOAD) < 0.01

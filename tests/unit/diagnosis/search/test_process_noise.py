@@ -213,12 +213,12 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     (start,) = starting_points(base, effect_class("dropped_samples"))
     white = fit(start.problem, start.point, base=base)
     planted = np.linspace(0.2, 0.8, len(CONDITIONS))  # shares of the runs
-    assert np.max(np.abs(white.point.release[:, -1] - planted)) > 0.05
+    assert np.max(np.abs(white.point.per_run[:, -1] - planted)) > 0.05
     kinds = (*BUFFETING, effect_class("dropped_samples"))
     (answer,) = weigh_random_moments(whole_runs(base, kinds), [Hypothesis(("dropped_samples",), white)])
     assert answer.effects == ("buffeting", "dropped_samples")
     found = answer.beside.fit
-    assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
+    assert found.point.per_run[:, -1] == pytest.approx(planted, abs=0.005)
     assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
     assert abs(excess_elsewhere(found, answer.process.runs)) < 0.1
 

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import vocabulary
 from diagnosis.search.investigate import investigate, nominal_study
-from diagnosis.search.reach import left_by_all
+from diagnosis.search.reach import unexplained_floor
 from diagnosis.words.cautions import CAUTIONS
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -41,7 +41,7 @@ def campaign(*, friction: float = 0.0, strange: float = 0.0) -> Campaign:
 def left(found: Campaign) -> float:
     """The share of the gap that all effects together leave."""
     prepared = nominal_study(found, known_effects()).prepared
-    return left_by_all(prepared.nominal, prepared.able, prepared.kinds)
+    return unexplained_floor(prepared.nominal, prepared.able, prepared.kinds)
 
 
 def test_a_known_effect_is_within_reach_of_all() -> None:
@@ -58,8 +58,8 @@ def test_the_search_ends_there_and_says_so() -> None:
     )
     study = investigate(campaign(strange=0.1), few)
     assert study.causes == ("unknown",)
-    assert study.left_by_all is not None
-    assert study.left_by_all > study.settings.search.out_of_reach
+    assert study.unexplained_floor is not None
+    assert study.unexplained_floor > study.settings.search.out_of_reach
     assert max(len(answer.effects) for answer in study.answers) <= 2
     words = CAUTIONS["beyond reach"]
     assert callable(words)

@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.findings.next_run import separation
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.study import Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.marks import slow

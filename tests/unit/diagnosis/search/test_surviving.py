@@ -37,7 +37,7 @@ def with_cubic(data: Campaign, start: float = 0.1) -> Fit:
     """The campaign fitted with a cubic spring."""
     base = nominal(data)
     problem = replace(base.problem, effects=(effect_class("cubic_stiffness"),))
-    return fit(problem, Point(np.append(base.point.common, start), base.point.release))
+    return fit(problem, Point(np.append(base.point.common, start), base.point.per_run))
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import nominal_study
+from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.scatter import scattered
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.files.rig_file import load_rig
@@ -86,7 +86,7 @@ def beside_scatter(found: Campaign, effect: str) -> tuple[Fit, Fit]:
     assert start.scaled is not None
     common = start.point.common.copy()
     common[start.scaled] *= 0.1
-    fitted = try_fit(start.problem, Point(common, start.point.release))
+    fitted = try_fit(start.problem, Point(common, start.point.per_run))
     assert fitted is not None
     return base, fitted
 
@@ -145,10 +145,10 @@ def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_lit
 
 def test_which_effects_only_the_comparison_of_runs_shows() -> None:
     """A speed that is off does to every run what a deviation does; the vortices' line is in each of them."""
-    assert off()[1].compared == 1
+    assert off()[1].shown_between_runs == 1
     assert not off()[1].shown.any()
     base, shed = beside_scatter(blown(shedding=0.05), "vortex_shedding")
-    assert (base.compared, shed.compared) == (0, 0)
+    assert (base.shown_between_runs, shed.shown_between_runs) == (0, 0)
     of_effect = [name.startswith("vortex_shedding.") for name in shed.problem.names]
     assert any(of_effect)
     assert shed.shown.tolist() == of_effect

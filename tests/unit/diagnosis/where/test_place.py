@@ -363,7 +363,7 @@ def test_runs_have_their_amplitude_frequency_and_share_of_the_gap():
         inertia, _, stiffness = linear_coefficients(base, i)
         omega = np.sqrt(stiffness / inertia)
         assert one.frequency == pytest.approx(omega / (2.0 * np.pi))
-        assert one.amplitude == pytest.approx(np.hypot(*(base.point.release[i] / (1.0, omega))), rel=2e-3)
+        assert one.amplitude == pytest.approx(np.hypot(*(base.point.per_run[i] / (1.0, omega))), rel=2e-3)
         assert (one.id, one.wind_speed) == (run.id, run.wind_speed)
         assert one.spring_stiffness == pytest.approx(run.spring_stiffness)
         assert one.excess == pytest.approx(float(np.mean(base.residuals[i] ** 2)) - 1.0, rel=0.01)

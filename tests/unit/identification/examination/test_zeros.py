@@ -136,7 +136,7 @@ def test_the_diagnosis_fits_the_zeros_among_the_runs_own_parameters():
     prepared = prepare(kept, campaign_noise(kept, Settings().noise).variance)
     found = fit(Problem(prepared), nominal_start(prepared))
     assert "zero" not in found.problem.names
-    assert found.point.release.shape == (6, 3)
+    assert found.point.per_run.shape == (6, 3)
     assert found.excess == pytest.approx(0.0, abs=5.0 * np.sqrt(2.0 / found.count))
     for i, own in enumerate(OWN):
         assert found.zero(i) == pytest.approx(own + 0.003, abs=1e-4)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tunnel_lab.paper import paper_page, rig_tables
-from tunnel_lab.paper.paper_page import PaperSection, Picture, signed
+from tunnel_lab.paper.paper_page import PaperPicture, PaperSection, signed
 from tunnel_lab.paper.rig_tables import Oscillation, eq7, eq8, known_run, printed_transfer_function
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -64,7 +64,7 @@ def test_numbers_with_signs(value: float, text: str) -> None:
 
 
 def section(title: str, *files: str) -> PaperSection:
-    pictures = tuple(Picture(file=file, caption="<b>") for file in files)
+    pictures = tuple(PaperPicture(file=file, caption="<b>") for file in files)
     return PaperSection(
         title=title, about="a", theirs="<1>", ours="2", outcome="reproduced", words=(), pictures=pictures
     )

@@ -13,7 +13,7 @@ import pytest
 
 from identification.show.blocks import TextTable
 from tunnel_lab.cli import main
-from tunnel_lab.terminal.arguments import TableFormat
+from tunnel_lab.terminal.table_format import TableFormat
 from tunnel_lab.terminal.table_layout import rendered
 
 ROOT = Path(__file__).parents[4]

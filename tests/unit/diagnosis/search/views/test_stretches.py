@@ -108,9 +108,9 @@ def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):
     sizes = [max(run.reading.size for run in runs.runs) for runs, _ in starts]
     assert sizes == sorted(sizes)
     assert longest.data is data
-    known = dict(zip(short.places, first.point.release, strict=True))
+    known = dict(zip(short.places, first.point.per_run, strict=True))
     begins = in_stretches(data, 3 * short.length).places
-    np.testing.assert_array_equal(starts[0][1].release, [known[place] for place in begins])
+    np.testing.assert_array_equal(starts[0][1].per_run, [known[place] for place in begins])
     assert [run.id for run in found.problem.data.runs] == [run.id for run in data.runs]
 
 
@@ -120,7 +120,7 @@ def test_fits_of_growing_length_reach_a_truth_far_out_of_phase(data):
     right = fit_nominal(short.data)
     far = right.point.common.copy()
     far[0] *= 1.05
-    begun = fit(Problem(short.data), Point(far, right.point.release))
+    begun = fit(Problem(short.data), Point(far, right.point.per_run))
     found, _ = fit_longer(begun, short, data)
     assert abs(found.value("yaw_inertia") - INERTIA) < 4.0 * found.std("yaw_inertia")
     assert abs(found.value("cn_beta") - CN_BETA) < 4.0 * found.std("cn_beta")

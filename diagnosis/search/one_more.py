@@ -1,0 +1,121 @@
+"""Sets of causes with one effect more, fitted from their best starting points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.residuals import gap_left, misfit
+from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
+from diagnosis.search.clock import Progress
+from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
+from diagnosis.search.scatter import likelier, with_likeliest_widths
+from diagnosis.search.weigh import log_weight, misfit_scale
+from tunnel_sim.effects import Effect
+
+_ITERATIONS = 12  # of an intermediate fit; the answer's is polished
+
+
+def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
+    """The second mode, where the nominal model misses the motion because it has only one mode.
+
+    Returns:
+        The fit with the mode added; None where it misses the motion too, or may not be tried.
+    """
+    modes = [kind for kind in kinds if kind.line == "ringing"]
+    found = sets_with_one_more([Hypothesis((), nominal)], modes)
+    return found[0] if found and not misses_motion(found[0].fit) else None
+
+
+def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
+    """Whether two fits differ by a small share of the power of their change to the nominal fit."""
+    apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
+    return apart < nominal.settings.search.same_change * (nominal.total - max(one.total, other.total))
+
+
+def sets_with_one_more(
+    level: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None = None
+) -> list[Hypothesis]:
+    """The sets with one more effect, each fitted from its best starting points.
+
+    Returns:
+        One for every set of effects: the one of more weight where two sets lead to it, so that a freed form of one
+        does not exclude the other.
+    """
+    # alone, a freed form also follows the effects of other causes
+    single = [h for h in level if len(h.effects) == 1]
+    textbook = [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
+    sets: dict[tuple[str, ...], Hypothesis] = {}
+    for parent in (*level, *textbook):
+        base = parent.fit
+        others = [kind for kind in kinds if kind.name not in parent.effects]
+        for kind, starts in _worth_fitting(parent, others):
+            if progress is not None:
+                progress(" + ".join((*parent.effects, kind.name)))
+            starts = starts[: kind.tries]
+            tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+            if all(fitted.total > base.total for fitted in tried):  # linear theory overshot
+                near = [point for start in starts if (point := start.nearer()) is not None]
+                tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
+            there = filter(is_plausible, map(turned_back, tried))
+            best = min(there, key=lambda fitted: fitted.unlikelihood, default=None)
+            if best is not None:
+                best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
+                child = Hypothesis((*parent.effects, kind.name), best)
+                sets[child.names] = of_more_weight(sets.get(child.names), child, gap_left(base))
+    return list(sets.values())
+
+
+def _worth_fitting(
+    parent: Hypothesis, kinds: Sequence[type[Effect]]
+) -> list[tuple[type[Effect], list[StartingPoint]]]:
+    """The effects that linear theory predicts to explain most; generously many after the nominal model.
+
+    Beside other effects, those predicted to gain no more than chance are left out. Where chance differences
+    between the runs explain them, the effects of greatest predicted likelihood are fitted.
+    """
+    scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
+    weighing, chosen = parent.fit.settings.weighing, parent.fit.settings.search
+    scale = misfit_scale(misfit(parent.fit), weighing)
+    scored.sort(
+        key=lambda item: min(
+            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf))
+            for start in item[1]
+        )
+    )
+    if parent.effects or parent.explains_runs:
+        own, beyond = own_gain(parent.fit.problem), {}
+        for kind, starts in scored:  # the chance gain of the effect's parameters per run does not count
+            beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
+        if not parent.effects:
+            likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
+            return [item for item in likely if beyond[item[0].name] > 0.0]
+        worth = [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
+        # linear theory underestimates these: the runs' deviations absorb most of the prediction, not of the effect
+        absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
+        return worth + [item for item in absorbed if item not in worth and beyond[item[0].name] > 0.0]
+    limit = chosen.predicted_share * parent.fit.total
+    return [
+        item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit
+    ]
+
+
+def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
+    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points."""
+    base = parent.repeating
+    if base is None:
+        return None
+    starts = starting_points(base, kind)[: kind.tries]
+    tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+    there = filter(is_plausible, map(turned_back, tried))
+    return min(there, key=lambda fitted: fitted.total, default=None)
+
+
+def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
+    if misses_motion(base):
+        found = try_fit(start.problem, start.point)
+    else:
+        found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
+    return with_likeliest_widths(found, rounds=1) if found is not None and np.isfinite(found.total) else None
