@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from diagnosis.findings.judged import Misfit
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
 
@@ -68,29 +68,6 @@ class GapSummary:
 
 FITTED = "in the fitted runs (none could be held out)"
 """The readings on which a gap before and after is measured, as in the document."""
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Conversion from an excess to a misfit.
-
-    Args:
-        noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
-        swing: root mean square of the readings about the mean of each run, in ``unit``.
-        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
-    """
-
-    noise: float
-    swing: float
-    unit: str
-
-    def rms(self, excess: float) -> float:
-        """Root mean square in ``unit`` of an excess in noise variances of a sample; below zero it is chance."""
-        return self.noise * math.sqrt(max(excess, 0.0))
-
-    def of_swing(self, excess: float) -> float | None:
-        """The same as a share of the swing; None where the readings do not move."""
-        return self.rms(excess) / self.swing if self.swing > 0.0 else None
 
 
 @dataclass(frozen=True)

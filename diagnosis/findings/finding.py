@@ -8,32 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
+from diagnosis.findings.judged import Judged
 from diagnosis.search.study import Study
-from diagnosis.settings import Settings
 from identification.show.blocks import Figure, Section
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
-
-
-class Judged(Protocol):
-    """The judgement of a diagnosis in plain values: all that the words of a finding know beside its own fields."""
-
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """Effect names, sorted; ``unknown``, or none."""
-
-    @property
-    def names_effects(self) -> bool:
-        """Whether the answer names effects."""
-
-    @property
-    def settings(self) -> Settings:
-        """The settings with which the diagnosis was made."""
 
 
 @dataclass(frozen=True, eq=False)

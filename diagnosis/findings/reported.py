@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagnosis.answer.held_out import ON_RUNS, Base, HeldOut, Waterfall, share_closed
-from diagnosis.findings.closure import FITTED, Confirmation, GapSummary, Misfit, RunGap
+from diagnosis.findings.closure import FITTED, Confirmation, GapSummary, RunGap
+from diagnosis.findings.judged import Misfit
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.likelihood.problem import Problem

@@ -19,6 +19,7 @@ from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
 from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Remainder
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.patch.written_model import PatchedModel
@@ -120,6 +121,26 @@ class Findings:
     def settings(self) -> Settings:
         """The settings with which the diagnosis was made."""
         return Settings().changed(self.provenance.get("settings", {}))
+
+    @property
+    def decided(self) -> bool:
+        """Whether the answer is decided."""
+        return self.decision.decided
+
+    @property
+    def likely(self) -> float:
+        """Probability of the likeliest answer, a fraction."""
+        return self.decision.credible[0][1]
+
+    @property
+    def misfit(self) -> Misfit | None:
+        """The conversion from an excess to a misfit; None where it is not known."""
+        return self.gap.misfit
+
+    @property
+    def rest_is_significant(self) -> bool:
+        """Whether a gap remains beyond chance."""
+        return self.rest is not None and self.rest.significant
 
     @property
     def names_effects(self) -> bool:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown
+from diagnosis.findings.terms import acts_on
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
-from diagnosis.words.numbers import acts_on, misfit_of, misfit_shown, of_swing, rms_shown
 from diagnosis.words.scatter import (
     BETWEEN_RUNS,
     SCATTERS,

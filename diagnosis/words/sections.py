@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from diagnosis.findings.misfit import windy
+from diagnosis.findings.terms import CHANNELS, CONDITIONS
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.answers import set_out
 from diagnosis.words.captions import captioned, pictured
@@ -20,7 +22,6 @@ from diagnosis.words.lines import (
     noise_line,
     patch_line,
 )
-from diagnosis.words.numbers import CHANNELS, CONDITIONS, windy
 from diagnosis.words.remainder import closable_line
 from diagnosis.words.scatter import (
     repeatability_line,

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from diagnosis.findings.misfit import misfit_text, unit_of
+from diagnosis.findings.terms import KINDS
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked, set_out
-from diagnosis.words.numbers import KINDS, misfit_text, unit_of
 from diagnosis.words.scatter import answer_name, spread_estimate
 from identification.printing import coefficient_label
 from identification.show.blocks import TextTable

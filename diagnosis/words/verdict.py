@@ -7,7 +7,9 @@ from typing import Any
 
 from diagnosis.findings.candidates import CauseSize
 from diagnosis.findings.found import Nearly
+from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.other_motions import TwoModes
+from diagnosis.findings.terms import CHANNELS, CONDITIONS, MISFITS
 from diagnosis.findings.whole import Findings
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.rivals.two_springs import SpringError
@@ -20,16 +22,6 @@ from diagnosis.words.causes import (
     hold_words,
     known_and_open,
     one_of_springs,
-)
-from diagnosis.words.numbers import (
-    CHANNELS,
-    CONDITIONS,
-    MISFITS,
-    misfit_of,
-    of_swing,
-    rms_shown,
-    unit_of,
-    windy,
 )
 from diagnosis.words.own_model import model_step, model_words
 from diagnosis.words.remainder import formula_step

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.whole import Findings
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
-from diagnosis.words.numbers import unit_of
 from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words

@@ -308,7 +308,7 @@ class ByHandPart:
 
 def show_closure(closure: Closure, answer: Diagnosis) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
-    from diagnosis.words.numbers import misfit_shown
+    from diagnosis.findings.misfit import misfit_shown
     from identification.show.numbers import estimated, share, unit_mark
 
     def size(given: Quantity) -> str:
@@ -353,7 +353,7 @@ class _Rivals:
     """Fields for two answers, and the run that would distinguish them."""
 
     def __init__(self, session: Session, answer: Diagnosis) -> None:
-        from diagnosis.words.numbers import windy
+        from diagnosis.findings.misfit import windy
         from tunnel_sim.effects import known_effects
 
         self._session, self._left_out, self._settings = session, left_out_of(answer), answer.settings

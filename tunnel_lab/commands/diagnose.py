@@ -294,7 +294,7 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
         names: of the diagnoses, each different.
         answers: the reference first.
     """
-    from diagnosis.words.numbers import excess_std
+    from diagnosis.findings.misfit import excess_std
     from diagnosis.words.scatter import spread_estimate
     from identification.show.numbers import probability, share
 

@@ -136,7 +136,9 @@ def table_3(folder: Path) -> PaperSection:
         ),
         rows=rows,
         pictures=(
-            PaperPicture(file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."),
+            PaperPicture(
+                file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."
+            ),
         ),
     )  # fmt: skip
 

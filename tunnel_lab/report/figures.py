@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.findings.finding import Picture
+from diagnosis.findings.misfit import excess_std, misfit_scale, run_labels
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
-from diagnosis.words.numbers import excess_std, misfit_scale, run_labels
 from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label
 from identification.show.drawing import (

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnosis.findings.misfit import misfit_scale, run_labels
 from diagnosis.findings.whole import Findings
-from diagnosis.words.numbers import misfit_scale, run_labels
 from identification.printing import Document
 from identification.show.drawing import (
     AFTER,

@@ -12,6 +12,7 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import diagnose
+from diagnosis.findings.terms import KINDS
 from diagnosis.likelihood.ceiling import (
     Ceiling,
     Evidence,
@@ -32,7 +33,6 @@ from diagnosis.remainder.formula import Formula, FormulaTerm, choose, effect_of,
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
-from diagnosis.words.numbers import KINDS
 from diagnosis.words.remainder import closable_line, closable_words
 from diagnosis.words.tables import closable_table
 from tests.marks import slow

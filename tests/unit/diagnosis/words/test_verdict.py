@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
-from diagnosis.findings.closure import FITTED, GapSummary, Misfit, RunGap
+from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.found import Nearly
+from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import immaterial, nearly
 from diagnosis.findings.reported import held_out_totals
 from diagnosis.likelihood.least_squares import fit

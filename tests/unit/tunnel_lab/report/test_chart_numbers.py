@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.words.numbers import run_labels
+from diagnosis.findings.misfit import run_labels
 from tests.support.diagnosis_document import IDS
 from tunnel_lab.report.where import charts
 

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from diagnosis.findings.friction_curve import friction_figure
-from diagnosis.words.numbers import run_labels
+from diagnosis.findings.misfit import run_labels
 from identification.show.style import styled
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
 from tests.support.shown_numbers import numbers

@@ -1,0 +1,67 @@
+"""Words for the places, conditions, channels and kinds of law that findings name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from diagnosis.findings.judged import Judged
+from diagnosis.findings.misfit import windy
+from tunnel_sim.effects.registry import known_effects
+
+CHANNELS = {
+    "stiffness": "the restoring moment",
+    "damping": "the damping",
+    "forcing": "the forcing moment",
+    "sensor": "the sensor reading",
+    "calibration": "a stated value",
+}
+"""The object on which a cause or a gap acts."""
+
+
+CONDITIONS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
+"""The condition under which a cause acts, or a gap shows."""
+
+
+BANDS = {
+    "0": "slower than the oscillation",
+    "f0": "at the oscillation itself",
+    "2f0": "at twice its frequency",
+    "3f0": "at three times its frequency",
+    "above": "faster than its third harmonic",
+}
+"""Bands of frequency, in multiples of that of the motion."""
+
+
+MISFITS = {
+    "damping": "the damping along the runs",
+    "frequency": "the frequency along the runs",
+    "damping of runs": "the damping of single runs",
+    "frequency of runs": "the frequency of single runs",
+    "zero": "the zero",
+    "harmonics": "the harmonics",
+}
+"""Channels in which a set of effects may have a misfit."""
+
+
+KINDS: Mapping[str, str] = {
+    "angle": "a moment of the angle alone",
+    "rate": "a moment of the rate alone",
+    "state": "a moment of angle and rate",
+    "wind": "a moment of angle and rate with the wind",
+    "time": "a moment in time, equal in all runs",
+    "reading": "an error of the reading, equal in all runs",
+    "line": "a steady line in the reading, with its own phase in every run",
+    "between": "a stiffness, damping or moment of each run",
+    "event": "a moment in time of each run",
+    "wander": "a wandering or jumping zero of each run",
+    "noise": "nothing smooth: the rest is noise",
+}
+"""Kinds of missing law (`diagnosis.likelihood.ceiling.KINDS`)."""
+
+
+def acts_on(answer: Judged, effect: str) -> str:
+    """The object and condition of an effect, such as ``the damping, only with the wind on``; empty if unknown."""
+    kind = {kind.name: kind for kind in known_effects()}.get(effect)
+    if kind is None:
+        return ""
+    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"
