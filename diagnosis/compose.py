@@ -46,7 +46,7 @@ from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
-from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability, repeatability
+from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
@@ -122,7 +122,7 @@ class Confirmed:
         study, closes = confirmed(study)
         # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
         fitted = study.chosen if study.causes != UNKNOWN else study.between_runs or study.chosen
-        return cls(study, closes, repeatability(fitted))
+        return cls(study, closes, RunRepeatability.find(fitted))
 
 
 @dataclass(frozen=True)

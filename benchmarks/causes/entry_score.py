@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
-from diagnosis.words.scatter import SCATTERS
+from diagnosis.findings.terms import SCATTERS
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
 from tunnel_lab.experiments.blind.cases import Case, case, found_by_group, inclusions

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from diagnosis.settings import Settings
+from identification.status import Remark
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,14 @@ class Judged(Protocol):
     @property
     def figure_data(self) -> Mapping[str, Any]:
         """The data of the figures, in JSON's types; empty for an answer without them."""
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks of the examination."""
+
+    @property
+    def between_runs_remain(self) -> bool:
+        """Whether differences between the runs could explain what remains."""
 
     @property
     def rest_is_significant(self) -> bool:

@@ -1,126 +1,48 @@
-"""Repeatability of the runs under the answer: widths with intervals, and every run against the common model."""
+"""Repeatability of the runs: their chance differences, every run against the model, and the run that deviates most."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import fdtrc, ndtri, stdtr
 
-from diagnosis.likelihood.least_squares import Fit, scaled_residuals
-from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
-from diagnosis.likelihood.sensitivities import sensitivities
-from diagnosis.model.chance import Scatter
-from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
-from identification.campaign.random_effects import (
-    RunProducts,
-    WidthPrior,
-    likeliest_widths,
-    marginal,
-    width_quantiles,
+from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread, Trend
+from diagnosis.findings.finding import Picture, Pictured
+from diagnosis.findings.judged import Judged
+from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings.words import WordsSettings
+from identification.show.blocks import TextTable
+from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
+from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std
+from identification.show.quantity import Quantity
+from identification.show.style import INTERVAL, figure, figure_text, grid, styled
+from identification.status import SYSTEMATIC
+from tunnel_sim.vocabulary.quantities import Share
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MEANT = (
+    "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
+    "them."
 )
-from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.quantities import PerRun
-from tunnel_sim.vocabulary.record import Array
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Chance difference of a quantity between the runs.
-
-    Args:
-        effect: name of the scatter.
-        width: standard deviation of the runs' relative deviations, the likeliest, dimensionless.
-        interval: its central interval of 0.90, dimensionless.
-        stated: value stated by the campaign, dimensionless; None: not stated.
-        shown: whether the runs show it beyond the stated value; it is then among the causes.
-        deviations: of every run that it acts on, by id, relative, dimensionless.
-    """
-
-    effect: str
-    width: float
-    interval: tuple[float, float]
-    stated: float | None
-    shown: bool
-    deviations: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A quantity that differs between the runs by a pattern: in their order, or with a condition of the plan.
-
-    Args:
-        effect: name of the scatter of that quantity.
-        change: of the quantity from the first run to the last one, or from the least value of the condition to the
-            greatest, relative, dimensionless.
-        std: its standard deviation, dimensionless.
-        p_value: probability of such an order by chance, times the number of trends sought.
-        left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
-        only: whether the runs show no scatter of the quantity beside the drift.
-        along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density`` or ``amplitude``.
-    """
-
-    effect: str
-    change: float
-    std: float
-    p_value: float
-    left: float
-    only: bool = False
-    along: str = "order"
-
-
-@dataclass(frozen=True)
-class RunRepeat:
-    """A run against the model of all runs.
-
-    Args:
-        id: of the run.
-        windy: whether the wind is on.
-        frequency_hz: of small swings, predicted without a deviation of the run, Hz.
-        damping_ratio: of small swings, predicted without a deviation of the run, dimensionless.
-        frequency: the run's own over the predicted one minus one, a fraction.
-        frequency_std: its standard deviation by the noise, a fraction.
-        damping: the run's own damping ratio over the predicted one minus one, a fraction.
-        damping_std: its standard deviation by the noise, a fraction.
-        frequency_band: standard deviation of the frequency between runs, a fraction; 0 where they repeat.
-        damping_band: standard deviation of the damping ratio between runs, a fraction.
-        p_value: probability of such a deviation by chance, given the other runs, times the number of runs.
-    """
-
-    id: str
-    windy: bool
-    frequency_hz: float
-    damping_ratio: float
-    frequency: float
-    frequency_std: float
-    damping: float
-    damping_std: float
-    frequency_band: float
-    damping_band: float
-    p_value: float
-
-    def deviation(self, name: str) -> tuple[float, float, float]:
-        """The deviation of ``frequency`` or ``damping``, its deviation by noise, and its scatter between runs."""
-        if name == "frequency":
-            return self.frequency, self.frequency_std, self.frequency_band
-        return self.damping, self.damping_std, self.damping_band
-
-
-@dataclass(frozen=True)
-class ScatterLimits:
-    """Upper limits of scatter that was not detected, under a model that explains the runs down to their noise.
-
-    Args:
-        frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction;
-            None where the runs would hide usual scatter.
-        damping: of the damping ratio, as ``frequency``.
-    """
-
-    frequency: float | None
-    damping: float | None
+_ALONG = {
+    "spring_stiffness": "stiffness of the spring",
+    "wind_speed": "wind speed",
+    "air_density": "air density",
+    "amplitude": "amplitude",
+}
+_DRIFTS = {
+    "wind_speed": "does the lab warm up, or the fan drift?",
+    "spring_stiffness": "does the spring warm up, or creep?",
+    "mechanical_damping": "does the bearing run in, or the cable creep?",
+}
 
 
 @dataclass(frozen=True)
@@ -137,7 +59,7 @@ class AnswerWithout:
 
 
 @dataclass(frozen=True)
-class RunRepeatability:
+class RunRepeatability(Pictured):
     """Repeatability of the runs under the answer.
 
     Args:
@@ -156,248 +78,368 @@ class RunRepeatability:
     without_outlier: AnswerWithout | None = None
     limits: ScatterLimits | None = None
 
-
-_CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
-_AT_MOST = 0.95  # level of a limit
-_NUMBERS = 2  # by which a run may deviate: its frequency and its damping
-_FEWEST = 5  # fewest runs for an outlier or a drift
-_FEWEST_OF_PATTERN = 4  # fewest runs for a pattern of the plan
-_PATTERN = 0.05  # relative range of a condition that makes a pattern
-_OF_TREND = 2  # numbers of a straight line
-
-
-def repeatability(fitted: Fit) -> RunRepeatability | None:
-    """Repeatability of the runs.
-
-    Args:
-        fitted: the fit of the answer.
-
-    Returns:
-        None for a single run, for a body without a spring, and where the model's sensitivities are not finite.
-    """
-    found = _Runs.of(fitted)
-    if found is None:
-        return None
-    runs = tuple(found.run(index) for index in range(len(fitted.problem.data.runs)))
-    rate = fitted.settings.scatter.outlier_rate
-    outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
-    outlier = outliers[0].id if outliers else ""
-    return RunRepeatability(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
-
-
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """The runs of a fit, each with its own deviations.
-
-    Args:
-        fitted: the fit of the answer.
-        scatter: all differences that the runs could show; those of the fit have its widths.
-        columns: of the fit with all of them.
-        kept: indices of the fit's own differences among them.
-    """
-
-    fitted: Fit
-    scatter: Scatter
-    columns: ScatterColumns
-    kept: Sequence[int]
-
     @classmethod
-    def of(cls, fitted: Fit) -> _Runs | None:
-        own = {one.name: one for one in fitted.problem.scatter}
-        able = may_scatter(ALL_EFFECTS, fitted.problem.data)
-        if not able:
-            return None
-        scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
-        problem, point = with_deviations(*without_deviations(fitted), scatter)
-        names = fitted.problem.parameters.own_names
-        for place, name in enumerate(problem.parameters.own_names):
-            if name in own:
-                point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
-        jacobian = sensitivities(problem, point)
-        if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
-            return None
-        columns = ScatterColumns.of(problem, point, scaled_residuals(problem, point), jacobian)
-        return cls(fitted, scatter, columns, [k for k, one in enumerate(scatter) if one.name in own])
+    def find(cls, fitted: Fit) -> RunRepeatability | None:
+        """Repeatability of the runs.
 
-    @property
-    def products(self) -> RunProducts:
-        """Products of the columns of the fit's own differences."""
-        deviations = [one[:, self.kept] for one in self.columns.deviations]
-        return RunProducts.of(deviations, self.columns.common, self.columns.seen)
+        Args:
+            fitted: the fit of the answer.
 
-    @property
-    def prior(self) -> WidthPrior:
-        """Prior of the widths of the fit's own differences."""
-        return width_prior(self.fitted.problem)
-
-    @property
-    def alone(self) -> tuple[int, int]:
-        """Indices of the differences in a run's own stiffness and in its own damping."""
-        numbers = [one.kind.scatters for one in self.scatter]
-        return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
-
-    def spreads(self) -> tuple[Spread, ...]:
-        """The differences of the fit with the intervals of their widths."""
-        scatter, data = self.fitted.problem.scatter, self.fitted.problem.data
-        if not scatter:
-            return ()
-        if any(one.shown for one in scatter):
-            low, middle, high = width_quantiles(self.products, self.prior, _CENTRAL)
-        else:
-            low = middle = high = np.array([one.width for one in scatter])
-        found = marginal(self.products, middle).deviations
-        spreads = []
-        for k, one in enumerate(scatter):
-            acts = [one.kind.acts(wind_on=run.wind_on) for run in data.runs]
-            own = {run.id: float(e) for run, e, a in zip(data.runs, found[:, k], acts, strict=True) if a}
-            known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
-            spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
-        return tuple(spreads)
-
-    def limits(self) -> ScatterLimits | None:
-        """Limits of the scatter of frequency and damping; None where the fit has chance differences.
-
-        A limit is the quantile of the width given the runs. Where it is hardly below the quantile of the prior, the
-        runs say nothing about the scatter.
+        Returns:
+            None for a single run, for a body without a spring, and where the model's sensitivities are not finite.
         """
-        if self.kept:
+        found = RunDeviations.of(fitted)
+        if found is None:
             return None
-        pair = list(self.alone)
-        problem = replace(self.fitted.problem, scatter=tuple(self.scatter[place] for place in pair))
-        prior = width_prior(problem)
-        products = RunProducts.of(
-            [one[:, pair] for one in self.columns.deviations], self.columns.common, self.columns.seen
-        )
-        widths = width_quantiles(products, prior, (_AT_MOST,))[0]
-        unseen = prior.usual * 10.0 ** (prior.decades * float(ndtri(_AT_MOST)))
-        per = np.array([self._per(index) for index in range(len(self.fitted.problem.data.runs))])
-        sizes = widths * np.sqrt(np.mean(per**2, axis=0))
-        told = widths <= self.fitted.settings.scatter.limit_told * unseen
-        frequency, damping = (float(size) if known else None for size, known in zip(sizes, told, strict=True))
-        return ScatterLimits(frequency, damping)
+        runs = tuple(found.run(index) for index in range(len(fitted.problem.data.runs)))
+        rate = fitted.settings.scatter.outlier_rate
+        outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
+        outlier = outliers[0].id if outliers else ""
+        return cls(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
 
-    def trends(self) -> tuple[Trend, ...]:
-        """Parameters that differ between the runs and follow their order, or a condition of the plan.
+    @property
+    def scatters(self) -> bool:
+        """Whether the runs show scatter, or some is stated."""
+        return any(one.width for one in self.spreads)
 
-        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
-        place in the campaign, or to the condition. Widths are those beside the drift.
+    def repeats(self, judged: Judged) -> bool:
+        """Whether a test that could see scatter between the runs saw none, and none is stated."""
+        return not self.scatters and not self._undetermined(judged)
+
+    def _undetermined(self, judged: Judged) -> str:
+        """The reason why it is not known whether the runs repeat, as a clause; empty where it is known.
+
+        Scatter is measured against the noise, so the answer must explain the runs down to their noise.
         """
-        places = [place for place in self.kept if self.scatter[place].shown]
-        rate = self.fitted.settings.scatter.trend_rate
-        clearest = []
-        for place in places:
-            patterns = self._patterns(place)
-            tried = len(places) * len(patterns)
-            found = [self._trend(place, along, values, tried) for along, values in patterns.items()]
-            known = [one for one in found if one is not None and one.p_value < rate]
-            clearest += [min(known, key=lambda one: one.p_value)] if known else []
-        return tuple(clearest)
+        if judged.causes == UNKNOWN:
+            return "since no known effect explains the gap"
+        if not judged.decided:
+            return "since the answer is undecided"
+        if judged.rest_is_significant:
+            return "since the answer leaves a gap beyond the noise"
+        if judged.between_runs_remain:
+            return "since a difference between the runs could explain the rest"
+        limits = self.limits
+        if limits is None or (limits.frequency is None and limits.damping is None):
+            return "since these runs would not show usual scatter"
+        return ""
 
-    def _patterns(self, place: int) -> dict[str, PerRun | None]:
-        """Quantities that the deviations of one parameter may follow, from -1/2 to 1/2; None for the order."""
-        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
-        acts = np.array([kind.acts(wind_on=run.wind_on) for run in runs])
-        known = {
-            "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
-            "wind_speed": [run.wind_speed for run in runs],
-            "air_density": [run.air_density for run in runs],
-            "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
-        }
-        found: dict[str, PerRun | None] = {"order": None}
-        for name, given in known.items():
-            values = np.array(given)
-            has = (
-                acts & (values > 0.0) if name == "air_density" else acts
-            )  # without wind no density is stated
-            low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
-            if high - low > _PATTERN * high:
-                found[name] = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
-        return found
+    def spread_estimate(self, effect: str, given: Quantity) -> str | None:
+        """The parameter of a scatter in per cent, with its interval in the answer; None for other effects.
 
-    def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
-        """The drift of one parameter; None where too few runs have it."""
-        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
-        count = sum(kind.acts(wind_on=run.wind_on) for run in runs)
-        if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):
+        Args:
+            effect: that the parameter belongs to.
+            given: the parameter.
+        """
+        if effect not in SCATTERS:
             return None
-        columns, size = self.columns.with_drift(place, values)
-        products = RunProducts.of(
-            [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
+        spread = next((one for one in self.spreads if one.effect == effect), None)
+        return percent_of(given.value) if spread is None else width_text(spread)
+
+    def words(self, judged: Judged) -> str:
+        """Repeatability of the runs, in sentences; empty where they repeat, or it is not known."""
+        return " ".join(filter(None, (self._scatter_words(judged), self._outlier_words(judged))))
+
+    def _scatter_words(self, judged: Judged) -> str:
+        """Chance differences or drifts of the runs and their meaning; empty where there are none."""
+        shown = [one for one in self.spreads if one.shown]
+        if not shown:
+            return self._stated_words(judged)
+        trends = {one.effect: one for one in self.trends}
+        drifting = {effect for effect, one in trends.items() if one.only}
+        said = []
+        if scattered := [one for one in shown if one.effect not in drifting]:
+            parts = "; ".join(_differs(one, trends) for one in scattered)
+            said.append(f"{self._start(judged)}: {parts}. {_MEANT}")
+        said += map(trend_words, trends.values())
+        if not scattered:
+            said.append("The intervals of the coefficients allow for it.")
+        return " ".join([*said, *_told_apart(self.spreads, judged.settings.words)])
+
+    def systematic(self, judged: Judged) -> list[str]:
+        """Words for what the examination found of a pattern in the runs' differences; and the patterns' effects."""
+        remarks = [remark.figures.get(SYSTEMATIC) for remark in judged.remarks]
+        return [*filter(None, remarks), *(one.effect for one in self.trends)]
+
+    def _start(self, judged: Judged) -> str:
+        if not judged.decided:
+            return "With every answer the runs differ from each other by chance"
+        if without_scatter(judged.causes):
+            return "In addition the runs differ by chance"
+        likely = probability(judged.likely)
+        if self.systematic(judged):
+            return f"The runs differ from each other, and not by chance alone (probability {likely})"
+        only = "" if judged.rest_is_material else " only"
+        return f"The runs differ from each other by chance{only} (probability {likely})"
+
+    def _stated_words(self, judged: Judged) -> str:
+        """The statement that the runs differ no more than the campaign states; empty where it states nothing."""
+        stated = [one for one in self.spreads if one.stated]
+        if not stated or judged.causes == UNKNOWN:
+            return ""
+        sizes = listed([f"{NUMBERS[SCATTERS[one.effect]]} {_stated(one)}" for one in stated])
+        return f"The runs differ no more than stated ({sizes}); the intervals allow for it."
+
+    def _outlier_words(self, judged: Judged) -> str:
+        """The run that deviates far beyond the others, with its deviation; empty without one."""
+        run = self.outlier
+        if not run:
+            return ""
+        own = next(one for one in self.runs if one.id == run)
+        parts = []
+        for name in ("frequency", "damping"):
+            value, std, band = own.deviation(name)
+            usual = max(band, std, 1e-300)
+            parts.append((abs(value) / usual, f"{name} {percent_of(value, sign=True)}"))
+        least = judged.settings.words.deviation_named
+        far = [text for stds, text in parts if stds >= least] or [max(parts)[1]]
+        said = f"Run {run} deviates far beyond the others: {' and '.join(far)} relative to the model of all runs."
+        return " ".join(filter(None, (said, self._without_outlier(judged, self.without_outlier))))
+
+    def _without_outlier(self, judged: Judged, other: AnswerWithout | None) -> str:
+        """The answer of the other runs; empty where it is not known."""
+        if not other:
+            return ""
+        causes, known = other.causes, probability(other.probability)
+        if causes == judged.causes:
+            return f"Without it the causes are the same ({known})."
+        if not causes:
+            return "Without it there is no gap."
+        if causes == UNKNOWN:
+            return f"Without it no known effect explains the gap ({known})."
+        return f"Without it the answer is {plain(*causes)} ({known})."
+
+    def steps(self, judged: Judged) -> list[str]:
+        """Next steps for a run that deviates far beyond the others, and for poorly distinguished quantities."""
+        run = self.outlier
+        steps = (
+            [f"Repeat run {run}, or look for a disturbance: it deviates far beyond the others."]
+            if run
+            else []
         )
-        widths = likeliest_widths(products, self.prior)
-        beside = marginal(products, widths)
-        slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
-        if std <= 0.0:  # only the common parameters change along the campaign
-            return None
-        # only the runs determine the width
-        p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
-        left = float(widths[list(self.kept).index(place)])
-        known = [one.name for one in self.fitted.problem.scatter]
-        only = values is None and kind.name in known and drifts(self.fitted, known.index(kind.name))
-        return Trend(kind.name, float(slope), std, p_value, left, only, along)
+        poorly = _told_apart(self.spreads, judged.settings.words)
+        named = {SCATTERS[name] for name in scattering(judged.causes)}
+        if poorly and "wind_speed" not in named:  # whose advice includes this
+            steps.append("Log the wind speed of every run: the runs do not distinguish it from the spring.")
+        return steps
 
-    def _changes(self, index: int) -> Array:
-        """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""
-        problem = self.fitted.problem
-        run = problem.data.runs[index]
-        stated = problem.stated(self.fitted.point.common, self.fitted.point.per_run[index], run)
-        table = SettingsTable.of([stated])
-        return np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
+    def line(self, judged: Judged) -> str:
+        """Repeatability of the runs, in a line; empty for fewer than two runs."""
+        if len(self.runs) < 2:
+            return ""
+        if self.limits is not None and self.repeats(judged):
+            return f"Repeatability: no run-to-run scatter detected: {_limits(self.limits)}."
+        if not self.scatters:
+            own = [f"{name} by {_root_mean_square(self.runs, name)}" for name in ("frequency", "damping")]
+            return (
+                f"Repeatability: not determined, {self._undetermined(judged)}. The runs, one by one, deviate from the "
+                f"model in {' and in '.join(own)} (root mean square)."
+            )
+        each = [
+            f"{name} ± {_root_mean_square(self.runs, name, of_scatter=True)}"
+            for name in ("frequency", "damping")
+        ]
+        beyond = f"; outlier: {self.outlier}" if self.outlier else ""
+        return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}."
 
-    def _per(self, index: int) -> Array:
-        """Relative changes of a run's frequency and damping by a unit of its own spring and damper, shape (2,)."""
-        changes, pair = self._changes(index), self.alone
-        _, damping, stiffness = linear_coefficients(self.fitted, index)
-        return np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
+    def table(self, judged: Judged) -> TextTable:
+        """Every run against the model; a table without rows where the runs repeat."""
+        rows, known = [], self.scatters
+        for run in self.runs if not self.repeats(judged) else ():
+            deviations = [
+                f"{_signed(value, std)}{_band(band) if known else ''}"
+                for value, std, band in (run.deviation("frequency"), run.deviation("damping"))
+            ]
+            remark = "deviates far beyond the others" if run.id == self.outlier else ""
+            rows.append((run.id, "on" if run.windy else "off", *deviations, remark))
+        heads = ("run", "wind", "frequency [%]", "damping [%]", "remark")
+        last = None if any(row[-1] for row in rows) else -1
+        title = "Every run against the model"
+        if known:
+            title += ", and its scatter by chance (one standard deviation)"
+        return TextTable(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
 
-    def run(self, index: int) -> RunRepeat:
-        """One run against the model."""
-        problem = self.fitted.problem
-        run, pair = problem.data.runs[index], self.alone
-        inertia, damping, stiffness = linear_coefficients(self.fitted, index)
-        changes, per = self._changes(index), self._per(index)
-        deviation = self.columns.deviations[index][:, pair]
-        covariance = np.linalg.pinv(deviation.T @ deviation)
-        own = per * (covariance @ (deviation.T @ self.columns.seen[index]))
-        std = np.abs(per) * np.sqrt(np.diag(covariance))
-        widths = np.array([one.width if k in self.kept else 0.0 for k, one in enumerate(self.scatter)])
-        bands = (
-            np.abs(per)
-            * np.sqrt(np.sum((widths[:, None] * changes) ** 2, axis=0))
-            / np.abs(np.array([changes[pair[0], 0], changes[pair[1], 1]]))
+    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+        """Every run against the model; none for fewer than two runs."""
+        del judged
+        caption = (
+            "Repeatability: frequency and damping ratio of every run minus the prediction of the model of all runs. "
+            "Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which depends on "
+            "wind and spring."
         )
-        return RunRepeat(
-            id=run.id,
-            windy=run.wind_on,
-            frequency_hz=problem.data.model.frequency(inertia, stiffness),
-            damping_ratio=damping / (2.0 * float(np.sqrt(max(inertia * stiffness, 1e-300)))),
-            frequency=float(own[0]),
-            frequency_std=float(std[0]),
-            damping=float(own[1]),
-            damping_std=float(std[1]),
-            frequency_band=float(bands[0]),
-            damping_band=float(bands[1]),
-            p_value=self._p_value(index),
+        description = (
+            "Frequency and damping ratio of every run minus the model's, with the scatter as a band."
         )
+        drawn = Picture("repeatability", caption, description, partial(repeatability_figure, self))
+        return (drawn,) if len(self.runs) > 1 else ()
 
-    def _p_value(self, index: int) -> float:
-        """P-value of a run's deviation given the others, times the number of runs."""
-        count = len(self.columns.seen)
-        if not self.kept or count < _FEWEST:
-            return 1.0
-        products, pair = self.products, self.alone
-        others = RunProducts(*(np.delete(values, index, axis=0) for values in vars(products).values()))
-        widths = likeliest_widths(others, self.prior)
-        found = marginal(others, widths)
-        # in the run's own stiffness and damping
-        own = self.columns.deviations[index][:, pair]
-        covariance = np.linalg.pinv(own.T @ own)
-        kept = self.columns.deviations[index][:, self.kept]
-        by_chance = covariance @ (own.T @ kept) * widths
-        by_common = covariance @ (own.T @ self.columns.common[index])
-        left = self.columns.seen[index] - self.columns.common[index] @ found.common
-        away = covariance @ (own.T @ left)
-        whole = covariance + by_chance @ by_chance.T + by_common @ found.covariance @ by_common.T
-        distance = float(away @ np.linalg.solve(whole, away)) / _NUMBERS
-        # only the other runs determine the widths
-        return min(1.0, count * float(fdtrc(_NUMBERS, max(count - 2, 1), distance)))
+
+def _stated(spread: Spread) -> str:
+    """The scatter stated by the campaign, in its own form; nothing stated is none."""
+    return f"{100.0 * (spread.stated or 0.0):.4g} %"
+
+
+def width_text(spread: Spread) -> str:
+    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; without it for a stated width."""
+    low, high = spread.interval
+    text = percent_of(spread.width)
+    return text if low == high else f"{text} ({percent_of(low).removesuffix(' %')} to {percent_of(high)})"
+
+
+def _differs(spread: Spread, trends: Mapping[str, Trend]) -> str:
+    """One quantity that differs: its width, the reference, and the runs that deviate most."""
+    text = f"{NUMBERS[SCATTERS[spread.effect]]} by {width_text(spread)}"
+    if spread.stated is not None:
+        text += f", beyond the {_stated(spread)} stated"
+    if spread.effect in trends:
+        return text
+    most = sorted(spread.deviations.items(), key=lambda one: -abs(one[1]))[:2]
+    return f"{text}, {' and '.join(f'{run} {percent_of(own, 1, sign=True)}' for run, own in most)} most"
+
+
+def trend_words(trend: Trend) -> str:
+    """The drift of a quantity over the campaign, in a sentence."""
+    number = SCATTERS[trend.effect]
+    change, std = 100.0 * abs(trend.change), 100.0 * trend.std
+    goes = "rises" if trend.change > 0.0 else "falls"
+    moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
+    along = trend.along
+    if along != "order":
+        moved = f"{with_std(change, std)} % {'higher' if trend.change > 0.0 else 'lower'}"
+        return (
+            f"Part of this is not by chance: {NUMBERS[number]} is {moved} at the greatest {_ALONG[along]} than at "
+            f"the least. The remaining scatter is {percent_of(trend.left)}."
+        )
+    if trend.only:
+        return f"The runs drift but do not scatter: {moved} ({_DRIFTS[number]})."
+    return (
+        f"Part of this is a drift: {moved} ({_DRIFTS[number]}). "
+        f"The remaining scatter is {percent_of(trend.left)}."
+    )
+
+
+def _ratio(interval: Sequence[float]) -> float:
+    low, high = interval
+    return high / low if low > 0.0 else float("inf")
+
+
+def _limits(limits: ScatterLimits) -> str:
+    """Upper limits of scatter that is not detected, such as ``frequency less than 0.05 %``."""
+    said = [
+        f"{name} not determined, since these runs would not show usual scatter"
+        if limit is None
+        else f"{name} less than {rounded_up(100.0 * limit)} %"
+        for name, limit in (("frequency", limits.frequency), ("damping", limits.damping))
+    ]
+    return f"{', '.join(said)} (one standard deviation; 95 % limits)"
+
+
+def _root_mean_square(runs: Sequence[RunRepeat], name: str, *, of_scatter: bool = False) -> str:
+    """Root mean square over the runs of their own deviations of a quantity, or of its scatter, in per cent."""
+    place = 2 if of_scatter else 0
+    return percent_of((sum(one.deviation(name)[place] ** 2 for one in runs) / len(runs)) ** 0.5)
+
+
+def _band(width: Share) -> str:
+    """The scatter of a quantity by chance, such as `` (± 0.039)``."""
+    return f" (± {percent_of(width).removesuffix(' %')})"
+
+
+def _signed(value: float, std: float) -> str:
+    """A deviation in per cent with its sign."""
+    text = concise(100.0 * abs(value), 100.0 * std)
+    return f"{'−' if value < 0.0 else '+'}{text}"
+
+
+def _told_apart(spreads: Sequence[Spread], chosen: WordsSettings) -> list[str]:
+    """The statement that the runs hardly distinguish two quantities, where so."""
+    both = [one for one in spreads if SCATTERS[one.effect] in ("wind_speed", "spring_stiffness")]
+    if len(both) < 2 or not any(one.shown for one in both):
+        return []
+    poorly = [one for one in both if _ratio(one.interval) > chosen.width_known_within and one.shown]
+    hidden = [one for one in both if not one.shown and one.stated is None]
+    if hidden:
+        other = NUMBERS[SCATTERS[hidden[0].effect]]
+        bound = percent_of(hidden[0].interval[1])
+        return [
+            f"{other[0].upper()}{other[1:]} may also differ, by up to {bound}; these runs do not show it."
+        ]
+    if poorly:
+        return [
+            "These runs hardly distinguish the wind speed from the spring: add wind-off runs, or log the wind "
+            "speed."
+        ]
+    return []
+
+
+_ROW = 0.24  # inches for a run
+_AROUND = 1.25  # inches: key, axis and its label
+_BAND_HEIGHT = 0.72  # of a row
+_MARGIN = 0.08  # of the axis
+_BESIDE = 7.0  # points between a mark and its text
+_DRAWN_NUMBERS = {"frequency": "frequency", "damping": "damping ratio"}
+
+
+@styled
+def repeatability_figure(found: RunRepeatability) -> Figure:
+    """Every run's frequency and damping minus the model's, in per cent.
+
+    The runs are in their order. The band of a run is the 95 % interval of the scatter between runs under its wind
+    and spring. Error bars are the noise's 95 % intervals.
+    """
+    runs = found.runs
+    fig = figure(NARROW, _AROUND + _ROW * max(len(runs), 4))
+    panels = fig.subplots(1, 2, sharey=True)
+    for axes, name in zip(panels, _DRAWN_NUMBERS, strict=True):
+        _draw_runs(axes, runs, name, str(found.outlier))
+    panels[0].set_yticks(np.arange(len(runs)), [figure_text(str(one.id)) for one in runs])
+    panels[0].set_ylim(len(runs) - 0.4, -0.6)
+    panels[1].tick_params(axis="y", length=0)
+    handles, labels = panels[0].get_legend_handles_labels()
+    if not found.scatters:
+        labels = ["noise (95 %)" if label.startswith("scatter") else label for label in labels]
+    fig.legend(
+        handles,
+        labels,
+        loc="outside upper left",
+        ncols=min(len(labels), 3),
+        handlelength=1.4,
+        columnspacing=1.2,
+    )
+    return fig
+
+
+def _draw_runs(axes: Axes, runs: Sequence[RunRepeat], name: str, outlier: str) -> None:
+    """One quantity of every run against the model's, with its band and error bar."""
+    rows = np.arange(len(runs))
+    value, std, band = (
+        100.0 * column for column in np.array([one.deviation(name) for one in runs], np.float64).T
+    )
+    reach = INTERVAL * np.hypot(band, std if not band.any() else 0.0)
+    axes.barh(
+        rows, 2.0 * reach, left=-reach, height=_BAND_HEIGHT, color=NOISE, linewidth=0, label="scatter (95 %)"
+    )
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    windy = np.array([bool(one.windy) for one in runs])
+    far = np.array([one.id == outlier for one in runs])
+    kinds = ((windy & ~far, "wind on", AFTER, AFTER), (~windy & ~far, "wind off", AFTER, PAPER))
+    for chosen, label, colour, face in (*kinds, (far, "deviates far beyond", BEFORE, BEFORE)):
+        if chosen.any():
+            axes.errorbar(
+                value[chosen], rows[chosen], xerr=INTERVAL * std[chosen], fmt="D" if label[0] == "d" else "o",
+                color=colour, mfc=face, ms=5, capsize=2, elinewidth=1.0, label=label,
+            )  # fmt: skip
+    ends = np.concatenate([value - INTERVAL * std, value + INTERVAL * std, reach, -reach])
+    low, high = float(ends.min()), float(ends.max())
+    margin = _MARGIN * (high - low) or 1.0
+    axes.set_xlim(low - margin, high + margin)
+    axes.set_xlabel(f"{_DRAWN_NUMBERS[name]} minus\nthe model's [%]")
+    axes.locator_params(axis="x", nbins=4)
+    grid(axes, "x")
+    for row in np.flatnonzero(far & (np.abs(value) > reach)).tolist():
+        # on the side that has room
+        side = -1.0 if value[row] > float(np.mean(axes.get_xlim())) else 1.0
+        axes.annotate(
+            percent_of(runs[row].deviation(name)[0], sign=True), (value[row], row), (side * _BESIDE, 0),
+            textcoords="offset points", ha="left" if side > 0.0 else "right", va="center", color=INK,
+        )  # fmt: skip

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from diagnosis.findings.judged import Judged
 from diagnosis.findings.misfit import windy
-from tunnel_sim.effects.registry import known_effects
+from identification.show.numbers import plain
+from tunnel_sim.effects.registry import ALL_EFFECTS, known_effects
 
 CHANNELS = {
     "stiffness": "the restoring moment",
@@ -65,3 +66,43 @@ def acts_on(answer: Judged, effect: str) -> str:
     if kind is None:
         return ""
     return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"
+
+
+SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
+"""The quantity that differs between runs, by the name of the scatter."""
+
+
+NUMBERS = {
+    "wind_speed": "the wind speed",
+    "spring_stiffness": "the spring",
+    "mechanical_damping": "the damping",
+}
+"""The quantities that may differ between runs, in words."""
+
+
+BETWEEN_RUNS = "scatter between runs"
+"""Chance differences between runs, in any quantity, in a few words."""
+
+
+def without_scatter(names: Iterable[str]) -> list[str]:
+    """Causes proper: those that are not chance differences between runs."""
+    return [name for name in names if name not in SCATTERS]
+
+
+def scattering(names: Iterable[str]) -> list[str]:
+    """Chance differences between runs among some causes."""
+    return [name for name in names if name in SCATTERS]
+
+
+def named_answer(causes: Sequence[str]) -> str:
+    """The causes in a few words, such as ``coulomb friction, and scatter between runs``."""
+    proper = without_scatter(causes)
+    if not scattering(causes):
+        return plain(*proper)
+    return f"{plain(*proper)}, and {BETWEEN_RUNS}" if proper else BETWEEN_RUNS.capitalize()
+
+
+def answer_name(effect: str) -> str:
+    """Names of effects joined by plus signs, with every scatter between runs as one part."""
+    names = effect.split(" + ")
+    return " + ".join([*without_scatter(names), *([BETWEEN_RUNS] if scattering(names) else [])])

@@ -138,6 +138,16 @@ class Findings:
         return self.gap.misfit
 
     @property
+    def repeated(self) -> RunRepeatability:
+        """Repeatability of the runs; an empty one where it is not known."""
+        return self.repeatability or RunRepeatability()
+
+    @property
+    def between_runs_remain(self) -> bool:
+        """Whether differences between the runs could explain what remains."""
+        return self.closable is not None and self.closable.kind == "between"
+
+    @property
     def rest_is_significant(self) -> bool:
         """Whether a gap remains beyond chance."""
         return self.rest is not None and self.rest.significant

@@ -10,9 +10,6 @@ from identification.show.blocks import Figure
 CAPTIONS: Mapping[str, str] = {
     "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "
     "residuals. The first view shows the cycles in which the models differ most.",
-    "repeatability": "Repeatability: frequency and damping ratio of every run minus the prediction of the model of "
-    "all runs. Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which depends "
-    "on wind and spring.",
     "how-far": "Misfit of every run before and after. Filled circles: the run was held out of the fit, "
     "and only its release was refitted. Open circles: the run was part of the fit.",
     "law": "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within "

@@ -6,19 +6,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown
-from diagnosis.findings.terms import acts_on
+from diagnosis.findings.repeatability import width_text
+from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
-from diagnosis.words.scatter import (
-    BETWEEN_RUNS,
-    SCATTERS,
-    scattering,
-    spreads_of,
-    width_text,
-    without_scatter,
-)
 from diagnosis.words.verdict import size_words
 from identification.show.blocks import Card, Heading, Paragraph
 from identification.show.numbers import beside_noise, left_over, plain, probability, share, times_noise
@@ -121,7 +114,7 @@ def cause_cards(answer: Findings) -> list[Card]:
         for name in without_scatter(names)
     ]
     if scatter := scattering(names):
-        spreads = [one for one in spreads_of(answer) if one.effect in scatter]
+        spreads = [one for one in answer.repeated.spreads if one.effect in scatter]
         widths = "; ".join(f"{plain(SCATTERS[one.effect])} {width_text(one)}" for one in spreads)
         cards.append(
             _cause(

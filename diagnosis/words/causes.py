@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.terms import BETWEEN_RUNS, scattering, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     estimated,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of
+from diagnosis.findings.terms import named_answer, scattering
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import set_out
-from diagnosis.words.scatter import named_answer, scattering
 from diagnosis.words.tables import SOURCES
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (

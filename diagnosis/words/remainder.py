@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 from diagnosis.findings.misfit import misfit_of, rms_shown
-from diagnosis.findings.terms import KINDS
+from diagnosis.findings.terms import KINDS, scattering
 from diagnosis.findings.whole import Findings
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.remainder.closable import Closable, Law, Line
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.scatter import scattering
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     change_up_to,

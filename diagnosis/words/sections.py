@@ -23,11 +23,6 @@ from diagnosis.words.lines import (
     patch_line,
 )
 from diagnosis.words.remainder import closable_line
-from diagnosis.words.scatter import (
-    repeatability_line,
-    repeatability_table,
-    repeats,
-)
 from diagnosis.words.symbols import symbol_rows
 from diagnosis.words.tables import (
     budget_table,
@@ -185,9 +180,9 @@ def _causes(answer: Findings) -> Section:
 
 
 def _repeats(answer: Findings) -> Section:
-    line = repeatability_line(answer)
-    drawn = [] if not line or repeats(answer) else [captioned("repeatability")]
-    return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, repeatability_table(answer)))
+    line = answer.repeated.line(answer)
+    drawn = [] if not line or answer.repeated.repeats(answer) else [*pictured(answer, "repeatability")]
+    return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, answer.repeated.table(answer)))
 
 
 def _how_far(answer: Findings, campaign: Campaign | None) -> Section:

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from diagnosis.findings.misfit import misfit_text, unit_of
-from diagnosis.findings.terms import KINDS
+from diagnosis.findings.terms import KINDS, answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked, set_out
-from diagnosis.words.scatter import answer_name, spread_estimate
 from identification.printing import coefficient_label
 from identification.show.blocks import TextTable
 from identification.show.numbers import (
@@ -68,7 +67,9 @@ def candidates_table(answer: Findings) -> TextTable:
 def _estimate(answer: Findings, full: str, candidate: str, given: Quantity) -> str:
     """A parameter of an answer, by its full name."""
     mark = unit_mark(beside(given.unit, ""))
-    return spread_estimate(answer, full.rpartition(".")[0] or candidate, given) or estimated(given, mark)
+    return answer.repeated.spread_estimate(full.rpartition(".")[0] or candidate, given) or estimated(
+        given, mark
+    )
 
 
 def parameters_table(answer: Findings) -> TextTable:

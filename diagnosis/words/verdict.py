@@ -9,7 +9,15 @@ from diagnosis.findings.candidates import CauseSize
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.other_motions import TwoModes
-from diagnosis.findings.terms import CHANNELS, CONDITIONS, MISFITS
+from diagnosis.findings.terms import (
+    BETWEEN_RUNS,
+    CHANNELS,
+    CONDITIONS,
+    MISFITS,
+    named_answer,
+    scattering,
+    without_scatter,
+)
 from diagnosis.findings.whole import Findings
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.rivals.two_springs import SpringError
@@ -25,15 +33,6 @@ from diagnosis.words.causes import (
 )
 from diagnosis.words.own_model import model_step, model_words
 from diagnosis.words.remainder import formula_step
-from diagnosis.words.scatter import (
-    BETWEEN_RUNS,
-    named_answer,
-    repeat_steps,
-    repeats_words,
-    scattering,
-    systematic,
-    without_scatter,
-)
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     beside_noise,
@@ -58,7 +57,7 @@ def headline(answer: Findings) -> tuple[str, str]:
     if answer.found.hold:
         delay = plain(the_effect(delays=True).name)
         words = words.replace(delay, f"{delay} or wrong hold")
-    if kind == "found" and not without_scatter(answer.causes) and systematic(answer):
+    if kind == "found" and not without_scatter(answer.causes) and answer.repeated.systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
     found = answer.disturbed
     disturbed = [one.run for one in found if one.at_s is not None]
@@ -115,7 +114,7 @@ def verdict(answer: Findings, rest: str) -> str:
 def _answer(answer: Findings, rest: str) -> str:
     """The gap, its causes, and the share of the gap that they explain."""
     causes, gap, facts = answer.causes, answer.gap, answer.found
-    excess, repeats = gap.excess_before, repeats_words(answer)
+    excess, repeats = gap.excess_before, answer.repeated.words(answer)
     if not causes:
         sentence = (
             "No gap: the nominal model explains the runs down to their noise "
@@ -506,7 +505,7 @@ def next_steps(answer: Findings) -> list[str]:
     causes = answer.causes
     steps = [_repeat(one) for one in answer.disturbed]
     steps += _remedies(answer.remarks)
-    steps += repeat_steps(answer)
+    steps += answer.repeated.steps(answer)
     if causes != UNKNOWN and answer.decision.decided:
         steps += choice_steps(answer)
     if (run := run_to_make(answer)) is not None and answer.ambiguous_with:

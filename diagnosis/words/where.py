@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping
 from math import degrees
 from typing import Any
 
-from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS
+from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, scattering
 from diagnosis.findings.whole import Findings
 from diagnosis.model.fact import Fact
 from diagnosis.settings import WordsSettings
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
-from diagnosis.words.scatter import scattering
 from identification.show.numbers import p_text, part, plain
 from tunnel_sim.effects import effect_class
 

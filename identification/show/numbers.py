@@ -313,3 +313,14 @@ def listed(parts: Sequence[str]) -> str:
     """Parts of a sentence as a list: ``one, two and three``."""
     *first, last = parts
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def percent_of(value: Share, digits: int = 2, *, sign: bool = False) -> str:
+    """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
+
+    Args:
+        digits: significant ones (a count).
+        sign: whether a plus sign is written.
+    """
+    text = significant(100.0 * abs(value), digits) if value else "0"
+    return f"{'−' if value < 0.0 else '+' if sign else ''}{text} %"

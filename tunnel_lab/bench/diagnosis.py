@@ -227,19 +227,22 @@ class ShownAnswer:
         """The figures of the report's summary."""
 
         def drawings() -> list[str]:
-            from diagnosis.words.scatter import repeats
             from identification.show.drawing import inline_svg
             from tunnel_lab.report.figures import waterfall_figure
             from tunnel_lab.report.page import descriptions
-            from tunnel_lab.report.repeatability import repeatability_figure
             from tunnel_lab.report.where import runs_figure
 
             drawn = {"waterfall": waterfall_figure(answer)}
-            if not repeats(answer):
-                drawn["repeatability"] = repeatability_figure(answer)
+            if not answer.repeated.repeats(answer):
+                drawn |= {
+                    name: answer.pictures[name].draw()
+                    for name in ["repeatability"]
+                    if name in answer.pictures
+                }
             if answer.maps:
                 drawn["where-runs"] = runs_figure(answer)
-            drawn |= {name: one.draw() for name, one in answer.pictures.items()}
+            own = [drawing for one in answer.findings.values() for drawing in one.pictures(answer)]
+            drawn |= {drawing.name: drawing.draw() for drawing in own}
             described = descriptions(answer)
             return [inline_svg(fig, name, described[name]) for name, fig in drawn.items() if fig is not None]
 

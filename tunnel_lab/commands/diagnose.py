@@ -295,7 +295,6 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
         answers: the reference first.
     """
     from diagnosis.findings.misfit import excess_std
-    from diagnosis.words.scatter import spread_estimate
     from identification.show.numbers import probability, share
 
     def excess(answer: Diagnosis, value: float) -> str:
@@ -322,7 +321,7 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
             owner, _, name = full.rpartition(".")
             mark = unit_mark(beside(given.unit, ""))
             owner = owner or first_answer.effect
-            texts[owner, name] = spread_estimate(answer, owner, given) or estimated(given, mark)
+            texts[owner, name] = answer.repeated.spread_estimate(owner, given) or estimated(given, mark)
         parameters.append(texts)
     labels = {
         name: coefficient_label(name, given.unit)

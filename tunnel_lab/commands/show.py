@@ -116,7 +116,6 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
     """
     from tunnel_lab.report import draw
     from tunnel_lab.report.diagnosis_file import read_diagnosis
-    from tunnel_lab.report.repeatability import repeatability_figure
     from tunnel_lab.report.where import fit_pages
 
     answer, drawn = read_diagnosis(file), dict[str, "Figure"]()
@@ -128,8 +127,9 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
                 raise TunnelError("has no curves to draw", where=where, remedy=again)
             drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
         drawn |= {name: draw(answer, name) for name in names if name != "fit"}
-        repeats = None if names else repeatability_figure(answer)
-    return drawn if repeats is None else drawn | {"repeatability": repeats}
+        if not names and "repeatability" in answer.pictures:
+            drawn["repeatability"] = draw(answer, "repeatability")
+    return drawn
 
 
 def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:

@@ -13,10 +13,10 @@ import numpy as np
 
 from diagnosis.findings.finding import Picture
 from diagnosis.findings.misfit import excess_std, misfit_scale, run_labels
+from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
 from diagnosis.words.cards import WITHIN_THE_NOISE
-from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label
 from identification.show.drawing import (
     ACCENT,
@@ -46,7 +46,6 @@ from identification.show.style import (
     styled,
 )
 from tunnel_lab.report import where
-from tunnel_lab.report.repeatability import repeatability_figure
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -107,7 +106,6 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return makers | {
         "which": candidates_figure,
-        "repeatability": repeatability_figure,
         "how-far": closure_figure,
         "law": law_figure,
         "coefficients": coefficients_figure,

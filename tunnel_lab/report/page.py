@@ -43,7 +43,6 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
-    "repeatability": "Frequency and damping ratio of every run minus the model's, with the scatter as a band.",
     "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",

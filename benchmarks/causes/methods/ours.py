@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.causes.entry import KINDS, About, answer_of, main
-from diagnosis.words.scatter import SCATTERS
+from diagnosis.findings.terms import SCATTERS
 
 ABOUT = About("tunnel diagnose", "as delivered, no option")
 

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from diagnosis.findings.decision import Decision, Predictions, decision
+from diagnosis.findings.terms import SCATTERS
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
-from diagnosis.words.scatter import SCATTERS
 from identification.statistics import Proportion
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.files.toml_input import NotNegative

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.run_deviations import ScatterLimits
 from diagnosis.findings.judgements import zeros_apart
-from diagnosis.findings.repeatability import RunRepeatability, ScatterLimits, repeatability
+from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.units import own_repeatability
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered

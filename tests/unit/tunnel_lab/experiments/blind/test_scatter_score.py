@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from diagnosis.words.scatter import SCATTERS
+from diagnosis.findings.terms import SCATTERS
 from identification.statistics import Proportion
 from tests.unit.tunnel_lab.experiments.blind.test_set_score import TRUTH, document
 from tunnel_lab.experiments.blind import score_page as blind

@@ -1,0 +1,350 @@
+"""Repeatability of the runs under the answer: widths with intervals, and every run against the common model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import fdtrc, ndtri, stdtr
+
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
+from diagnosis.likelihood.sensitivities import sensitivities
+from diagnosis.model.chance import Scatter
+from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
+from identification.campaign.random_effects import (
+    RunProducts,
+    WidthPrior,
+    likeliest_widths,
+    marginal,
+    width_quantiles,
+)
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.quantities import PerRun
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Chance difference of a quantity between the runs.
+
+    Args:
+        effect: name of the scatter.
+        width: standard deviation of the runs' relative deviations, the likeliest, dimensionless.
+        interval: its central interval of 0.90, dimensionless.
+        stated: value stated by the campaign, dimensionless; None: not stated.
+        shown: whether the runs show it beyond the stated value; it is then among the causes.
+        deviations: of every run that it acts on, by id, relative, dimensionless.
+    """
+
+    effect: str
+    width: float
+    interval: tuple[float, float]
+    stated: float | None
+    shown: bool
+    deviations: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A quantity that differs between the runs by a pattern: in their order, or with a condition of the plan.
+
+    Args:
+        effect: name of the scatter of that quantity.
+        change: of the quantity from the first run to the last one, or from the least value of the condition to the
+            greatest, relative, dimensionless.
+        std: its standard deviation, dimensionless.
+        p_value: probability of such an order by chance, times the number of trends sought.
+        left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
+        only: whether the runs show no scatter of the quantity beside the drift.
+        along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density`` or ``amplitude``.
+    """
+
+    effect: str
+    change: float
+    std: float
+    p_value: float
+    left: float
+    only: bool = False
+    along: str = "order"
+
+
+@dataclass(frozen=True)
+class RunRepeat:
+    """A run against the model of all runs.
+
+    Args:
+        id: of the run.
+        windy: whether the wind is on.
+        frequency_hz: of small swings, predicted without a deviation of the run, Hz.
+        damping_ratio: of small swings, predicted without a deviation of the run, dimensionless.
+        frequency: the run's own over the predicted one minus one, a fraction.
+        frequency_std: its standard deviation by the noise, a fraction.
+        damping: the run's own damping ratio over the predicted one minus one, a fraction.
+        damping_std: its standard deviation by the noise, a fraction.
+        frequency_band: standard deviation of the frequency between runs, a fraction; 0 where they repeat.
+        damping_band: standard deviation of the damping ratio between runs, a fraction.
+        p_value: probability of such a deviation by chance, given the other runs, times the number of runs.
+    """
+
+    id: str
+    windy: bool
+    frequency_hz: float
+    damping_ratio: float
+    frequency: float
+    frequency_std: float
+    damping: float
+    damping_std: float
+    frequency_band: float
+    damping_band: float
+    p_value: float
+
+    def deviation(self, name: str) -> tuple[float, float, float]:
+        """The deviation of ``frequency`` or ``damping``, its deviation by noise, and its scatter between runs."""
+        if name == "frequency":
+            return self.frequency, self.frequency_std, self.frequency_band
+        return self.damping, self.damping_std, self.damping_band
+
+
+@dataclass(frozen=True)
+class ScatterLimits:
+    """Upper limits of scatter that was not detected, under a model that explains the runs down to their noise.
+
+    Args:
+        frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction;
+            None where the runs would hide usual scatter.
+        damping: of the damping ratio, as ``frequency``.
+    """
+
+    frequency: float | None
+    damping: float | None
+
+
+_CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
+_AT_MOST = 0.95  # level of a limit
+_NUMBERS = 2  # by which a run may deviate: its frequency and its damping
+_FEWEST = 5  # fewest runs for an outlier or a drift
+_FEWEST_OF_PATTERN = 4  # fewest runs for a pattern of the plan
+_PATTERN = 0.05  # relative range of a condition that makes a pattern
+_OF_TREND = 2  # numbers of a straight line
+
+
+@dataclass(frozen=True, eq=False)
+class RunDeviations:
+    """The runs of a fit, each with its own deviations.
+
+    Args:
+        fitted: the fit of the answer.
+        scatter: all differences that the runs could show; those of the fit have its widths.
+        columns: of the fit with all of them.
+        kept: indices of the fit's own differences among them.
+    """
+
+    fitted: Fit
+    scatter: Scatter
+    columns: ScatterColumns
+    kept: Sequence[int]
+
+    @classmethod
+    def of(cls, fitted: Fit) -> RunDeviations | None:
+        own = {one.name: one for one in fitted.problem.scatter}
+        able = may_scatter(ALL_EFFECTS, fitted.problem.data)
+        if not able:
+            return None
+        scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
+        problem, point = with_deviations(*without_deviations(fitted), scatter)
+        names = fitted.problem.parameters.own_names
+        for place, name in enumerate(problem.parameters.own_names):
+            if name in own:
+                point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
+        jacobian = sensitivities(problem, point)
+        if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
+            return None
+        columns = ScatterColumns.of(problem, point, scaled_residuals(problem, point), jacobian)
+        return cls(fitted, scatter, columns, [k for k, one in enumerate(scatter) if one.name in own])
+
+    @property
+    def products(self) -> RunProducts:
+        """Products of the columns of the fit's own differences."""
+        deviations = [one[:, self.kept] for one in self.columns.deviations]
+        return RunProducts.of(deviations, self.columns.common, self.columns.seen)
+
+    @property
+    def prior(self) -> WidthPrior:
+        """Prior of the widths of the fit's own differences."""
+        return width_prior(self.fitted.problem)
+
+    @property
+    def alone(self) -> tuple[int, int]:
+        """Indices of the differences in a run's own stiffness and in its own damping."""
+        numbers = [one.kind.scatters for one in self.scatter]
+        return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
+
+    def spreads(self) -> tuple[Spread, ...]:
+        """The differences of the fit with the intervals of their widths."""
+        scatter, data = self.fitted.problem.scatter, self.fitted.problem.data
+        if not scatter:
+            return ()
+        if any(one.shown for one in scatter):
+            low, middle, high = width_quantiles(self.products, self.prior, _CENTRAL)
+        else:
+            low = middle = high = np.array([one.width for one in scatter])
+        found = marginal(self.products, middle).deviations
+        spreads = []
+        for k, one in enumerate(scatter):
+            acts = [one.kind.acts(wind_on=run.wind_on) for run in data.runs]
+            own = {run.id: float(e) for run, e, a in zip(data.runs, found[:, k], acts, strict=True) if a}
+            known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
+            spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
+        return tuple(spreads)
+
+    def limits(self) -> ScatterLimits | None:
+        """Limits of the scatter of frequency and damping; None where the fit has chance differences.
+
+        A limit is the quantile of the width given the runs. Where it is hardly below the quantile of the prior, the
+        runs say nothing about the scatter.
+        """
+        if self.kept:
+            return None
+        pair = list(self.alone)
+        problem = replace(self.fitted.problem, scatter=tuple(self.scatter[place] for place in pair))
+        prior = width_prior(problem)
+        products = RunProducts.of(
+            [one[:, pair] for one in self.columns.deviations], self.columns.common, self.columns.seen
+        )
+        widths = width_quantiles(products, prior, (_AT_MOST,))[0]
+        unseen = prior.usual * 10.0 ** (prior.decades * float(ndtri(_AT_MOST)))
+        per = np.array([self._per(index) for index in range(len(self.fitted.problem.data.runs))])
+        sizes = widths * np.sqrt(np.mean(per**2, axis=0))
+        told = widths <= self.fitted.settings.scatter.limit_told * unseen
+        frequency, damping = (float(size) if known else None for size, known in zip(sizes, told, strict=True))
+        return ScatterLimits(frequency, damping)
+
+    def trends(self) -> tuple[Trend, ...]:
+        """Parameters that differ between the runs and follow their order, or a condition of the plan.
+
+        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
+        place in the campaign, or to the condition. Widths are those beside the drift.
+        """
+        places = [place for place in self.kept if self.scatter[place].shown]
+        rate = self.fitted.settings.scatter.trend_rate
+        clearest = []
+        for place in places:
+            patterns = self._patterns(place)
+            tried = len(places) * len(patterns)
+            found = [self._trend(place, along, values, tried) for along, values in patterns.items()]
+            known = [one for one in found if one is not None and one.p_value < rate]
+            clearest += [min(known, key=lambda one: one.p_value)] if known else []
+        return tuple(clearest)
+
+    def _patterns(self, place: int) -> dict[str, PerRun | None]:
+        """Quantities that the deviations of one parameter may follow, from -1/2 to 1/2; None for the order."""
+        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
+        acts = np.array([kind.acts(wind_on=run.wind_on) for run in runs])
+        known = {
+            "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
+            "wind_speed": [run.wind_speed for run in runs],
+            "air_density": [run.air_density for run in runs],
+            "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
+        }
+        found: dict[str, PerRun | None] = {"order": None}
+        for name, given in known.items():
+            values = np.array(given)
+            has = (
+                acts & (values > 0.0) if name == "air_density" else acts
+            )  # without wind no density is stated
+            low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
+            if high - low > _PATTERN * high:
+                found[name] = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
+        return found
+
+    def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
+        """The drift of one parameter; None where too few runs have it."""
+        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
+        count = sum(kind.acts(wind_on=run.wind_on) for run in runs)
+        if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):
+            return None
+        columns, size = self.columns.with_drift(place, values)
+        products = RunProducts.of(
+            [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
+        )
+        widths = likeliest_widths(products, self.prior)
+        beside = marginal(products, widths)
+        slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
+        if std <= 0.0:  # only the common parameters change along the campaign
+            return None
+        # only the runs determine the width
+        p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
+        left = float(widths[list(self.kept).index(place)])
+        known = [one.name for one in self.fitted.problem.scatter]
+        only = values is None and kind.name in known and drifts(self.fitted, known.index(kind.name))
+        return Trend(kind.name, float(slope), std, p_value, left, only, along)
+
+    def _changes(self, index: int) -> Array:
+        """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""
+        problem = self.fitted.problem
+        run = problem.data.runs[index]
+        stated = problem.stated(self.fitted.point.common, self.fitted.point.per_run[index], run)
+        table = SettingsTable.of([stated])
+        return np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
+
+    def _per(self, index: int) -> Array:
+        """Relative changes of a run's frequency and damping by a unit of its own spring and damper, shape (2,)."""
+        changes, pair = self._changes(index), self.alone
+        _, damping, stiffness = linear_coefficients(self.fitted, index)
+        return np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
+
+    def run(self, index: int) -> RunRepeat:
+        """One run against the model."""
+        problem = self.fitted.problem
+        run, pair = problem.data.runs[index], self.alone
+        inertia, damping, stiffness = linear_coefficients(self.fitted, index)
+        changes, per = self._changes(index), self._per(index)
+        deviation = self.columns.deviations[index][:, pair]
+        covariance = np.linalg.pinv(deviation.T @ deviation)
+        own = per * (covariance @ (deviation.T @ self.columns.seen[index]))
+        std = np.abs(per) * np.sqrt(np.diag(covariance))
+        widths = np.array([one.width if k in self.kept else 0.0 for k, one in enumerate(self.scatter)])
+        bands = (
+            np.abs(per)
+            * np.sqrt(np.sum((widths[:, None] * changes) ** 2, axis=0))
+            / np.abs(np.array([changes[pair[0], 0], changes[pair[1], 1]]))
+        )
+        return RunRepeat(
+            id=run.id,
+            windy=run.wind_on,
+            frequency_hz=problem.data.model.frequency(inertia, stiffness),
+            damping_ratio=damping / (2.0 * float(np.sqrt(max(inertia * stiffness, 1e-300)))),
+            frequency=float(own[0]),
+            frequency_std=float(std[0]),
+            damping=float(own[1]),
+            damping_std=float(std[1]),
+            frequency_band=float(bands[0]),
+            damping_band=float(bands[1]),
+            p_value=self._p_value(index),
+        )
+
+    def _p_value(self, index: int) -> float:
+        """P-value of a run's deviation given the others, times the number of runs."""
+        count = len(self.columns.seen)
+        if not self.kept or count < _FEWEST:
+            return 1.0
+        products, pair = self.products, self.alone
+        others = RunProducts(*(np.delete(values, index, axis=0) for values in vars(products).values()))
+        widths = likeliest_widths(others, self.prior)
+        found = marginal(others, widths)
+        # in the run's own stiffness and damping
+        own = self.columns.deviations[index][:, pair]
+        covariance = np.linalg.pinv(own.T @ own)
+        kept = self.columns.deviations[index][:, self.kept]
+        by_chance = covariance @ (own.T @ kept) * widths
+        by_common = covariance @ (own.T @ self.columns.common[index])
+        left = self.columns.seen[index] - self.columns.common[index] @ found.common
+        away = covariance @ (own.T @ left)
+        whole = covariance + by_chance @ by_chance.T + by_common @ found.covariance @ by_common.T
+        distance = float(away @ np.linalg.solve(whole, away)) / _NUMBERS
+        # only the other runs determine the widths
+        return min(1.0, count * float(fdtrc(_NUMBERS, max(count - 2, 1), distance)))
