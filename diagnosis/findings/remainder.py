@@ -322,8 +322,8 @@ def law_pictures(found: Closable | None) -> tuple[Picture, ...]:
     if found is None or found.curve is None:
         return ()
     caption = (
-        "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within the band. "
-        "The part that the coefficients and the zero of the model absorb is subtracted."
+        "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within the "
+        "band. The part that the coefficients and the zero of the model absorb is subtracted."
     )
     description = "The missing moment, or error of the reading, as a curve with its band or as a map."
     return (Picture("law", caption, description, partial(law_figure, found.curve)),)
