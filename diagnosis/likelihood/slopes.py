@@ -43,7 +43,7 @@ def changes(asked: Asked, count: int) -> list[Array]:
     points = len(asked.runs) // count - 1
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     skip = any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects})
-    if skip or any(asked.physics.program):  # nor has a moment by expression
+    if skip or any(asked.physics.program[:count]):  # a moment by expression has none
         return unknown
     motions = Motions.of(asked, like=count)
     if motions.rows["twist_stiffness"].any():
