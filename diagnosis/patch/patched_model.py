@@ -427,9 +427,9 @@ def _written_model(
     differences = identified.differences
     if identified.patch.friction > 0.0:
         creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
-        differences += (
-            Fact("soft friction", {"below_per_s": creep, "unit": "m" if model.law.slide else "rad"}),
-        )
+        if creep > 0.0:
+            unit = "m" if model.law.slide else "rad"
+            differences += (Fact("soft friction", {"below_per_s": creep, "unit": unit}),)
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     if (made := identified.patch.actuator) is not None and made.delay > 0.0:
