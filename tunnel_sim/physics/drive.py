@@ -74,7 +74,7 @@ class DriveMoment:
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         finite = all(map(isfinite, (self.scale, self.delay, self.offset)))
-        finite = finite and bool(np.isfinite(self.time_s).all() and np.isfinite(self.values).all())
+        finite = finite and _is_finite(Same(self.time_s)) and _is_finite(Same(self.values))
         if self.time_s.shape != self.values.shape or not self.time_s.size or not finite:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
@@ -98,12 +98,10 @@ class DriveMoment:
             return exerted
         return replace(exerted, values=exerted.values + exerted.offset / exerted.scale, offset=0.0)
 
-    @cached_property
+    @property
     def interval(self) -> Seconds:
         """Time between its samples; 0 where they are not even."""
-        interval = float(self.time_s[-1] - self.time_s[0]) / max(1, self.time_s.size - 1)
-        even = self.time_s[0] + interval * np.arange(self.time_s.size)
-        return interval if np.max(np.abs(self.time_s - even)) <= _EVEN * interval else 0.0
+        return _interval(Same(self.time_s))
 
     @property
     def through_actuator(self) -> bool:
@@ -233,6 +231,20 @@ class Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Same) and other.array is self.array
+
+
+@lru_cache(maxsize=128)
+def _is_finite(values: Same) -> bool:
+    return bool(np.isfinite(values.array).all())
+
+
+@lru_cache(maxsize=64)
+def _interval(time_s: Same) -> Seconds:
+    """As `DriveMoment.interval`."""
+    times = time_s.array
+    interval = float(times[-1] - times[0]) / max(1, times.size - 1)
+    even = times[0] + interval * np.arange(times.size)
+    return interval if np.max(np.abs(times - even)) <= _EVEN * interval else 0.0
 
 
 @lru_cache(maxsize=64)
