@@ -282,7 +282,8 @@ class _Course:
         alternate: whether the lines after the first have two lengths by turns.
         level, slope: of the lines, in the unit of the samples, and per s, shape (lines,).
         line: on which each time is, shape (n,).
-        since: time since that line's start, s, shape (n,); None where every time is at one.
+        between: places of the times that are not at a line's start, shape (m,).
+        since: of these, time since their line's start, s, shape (m,).
     """
 
     lengths: Array
@@ -291,7 +292,8 @@ class _Course:
     level: PerSample
     slope: PerSample
     line: NDArray[np.intp]
-    since: Times | None
+    between: NDArray[np.intp]
+    since: Times
 
 
 @lru_cache(maxsize=64)
@@ -310,7 +312,7 @@ def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _C
         lengths[1:] = drive.interval
     line = np.maximum(np.searchsorted(starts, time_s + within, side="right") - 1, 0)
     since = np.maximum(time_s - starts[line], 0.0)
-    apart = np.max(since, initial=0.0) > within
+    between = np.flatnonzero(since > rounding)
     return _Course(
         lengths[:3] if alternate else lengths,
         in_turn if alternate else number,
@@ -318,7 +320,8 @@ def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _C
         level - slope * within,
         slope,
         line,
-        since if apart else None,
+        between,
+        since[between],
     )
 
 
@@ -343,9 +346,9 @@ def _mode(times: Same, values: Same, held: bool, delay: float, root: complex, at
     else:
         state[1:] = recurrence(factor, added)
     found = state[course.line]
-    if course.since is not None:
-        by_level, by_slope = weights(course.since)
-        beyond = by_level * course.level[course.line] + by_slope * course.slope[course.line]
-        found = np.exp(root * course.since) * found + beyond
+    if course.between.size:
+        line, (by_level, by_slope) = course.line[course.between], weights(course.since)
+        beyond = by_level * course.level[line] + by_slope * course.slope[line]
+        found[course.between] = np.exp(root * course.since) * found[course.between] + beyond
     found.flags.writeable = False
     return found
