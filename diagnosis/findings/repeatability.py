@@ -264,8 +264,8 @@ class RunRepeatability(Pictured):
         del judged
         caption = (
             "Repeatability: frequency and damping ratio of every run minus the prediction of the model of all "
-            "runs. Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which depends "
-            "on wind and spring."
+            "runs. Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which "
+            "depends on wind and spring."
         )
         description = (
             "Frequency and damping ratio of every run minus the model's, with the scatter as a band."

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.actuator import DIRECT, ActuatorLimits, recurrence
+from tunnel_sim.physics.actuator import DIRECT, ActuatorLimits, InputSamples, recurrence
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.quantities import (
     Moments,
