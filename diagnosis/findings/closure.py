@@ -2,6 +2,29 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from diagnosis.answer.held_out import Waterfall
+from diagnosis.findings.finding import Picture
+from diagnosis.findings.judged import Judged
+from diagnosis.findings.misfit import excess_std, misfit_scale, misfit_text, unit_of
+from diagnosis.findings.terms import answer_name
+from identification.show.blocks import TextTable
+from identification.show.drawing import ACCENT, AFTER, BEFORE, INK, LINE, NARROW, NOISE, PAPER, QUIET, SIGMAS
+from identification.show.numbers import p_text, plain, reading_shown, significant, unit_mark
+from identification.show.style import figure, figure_text, grid, styled
+from tunnel_sim.vocabulary.campaign import Campaign
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -130,3 +153,245 @@ class NoiseSummary:
     stated_std: float | None
     source: str
     reason: str = ""
+
+
+_IN_BRACKETS = "root mean square (in brackets: mean square over the noise variance)"
+
+
+def runs_table(
+    gap: GapSummary, shows: Sequence[str], judged: Judged, campaign: Campaign | None = None
+) -> TextTable:
+    """The gap before and after, all runs first; a table without rows where no gap was found.
+
+    Args:
+        shows: ids of the runs that show the gap.
+        campaign: adds the conditions of the runs, also where no gap was found.
+    """
+    named = judged.names_effects
+    gaps = {run.id: run for run in gap.runs}
+    runs = {run.id: run for run in campaign.runs} if campaign else {}
+    windy = any(run.wind_on for run in runs.values())
+    conditions = (
+        ("spring [N m/rad]", *["wind [m/s]"] * windy, "duration [s]", "sample rate [Hz]") if runs else ()
+    )
+
+    def after(value: float) -> str:
+        return misfit_text(judged, value) if named else "–"
+
+    before = misfit_text(judged, gap.excess_before)
+    rows = [("all", *[""] * len(conditions), before, after(gap.excess_after), "")] if gap.detected else []
+    for name in runs or (gaps if gap.detected else ()):
+        found, stated = gaps.get(name), []
+        if run := runs.get(name):
+            spring = "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}"
+            wind = [f"{run.wind_speed:g}" if run.wind_on else "off"] if windy else []
+            stated = [spring, *wind, f"{run.record.duration:.3g}", f"{run.record.sample_rate:.4g}"]
+        fitted = " (fitted)" if found and not found.held_out else ""
+        sizes = (misfit_text(judged, found.before), after(found.after)) if found else ("–", "–")
+        rows.append((name + fitted, *stated, *sizes, "yes" if name in shows else ""))
+    shown = "shows the gap"
+    heads = ("run", *conditions, "before", "after", shown)
+    detail = (*conditions, shown)
+    return TextTable(f"Gap, {_IN_BRACKETS}", heads, tuple(rows), right=heads[1:-1], detail=detail)
+
+
+def waterfall_table(waterfall: Waterfall, judged: Judged) -> TextTable:
+    """The residual gap with each cause added, and without each; a table without rows where no cause is named."""
+    steps, without = waterfall.steps, waterfall.without
+    rows = []
+    for step in steps if len(steps) > 1 else ():
+        alone = misfit_text(judged, without[step.effect]) if step.effect and step.effect in without else ""
+        name = answer_name(step.effect) if step.effect else "nominal model"
+        rows.append((name, misfit_text(judged, step.excess), alone))
+    title = f"Gap {waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
+    heads = ("cause added", "residual gap", "without this cause")
+    return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
+
+
+TESTS = {
+    "below": "residual power below half the frequency f₀ of the oscillation",
+    "f0": "residual power at f₀, from 0.5 to 1.5 f₀: the oscillation itself",
+    "2f0": "residual power at its second harmonic, from 1.5 to 2.5 f₀",
+    "3f0": "residual power at its third harmonic, from 2.5 to 3.5 f₀",
+    "above": "residual power above 3.5 f₀",
+    "offset": "whether the runs have a common zero",
+    "noise against amplitude": "whether the noise grows or shrinks with the amplitude of the motion",
+    "noise against rate": "whether the noise grows or shrinks with the rate of the motion",
+    "noise in bursts": "whether the noise comes in bursts",
+    "noise level": "whether the noise is above the level that the campaign states",
+}
+"""The tested properties, by the names of the tests."""
+
+
+def tests_table(gap: GapSummary) -> TextTable:
+    """The tests of the gap: name, tested property, and p-value."""
+    tests = gap.tests.items()
+    rows = tuple((name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests)
+    title = "Tests of the gap; p is the probability that noise alone gives as much"
+    return TextTable(title, ("test", "tested property", "p"), rows, right=("p",))
+
+
+def noise_line(noise: NoiseSummary, judged: Judged) -> str:
+    """The noise to which the gap is compared, and its origin."""
+    unit = unit_of(judged)
+    size = f"{reading_shown(noise.std, 3, unit)} (noise_std = {noise.std:.3g} {unit_mark(unit)})"
+    return f"Noise: {size}, {noise.source} ({noise.reason})."
+
+
+def model_line(checked: Confirmation, judged: Judged) -> str:
+    """The model that the gaps are computed with; empty where a caveat says more about it."""
+    unit = unit_of(judged)
+    if not checked.agrees:
+        return ""
+    most, rms, allowed = (
+        reading_shown(size, 2, unit)
+        for size in (checked.largest_difference, checked.rms_difference, checked.tolerance)
+    )
+    return (
+        f"The gaps are computed by the MuJoCo model. The integrator of the fits differs from it by {most} at most "
+        f"({rms} root mean square in run {checked.run}; {allowed} is allowed)."
+    )
+
+
+WITHIN_THE_NOISE = "within the noise"
+"""A residual gap that is not significant, in the words of the verdict."""
+
+
+def closure_pictures(gap: GapSummary, waterfall: Waterfall, judged: Judged) -> tuple[Picture, ...]:
+    """The residual gap as the causes are added, where some are, and run by run."""
+    by_cause = Picture(
+        "waterfall",
+        "The residual misfit as the causes are added, the largest contribution first, "
+        f"{waterfall.held_out}. Open circles: the misfit without this cause, the others refitted.",
+        "The residual gap as the causes are added one after another.",
+        partial(waterfall_figure, waterfall, judged),
+    )
+    by_run = Picture(
+        "how-far",
+        "Misfit of every run before and after. Filled circles: the run was held out of the fit, and only its "
+        "release was refitted. Open circles: the run was part of the fit.",
+        "Misfit of every run with the nominal model and with the causes added.",
+        partial(closure_figure, gap, judged),
+    )
+    return (*([by_cause] if len(waterfall.steps) > 1 else []), by_run)
+
+
+@styled
+def waterfall_figure(waterfall: Waterfall, judged: Judged) -> Figure:
+    """The residual gap as the causes are added one after another.
+
+    A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a dot
+    for the rest, on a linear scale of the root mean square misfit.
+    """
+    steps = waterfall.steps
+    unit, size = misfit_scale(judged)
+    misfits = np.array([size(step.excess) for step in steps], np.float64)
+    without = {name: size(value) for name, value in waterfall.without.items()}
+    alone = [without.get(step.effect or "", np.nan) if len(without) > 1 else np.nan for step in steps]
+    fig = figure(NARROW, 1.2 + 0.36 * (misfits.size + 1))
+    axes = fig.add_subplot()
+    rows, upper = np.arange(misfits.size + 1), np.maximum(misfits[:-1], misfits[1:])
+    lower = np.minimum(misfits[:-1], misfits[1:])
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(misfits)]
+    axes.vlines(misfits, rows[:-1], rows[1:], color=QUIET, linewidth=0.8, zorder=0.9)
+    axes.barh(rows[1:-1], upper - lower, left=lower, color=colours, height=0.55)
+    for row, value, colour in ((0, misfits[0], BEFORE), (rows[-1], misfits[-1], ACCENT)):
+        axes.plot(value, row, "o", color=colour, ms=8, clip_on=False)
+    if np.isfinite(alone).any():
+        label = "without this cause alone"
+        axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
+    names = [textwrap.fill(f"+ {plain(answer_name(step.effect or ''))}", _STEP_LABEL) for step in steps[1:]]
+    axes.set_yticks(rows, ["nominal model", *names, "the rest"])
+    axes.set(ylim=(misfits.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
+    axes.locator_params(axis="x", nbins=6)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    axes.axvline(0.0, color=QUIET, linewidth=0.8, zorder=0.8)
+    grid(axes, "x")
+    shown = [
+        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}"
+        for value in misfits.tolist()
+    ]
+    if judged.rest_is_significant:
+        shown[-1] += ", material" if judged.rest_is_material else ", immaterial"
+    else:
+        shown[-1] = WITHIN_THE_NOISE
+    # The residual after the last cause is given in the row of the rest.
+    words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
+    _place_texts(axes, words, [misfits[0], *upper, misfits[-1]], [*alone, np.nan])
+    noise = size(SIGMAS * (excess_std(judged) or _LEAST_EXCESS))
+    seen = noise > _VISIBLE * axes.get_xlim()[1]
+    axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)
+    if seen or np.isfinite(alone).any():  # a key aligned with the axis above it
+        axes.legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.0, borderaxespad=0.3,
+            handlelength=1.2, columnspacing=1.4,
+        )  # fmt: skip
+    return fig
+
+
+_STEP_LABEL = 20  # characters in a line of a label
+_LEAST_EXCESS, _LEAST_NOISE = (
+    1e-3,
+    0.03,
+)  # of an excess and of three standard deviations: for a document without maps
+_VISIBLE = 0.01  # of the axis: a narrower band is invisible, and has no key
+_BESIDE = 7.0  # points between a mark and its text
+_MARK = 5.0  # points: the mark of the residual gap without one cause
+_BEFORE_ZERO = 0.03  # of the axis: keeps a mark at zero clear of the labels
+
+
+def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks: Sequence[float]) -> None:
+    """Write texts to the right of their bars or dots, clear of the marks, and extend the axis to hold all texts.
+
+    Args:
+        words: the text of each row.
+        ends: right end of each row's bar or dot, in data units.
+        marks: another mark in the row, in data units; NaN: none.
+    """
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # sizes are known only after the layout
+    points = 72.0 / axes.figure.dpi
+    whole = points * axes.get_window_extent().width
+    texts = [
+        axes.annotate(text, (end, row), (_BESIDE, 0), textcoords="offset points", va="center")
+        for row, (text, end) in enumerate(zip(words, ends, strict=True))
+    ]
+    widths = [_BESIDE + points * text.get_window_extent().width for text in texts]
+    beside = np.fmax(ends, marks)  # position of a text that has to clear the mark
+    free = (1.0 + _BEFORE_ZERO) * (1.0 - np.array(widths) / whole) - _BEFORE_ZERO
+    reach = float(max(np.max(beside / free), 1.05 * np.max(beside))) or 1.0
+    axes.set_xlim(-_BEFORE_ZERO * reach, reach)
+    point = (1.0 + _BEFORE_ZERO) * reach / whole
+    for row, (text, end, mark) in enumerate(zip(texts, ends, marks, strict=True)):
+        if end + (_BESIDE - _MARK) * point < mark < end + (widths[row] + _MARK) * point:
+            text.xy = (mark, row)
+
+
+@styled
+def closure_figure(gap: GapSummary, judged: Judged) -> Figure:
+    """Misfit of every run before and after the causes are added; filled marks for runs held out of the fit."""
+    runs = gap.runs
+    fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
+    axes = fig.add_subplot()
+    rows = np.arange(len(runs))
+    unit, size = misfit_scale(judged)
+    before = np.array([size(run.before) for run in runs])
+    after = np.array([size(run.after) for run in runs])
+    stds = [run["std"] for run in judged.figure_data.get("runs", [])]
+    noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
+    axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
+    most = 1.05 * float(max(before.max(), after.max())) or 1.0
+    axes.set(xlim=(0.0, most), xlabel=f"root mean square misfit [{unit}]")
+    axes.hlines(rows, after, before, color=LINE, linewidth=2.5)
+    axes.plot(before, rows, "s", color=BEFORE, ms=5, clip_on=False, label="nominal model")
+    if not np.array_equal(before, after):
+        held_out = np.array([run.held_out for run in runs])
+        for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
+            if chosen.any():
+                points, label = (after[chosen], rows[chosen]), f"with the causes, run {words}"
+                axes.plot(*points, "o", color=AFTER, mfc=face, ms=5, clip_on=False, label=label)
+    axes.set_yticks(rows, [figure_text(run.id) for run in runs])
+    axes.invert_yaxis()
+    fig.legend(loc="outside upper left", ncols=2)
+    grid(axes)
+    return fig

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
 from diagnosis.findings.candidates import Candidate, CauseSize
-from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, closure_pictures
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
 from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
@@ -117,7 +117,14 @@ class Findings:
         """The figures of the findings, by name."""
         pictured = [one for one in vars(self).values() if isinstance(one, Pictured)]
         drawn = [drawn for one in pictured for drawn in one.pictures(self)]
-        return {one.name: one for one in (*drawn, *law_pictures(self.closable))}
+        return {
+            one.name: one
+            for one in (
+                *drawn,
+                *closure_pictures(self.gap, self.waterfall, self),
+                *law_pictures(self.closable),
+            )
+        }
 
     @property
     def settings(self) -> Settings:

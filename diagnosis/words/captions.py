@@ -10,8 +10,6 @@ from identification.show.blocks import Figure
 CAPTIONS: Mapping[str, str] = {
     "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "
     "residuals. The first view shows the cycles in which the models differ most.",
-    "how-far": "Misfit of every run before and after. Filled circles: the run was held out of the fit, "
-    "and only its release was refitted. Open circles: the run was part of the fit.",
     "where-runs": "Excess of every run over time: the mean squared residual of the nominal model over the "
     "noise variance, minus one, on a logarithmic scale. Empty cells are within three standard deviations of "
     "the noise.",

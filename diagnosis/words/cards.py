@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+from diagnosis.findings.closure import WITHIN_THE_NOISE
 from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
@@ -16,9 +17,6 @@ from diagnosis.words.verdict import size_words
 from identification.show.blocks import Card, Heading, Paragraph
 from identification.show.numbers import beside_noise, left_over, plain, probability, share, times_noise
 from tunnel_sim.effects import known_effects
-
-WITHIN_THE_NOISE = "within the noise"
-"""A residual gap that is not significant, in the words of the verdict."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of
+from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown
 from diagnosis.findings.terms import named_answer, scattering
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import set_out
@@ -126,25 +126,3 @@ def patch_line(answer: Findings) -> str:
         )
     zero = f"{'−' if model.zero_rad < 0.0 else '+'} {reading_shown(abs(model.zero_rad), 3)}"
     return f"{said} The reading is the position of {model.joint} {zero}."
-
-
-def noise_line(answer: Findings) -> str:
-    """The noise to which the gap is compared, and its origin."""
-    noise, unit = answer.noise, unit_of(answer)
-    size = f"{reading_shown(noise.std, 3, unit)} (noise_std = {noise.std:.3g} {unit_mark(unit)})"
-    return f"Noise: {size}, {noise.source} ({noise.reason})."
-
-
-def model_line(answer: Findings) -> str:
-    """The model that the gaps are computed with; empty where a caveat says more about it."""
-    checked, unit = answer.confirmation, unit_of(answer)
-    if not checked.agrees:
-        return ""
-    most, rms, allowed = (
-        reading_shown(size, 2, unit)
-        for size in (checked.largest_difference, checked.rms_difference, checked.tolerance)
-    )
-    return (
-        f"The gaps are computed by the MuJoCo model. The integrator of the fits differs from it by {most} at most "
-        f"({rms} root mean square in run {checked.run}; {allowed} is allowed)."
-    )

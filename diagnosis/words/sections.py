@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from diagnosis.findings.closure import model_line, noise_line, runs_table, tests_table, waterfall_table
 from diagnosis.findings.misfit import windy
 from diagnosis.findings.remainder import closable_line, closable_table
 from diagnosis.findings.terms import CHANNELS, CONDITIONS
@@ -15,14 +16,7 @@ from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.answers import set_out
 from diagnosis.words.captions import captioned, pictured
 from diagnosis.words.cards import cause_cards, effect_cards
-from diagnosis.words.lines import (
-    coefficients_line,
-    hidden_line,
-    inclusion_line,
-    model_line,
-    noise_line,
-    patch_line,
-)
+from diagnosis.words.lines import coefficients_line, hidden_line, inclusion_line, patch_line
 from diagnosis.words.symbols import symbol_rows
 from diagnosis.words.tables import (
     budget_table,
@@ -32,9 +26,6 @@ from diagnosis.words.tables import (
     lines_table,
     parameters_table,
     patch_table,
-    runs_table,
-    tests_table,
-    waterfall_table,
 )
 from diagnosis.words.verdict import next_steps, rival_lines
 from identification.printing import COEFFICIENTS, trade_off_line
@@ -112,11 +103,7 @@ def _place(answer: Findings) -> Section:
 
 
 def _closes(answer: Findings) -> Section:
-    caption = (
-        "The residual misfit as the causes are added, the largest contribution first, "
-        f"{answer.waterfall.held_out}. Open circles: the misfit without this cause, the others refitted."
-    )
-    return Section("closes", "How much of the gap is explained", (Figure("waterfall", caption),))
+    return Section("closes", "How much of the gap is explained", pictured(answer, "waterfall"))
 
 
 def _where(answer: Findings) -> Section:
@@ -185,16 +172,16 @@ def _repeats(answer: Findings) -> Section:
 
 
 def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
-    drawn = captioned("how-far")
+    (drawn,) = pictured(answer, "how-far")
     meaning = (
         "A run shows the gap if its residual, with the nominal model fitted to all runs, exceeds chance at a "
         "false-alarm rate of 1 % per campaign and is at least a tenth of the largest residual of a run."
     )
-    runs = runs_table(answer, campaign)
+    runs = runs_table(answer.gap, answer.where.runs, answer, campaign)
     return Section(
         "how-far-section",
         "How much of the gap is explained, run by run",
-        (waterfall_table(answer), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
+        (waterfall_table(answer.waterfall, answer), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
     )
 
 
@@ -277,7 +264,7 @@ def _provenance(answer: Findings) -> Section:
     hashes = tuple(provenance.get("sha256", {}).items())
     seconds = tuple((name, f"{value:.1f} s") for name, value in answer.seconds.items())
     alarms = significant(answer.gap.false_alarm_rate, 2)
-    tests = tests_table(answer)
+    tests = tests_table(answer.gap)
     false = (
         f"All tests together raise a false alarm in {alarms} of the campaigns without a gap."
         if tests.rows
@@ -288,8 +275,8 @@ def _provenance(answer: Findings) -> Section:
         "Tests, noise and provenance",
         (
             Detail((tests, Paragraph(false, kind="small"))),
-            Paragraph(noise_line(answer)),
-            Paragraph(model_line(answer)),
+            Paragraph(noise_line(answer.noise, answer)),
+            Paragraph(model_line(answer.confirmation, answer)),
             Detail(
                 (
                     Heading("Units and terms"),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from diagnosis.findings.misfit import misfit_text, unit_of
+from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked, set_out
@@ -16,7 +16,6 @@ from identification.show.numbers import (
     estimated,
     explained,
     held_out_excess,
-    p_text,
     plain,
     probability,
     reading_shown,
@@ -27,10 +26,7 @@ from identification.show.numbers import (
     with_std,
 )
 from identification.show.quantity import Quantity
-from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.dimensions import beside
-
-_IN_BRACKETS = "root mean square (in brackets: mean square over the noise variance)"
 
 
 def candidates_table(answer: Findings) -> TextTable:
@@ -85,54 +81,6 @@ def parameters_table(answer: Findings) -> TextTable:
     units = explained({given.unit for given in first.parameters.values()})
     heads = ("effect", "parameter", "estimate")
     return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
-
-
-def runs_table(answer: Findings, campaign: Campaign | None = None) -> TextTable:
-    """The gap before and after, all runs first; a table without rows where no gap was found.
-
-    Args:
-        campaign: adds the conditions of the runs, also where no gap was found.
-    """
-    gap, shows = answer.gap, answer.where.runs
-    named = answer.names_effects
-    gaps = {run.id: run for run in gap.runs}
-    runs = {run.id: run for run in campaign.runs} if campaign else {}
-    windy = any(run.wind_on for run in runs.values())
-    conditions = (
-        ("spring [N m/rad]", *["wind [m/s]"] * windy, "duration [s]", "sample rate [Hz]") if runs else ()
-    )
-
-    def after(value: float) -> str:
-        return misfit_text(answer, value) if named else "–"
-
-    before = misfit_text(answer, gap.excess_before)
-    rows = [("all", *[""] * len(conditions), before, after(gap.excess_after), "")] if gap.detected else []
-    for name in runs or (gaps if gap.detected else ()):
-        found, stated = gaps.get(name), []
-        if run := runs.get(name):
-            spring = "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}"
-            wind = [f"{run.wind_speed:g}" if run.wind_on else "off"] if windy else []
-            stated = [spring, *wind, f"{run.record.duration:.3g}", f"{run.record.sample_rate:.4g}"]
-        fitted = " (fitted)" if found and not found.held_out else ""
-        sizes = (misfit_text(answer, found.before), after(found.after)) if found else ("–", "–")
-        rows.append((name + fitted, *stated, *sizes, "yes" if name in shows else ""))
-    shown = "shows the gap"
-    heads = ("run", *conditions, "before", "after", shown)
-    detail = (*conditions, shown)
-    return TextTable(f"Gap, {_IN_BRACKETS}", heads, tuple(rows), right=heads[1:-1], detail=detail)
-
-
-def waterfall_table(answer: Findings) -> TextTable:
-    """The residual gap with each cause added, and without each; a table without rows where no cause is named."""
-    steps, without = answer.waterfall.steps, answer.waterfall.without
-    rows = []
-    for step in steps if len(steps) > 1 else ():
-        alone = misfit_text(answer, without[step.effect]) if step.effect and step.effect in without else ""
-        name = answer_name(step.effect) if step.effect else "nominal model"
-        rows.append((name, misfit_text(answer, step.excess), alone))
-    title = f"Gap {answer.waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
-    heads = ("cause added", "residual gap", "without this cause")
-    return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
 
 
 def coefficients_table(answer: Findings) -> TextTable:
@@ -271,26 +219,3 @@ def budget_table(answer: Findings) -> TextTable:
     title = "Uncertainty budget with the causes: standard deviation by source, and share of the variance"
     rows = tuple(zip(*columns, strict=True)) if heads else ()
     return TextTable(title, ("source", *heads), rows, right=tuple(heads))
-
-
-TESTS = {
-    "below": "residual power below half the frequency f₀ of the oscillation",
-    "f0": "residual power at f₀, from 0.5 to 1.5 f₀: the oscillation itself",
-    "2f0": "residual power at its second harmonic, from 1.5 to 2.5 f₀",
-    "3f0": "residual power at its third harmonic, from 2.5 to 3.5 f₀",
-    "above": "residual power above 3.5 f₀",
-    "offset": "whether the runs have a common zero",
-    "noise against amplitude": "whether the noise grows or shrinks with the amplitude of the motion",
-    "noise against rate": "whether the noise grows or shrinks with the rate of the motion",
-    "noise in bursts": "whether the noise comes in bursts",
-    "noise level": "whether the noise is above the level that the campaign states",
-}
-"""The tested properties, by the names of the tests."""
-
-
-def tests_table(answer: Findings) -> TextTable:
-    """The tests of the gap: name, tested property, and p-value."""
-    tests = answer.gap.tests.items()
-    rows = tuple((name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests)
-    title = "Tests of the gap; p is the probability that noise alone gives as much"
-    return TextTable(title, ("test", "tested property", "p"), rows, right=("p",))

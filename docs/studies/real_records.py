@@ -16,7 +16,7 @@ from diagnosis import diagnose
 from diagnosis.result import Diagnosis
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from identification.show.style import save
-from tunnel_lab.report.figures import waterfall_figure
+from tunnel_lab.report.figures import diagnosis_figure
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -116,7 +116,7 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
         std = "" if given["std"] is None else f" ± {given['std']:.1g}"
         unit = "" if given["unit"] == "1" else f" {given['unit']}"
         parts.append(f"- `{key}`: {given['value']:.4g}{std}{unit}")
-    figure = waterfall_figure(Diagnosis.from_json_dict(document))
+    figure = diagnosis_figure(Diagnosis.from_json_dict(document), "waterfall")
     if figure is not None:
         path = images / f"real-records-{name}.png"
         save(figure, path)

@@ -33,6 +33,7 @@ from tunnel_lab.bench.parts import (
     show_items,
 )
 from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
+from tunnel_lab.report.figures import diagnosis_figure
 from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
@@ -228,11 +229,10 @@ class ShownAnswer:
 
         def drawings() -> list[str]:
             from identification.show.drawing import inline_svg
-            from tunnel_lab.report.figures import waterfall_figure
             from tunnel_lab.report.page import descriptions
             from tunnel_lab.report.where import runs_figure
 
-            drawn = {"waterfall": waterfall_figure(answer)}
+            drawn = {"waterfall": diagnosis_figure(answer, "waterfall")}
             if not answer.repeated.repeats(answer):
                 drawn |= {
                     name: answer.pictures[name].draw()

@@ -123,7 +123,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
 
 def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> None:
     """Print the injected faults, the findings, and the explained part of the gap."""
-    from diagnosis.words.tables import waterfall_table
+    from diagnosis.findings.closure import waterfall_table
     from tunnel_sim.effects.registry import effect_class
 
     springs = dict.fromkeys(condition.spring_stiffness for condition in plan.conditions)
@@ -140,7 +140,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> No
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{answer.verdict}\n")
-    show([found_table(plan, answer), waterfall_table(answer)])
+    show([found_table(plan, answer), waterfall_table(answer.waterfall, answer)])
 
 
 def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 DESCRIPTIONS = {
     "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
-    "waterfall": "The residual gap as the causes are added one after another.",
     "fit": "The measured and predicted readings of both models against time, and below them the residuals.",
     "where-runs": "Heat map of the excess of every run over time.",
     "where-profiles": "Excess against time and against amplitude, and the missing moment against time.",
@@ -43,7 +42,6 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
-    "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 """Text alternatives of the figures."""

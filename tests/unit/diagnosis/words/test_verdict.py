@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
-from diagnosis.findings.closure import FITTED, GapSummary, RunGap
+from diagnosis.findings.closure import FITTED, GapSummary, RunGap, runs_table
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.judged import Misfit
@@ -20,7 +20,7 @@ from diagnosis.settings import Settings
 from diagnosis.words.cards import key_figures
 from diagnosis.words.causes import said_size
 from diagnosis.words.lines import diagnosis_brief
-from diagnosis.words.tables import candidates_table, parameters_table, runs_table
+from diagnosis.words.tables import candidates_table, parameters_table
 from diagnosis.words.verdict import headline, next_steps, rival_lines, undecided_words, verdict
 from identification.show.blocks import typeset
 from identification.show.quantity import Quantity

@@ -10,7 +10,7 @@ import pytest
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
 from diagnosis.compose import localise
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap, waterfall_figure
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
 from diagnosis.likelihood.ceiling import Ceiling
@@ -23,7 +23,7 @@ from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
-from tunnel_lab.report.figures import diagnosis_figures, waterfall_figure
+from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.page import DESCRIPTIONS
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from matplotlib.transforms import Bbox
 
+from diagnosis.findings.closure import waterfall_figure
 from tests.marks import slow
 from tests.support.diagnosis_document import CAUSE, RIVAL, rms
 from tests.support.shown_numbers import assert_shows
-from tunnel_lab.report.figures import waterfall_figure
 
 Document = dict[str, Any]
 

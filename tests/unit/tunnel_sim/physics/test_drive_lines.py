@@ -1,3 +1,5 @@
+from tunnel_sim.vocabulary.rig import Actuator
+
 """Inputs as one line for each step move a body as their samples do, between which the step ends early."""
 
 from dataclasses import replace
@@ -6,7 +8,6 @@ import numpy as np
 import pytest
 
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.actuator import Actuator
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
