@@ -13,12 +13,8 @@ import numpy as np
 from diagnosis.answer.held_out import Waterfall, excess_base
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.diagnosable import Chosen, gain_words
-from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion
-from diagnosis.findings.closing import Closing, confirmed
-from diagnosis.findings.closure import GapSummary, NoiseSummary
-from diagnosis.findings.coefficients import (
+from diagnosis.findings.averaged_coefficients import (
     Answers,
-    Coefficients,
     as_identified,
     before_the_causes,
     coefficients,
@@ -26,6 +22,10 @@ from diagnosis.findings.coefficients import (
     in_phase,
     possible_answers,
 )
+from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion
+from diagnosis.findings.closing import Closing, confirmed
+from diagnosis.findings.closure import GapSummary, NoiseSummary
+from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision, Predictions, decision
 from diagnosis.findings.finding import Answered
 from diagnosis.findings.found import Found

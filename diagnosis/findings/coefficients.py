@@ -1,42 +1,43 @@
-"""Coefficients before and after the causes are added: averages over the answers, with intervals."""
+"""The coefficients before and after the causes: values, budget, upper limits on undetected effects, and words."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
-import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
-
-from diagnosis.answer.linear_theory import (
-    Beside,
-    alone,
-    beside,
-    coefficient_gradients,
-    coefficient_move,
-    coefficients_of,
-    starts_beside,
-    wind_on_runs,
-)
-from diagnosis.findings.candidates import meant_coefficient
-from diagnosis.findings.hidden import Hidden, hidden_effects
-from diagnosis.likelihood.least_squares import Fit
-from diagnosis.model.similarity import Similarity
-from diagnosis.search.study import Answer, Study
+from diagnosis.findings.finding import Picture, Pictured
+from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.judged import Judged
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import AnswerSettings
-from identification.estimate import Estimate
+from identification.printing import COEFFICIENTS, coefficient_label
+from identification.show.blocks import TextTable
+from identification.show.drawing import AFTER, BEFORE, NARROW
+from identification.show.numbers import (
+    estimated,
+    explained,
+    for_people,
+    listed,
+    plain,
+    significant,
+    size_change,
+    unit_mark,
+    with_std,
+)
 from identification.show.quantity import Quantity
-from identification.statistics import density_rounding
-from tunnel_sim.effects import Effect
-from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.record import Array
+from identification.show.style import INTERVAL, figure, grid, styled
+from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.registry import effect_class, known_effects
+from tunnel_sim.vocabulary.dimensions import beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
-class Coefficients:
+class Coefficients(Pictured):
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
@@ -60,411 +61,298 @@ class Coefficients:
     note: str = ""
     correlation: tuple[tuple[float, ...], ...] = ()
 
-
-_REACH = 8.5  # standard deviations beyond which a normal distribution has no probability in 64 bits
-_MOST_STEPS = 500
-
-
-@dataclass(frozen=True, eq=False)
-class NormalMixture:
-    """A mixture of normal distributions.
-
-    Args:
-        weights: their probabilities, which sum to 1, shape (n,).
-        means: in the quantity's unit, shape (n,).
-        variances: about their means, in the unit squared, shape (n,).
-    """
-
-    weights: Array
-    means: Array
-    variances: Array
-
-    @property
-    def mean(self) -> float:
-        """Mean of the mixture."""
-        return float(self.weights @ self.means)
-
-    @property
-    def between(self) -> float:
-        """Variance of the means."""
-        return float(self.weights @ (self.means - self.mean) ** 2)
-
-    @property
-    def std(self) -> float:
-        """Standard deviation, by the law of total variance: within and between the distributions."""
-        return math.sqrt(float(self.weights @ self.variances) + self.between)
-
-    def mean_between(self, low: float, high: float) -> float:
-        """Mean of the part between two values, in the quantity's unit."""
-        stds = np.maximum(np.sqrt(self.variances), 1e-300)
-        ends = [(end - self.means) / stds for end in (low, high)]
-        inside = self.weights * (ndtr(ends[1]) - ndtr(ends[0]))
-        densities = [np.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in ends]
-        moments = self.means * inside - self.weights * stds * (densities[1] - densities[0])
-        return float(moments.sum() / inside.sum()) if inside.sum() > 0.0 else self.mean
-
-    def quantile(self, share: float) -> float:
-        """The value below which the mixture has a given probability.
-
-        Args:
-            share: the probability, above 0 and below 1.
-        """
-        stds = np.sqrt(self.variances)
-        low, high = float(np.min(self.means - _REACH * stds)), float(np.max(self.means + _REACH * stds))
-        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)  # a value may be certain
-        widths = np.maximum(stds, 1e-300)
-        precision = max(1e-16 * (high - low), 1e-300)
-
-        def excess(value: float) -> float:
-            return float(self.weights @ ndtr((value - self.means) / widths)) - share
-
-        return float(brentq(excess, low, high, xtol=precision, maxiter=_MOST_STEPS))
-
-
-_SOURCES = (
-    "noise", "scatter", "misfit", "small causes", "air density", "unseen form", "freed form", "rivals",
-)  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Possible:
-    """An answer with its fit.
-
-    Args:
-        probability: of the answer, a fraction; those of all answers need not sum to 1.
-        textbook: the same effects in textbook form, where the fit freed their forms.
-        small: the small causes that may act beside them; None: neither these nor a misfit are considered.
-    """
-
-    probability: float
-    fit: Fit
-    textbook: Fit | None = None
-    small: Beside | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Answers:
-    """The answers over which coefficients are averaged.
-
-    Args:
-        unknown: probability (a fraction) of ``unknown`` where an answer with named effects is chosen.
-        hidden: upper limits on the effects that were not detected beside the chosen answer.
-    """
-
-    possible: tuple[Possible, ...]
-    unknown: float
-    nominal: Fit
-    hidden: tuple[Hidden, ...] = ()
-
-
-def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
-    """The answers of a study, without the evenly spread part of their probabilities.
-
-    That part represents causes not considered, not an answer that the runs refute.
-
-    Args:
-        kinds: the effects that may act unnamed. They are considered beside the chosen answer and every probable
-            answer, if there is a gap.
-    """
-    chosen = study.stated
-    even = study.settings.weighing.even_share / max(len(study.answers), 1)
-    least = study.settings.answer.small_causes_from
-    others, probability_of_answer, unknown = [], 1.0, 0.0
-    for place, answer in enumerate(study.answers):
-        probability, fit = max(answer.probability - even, 0.0), answer.fit(study.nominal)
-        if place == 0:
-            probability_of_answer = probability
-        elif answer.effects == UNKNOWN:
-            unknown = probability
-        elif fit is not None and probability > 0.0:
-            small = beside(fit, starts_beside(fit, kinds)) if probability >= least else None
-            share, alternatives = _by_choice(answer, fit, probability, kinds)
-            others += [Possible(probability * share, fit, answer.textbook_of(fit), small), *alternatives]
-    answer = study.answer or Answer((), 1.0, 1.0)
-    share, alternatives = _by_choice(answer, chosen, probability_of_answer, kinds)
-    starts = starts_beside(chosen, kinds)
-    small = beside(chosen, starts) if study.causes else None
-    hidden = hidden_effects(chosen, starts, None if small is None else small.left)
-    first = Possible(probability_of_answer * share, chosen, answer.textbook_of(chosen), small)
-    return Answers((first, *alternatives, *others), unknown, study.nominal, hidden)
-
-
-def _by_choice(
-    answer: Answer, fit: Fit, probability: float, kinds: Sequence[type[Effect]]
-) -> tuple[float, list[Possible]]:
-    """The fit's share among the choices of an answer that the runs cannot exclude, and the other choices."""
-    share, others = 1.0, []
-    for choice in answer.choices:
-        if choice.hypothesis.fit is fit:
-            share = choice.probability
-        else:
-            small = beside(choice.hypothesis.fit, starts_beside(choice.hypothesis.fit, kinds))
-            others.append(Possible(probability * choice.probability, choice.hypothesis.fit, None, small))
-    return share, others
-
-
-def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
-    """The coefficients averaged over the answers.
-
-    Args:
-        campaign: gives the digits to which the air density is stated.
-
-    Returns:
-        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. Their
-        distribution is a mixture over the answers and over the sets of small causes beside them
-        (`diagnosis.answer.linear_theory`), with their probabilities; value and deviation are those of its centre
-        (`Central`).
-
-        The variance within an answer is the sum of
-
-        - the fit's own;
-        - the scatter of the runs where it exceeds chance, or half the difference between two halves of the data
-          (`coefficient_move`) if that is greater;
-        - the rounding of the air density;
-        - the part of the causes' forms that no free decay shows;
-        - half the change by freeing the forms, since another family of forms may change as much.
-
-        ``unknown`` also adds half the change from the nominal model. No standard deviation is given at a bound, or
-        where the runs do not determine the coefficient. An effect that is too small to be detected adds nothing:
-        its upper limit stands beside the coefficients (`diagnosis.findings.hidden`).
-    """
-    fit, estimates, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
-    for name in coefficients_of(fit):
-        if _value(fit, name) is None:
-            continue  # fixed
-        each = [of for one in answers.possible if (of := _of_answer(one, campaign, name)) is not None]
-        _, first, parts = each[0]
-        change = chosen.unknown_std * (first.mean - (_value(answers.nominal, name) or first.mean))
-        if answers.unknown > 0.0:
-            doubted = NormalMixture(first.weights, first.means, first.variances + change**2)
-            each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
-        probability = np.array([p for p, _, _ in each])
-        probability /= probability.sum()
-        whole = NormalMixture(
-            np.concatenate([p * m.weights for p, (_, m, _) in zip(probability, each, strict=True)]),
-            np.concatenate([m.means for _, m, _ in each]),
-            np.concatenate([m.variances for _, m, _ in each]),
+    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+        """The coefficients that the runs determine, before and after; none without any."""
+        del judged
+        description = "Coefficients before and after the causes are added, with 95 % intervals."
+        drawn = Picture(
+            "coefficients", "Estimates with 95 % intervals.", description, partial(coefficients_figure, self)
         )
-        centre = Central.of(whole, chosen)
-        shares = _budget(parts, centre.std**2)
-        estimates[name] = _estimate(fit, name, centre.value, centre.std, shares)
-        if estimates[name].std is not None:
-            estimates[name] = replace(estimates[name], interval=centre.interval)
-    return estimates
+        return (drawn,) if _determined(self) else ()
 
 
-def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
-    """The correlation of the coefficients by noise, small causes and rivals; see `Coefficients`.
+def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
+    """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
 
-    Args:
-        found: the coefficients averaged over the answers.
-
-    Returns:
-        In the order of the coefficients, shape (n, n).
+    A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
     """
-    weights, means, noise = [], [], np.zeros((len(found), len(found)))
-    for one in answers.possible:
-        values, known = [_value(one.fit, name) for name in found], coefficients_of(one.fit)
-        if one.probability <= 0.0 or None in values:
-            continue
-        small, places = one.small or alone(one.fit), [known.index(name) for name in found]
-        gradients = coefficient_gradients(one.fit)[places]
-        noise += one.probability * gradients @ one.fit.stated_covariance @ gradients.T
-        weights.append(one.probability * small.weights)
-        means.append(np.array(values) + small.moves[:, places])
-    if not means:
-        return ()
-    weight, mean = np.concatenate(weights), np.concatenate(means)
-    away = mean - weight @ mean / weight.sum()
-    shared = (noise + (away.T * weight) @ away) / weight.sum()
-    whole = np.maximum([(one.std or 0.0) ** 2 for one in found.values()], np.diag(shared))
-    scale = np.sqrt(np.maximum(whole, 1e-300))
-    shared = shared / np.outer(scale, scale)
-    np.fill_diagonal(shared, 1.0)
-    return tuple(tuple(row) for row in shared.tolist())
+    before, after = given.before, given.after
+    named, rows = judged.names_effects, []
+    skewed = any(one.interval for one in (after or before).values())
+    for label, nominal, with_causes in _rows(given):
+        best = with_causes or nominal
+        cells = [_without_interval(one) for one in ([nominal, with_causes] if named else [best])]
+        interval = _interval(best)
+        if skewed and best is not None and best.std:
+            cells[-1] += f"\n({interval})"
+        change = "–"
+        both = [one for one in (nominal, with_causes) if one and one.determined]
+        if len(both) == 2 and both[0].value:
+            change = size_change(*(one.value for one in both))
+        rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
+    causes = "with the causes" if judged.decided else f"with the {judged.set_out}"
+    detail = () if skewed else ("95 % interval",)
+    heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
+    title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
+    return TextTable(title, heads, tuple(rows), right=heads[1:], detail=detail)
 
 
-def as_identified(
-    found: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
-) -> dict[str, Quantity]:
-    """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
+def _rows(given: Coefficients) -> Iterator[tuple[str, Quantity | None, Quantity | None]]:
+    """Label of a coefficient, and its estimates by the nominal model and with the causes.
 
-    Without a cause both fit the same model to the same readings, so there is one number for each coefficient. A
-    coefficient that the estimate does not state is unchanged; ωn and ζ are those of the only run.
+    The nominal model has no lag, so with a named lag its coefficients compare with those in phase.
     """
-    runs = estimate.runs if len(estimate.runs) == 1 else ()
-    repeatability, same = estimate.repeatability, dict(found)
-    for name in found:
-        given = next((one for of in (estimate, *runs) if (one := getattr(of, name, None)) is not None), None)
-        if not isinstance(given, Quantity) or given.known_std <= 0.0:
-            continue
-        parts = {"scatter": 0.0, "air density": 0.0}
-        if name in estimate.parameters and repeatability is not None:
-            place = estimate.parameters.index(name)
-            parts["scatter"] = sum(one[place][place] for one in repeatability.covariances)
-        if name.startswith("cn_"):
-            parts["air density"] = (given.value * density_rounding(campaign.runs)) ** 2
-        shares = {source: min(part / given.known_std**2, 1.0) for source, part in parts.items()}
-        shares = {"noise": max(1.0 - sum(shares.values()), 0.0), **shares}
-        value, std = (similarity.similar(one, given.unit) for one in (given.value, given.known_std))
-        ends = given.interval and tuple(similarity.similar(end, given.unit) for end in given.interval)
-        interval = (ends[0], ends[1]) if ends else None
-        same[name] = Quantity(value, std, given.unit, shares=shares, interval=interval)
-    return same
-
-
-_STEP = 1e-3  # of a parameter, in standard deviations, for the derivatives of the coefficients in phase
-
-
-def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ...]]:
-    """Cnβ and Cnr in phase with angle and rate (decision 0004), and the covariance of all four coefficients.
-
-    The part of an effect's form that no free decay shows moves Cnr along the effect's own part, so it adds nothing
-    to the coefficients in phase.
-
-    Returns:
-        By name, and the covariance of Cnβ and Cnr of the fitted law and of both in phase, shape (4, 4); both empty
-        where no effect of the fit has a part in phase.
-    """
-    names = fit.problem.names
-    if not {"cn_beta", "cn_r"} <= set(names):
-        return {}, ()
-    runs, own = wind_on_runs(fit), [names.index("cn_beta"), names.index("cn_r")]
-
-    def both(common: Array) -> Array:
-        beta, rate = (float(common[place]) for place in own)
-        found = beta, rate
-        for effect in fit.problem.effects_at(common):
-            found = effect.in_phase(*found, runs)
-        return np.array([beta, rate, *found])
-
-    here = both(fit.point.common)
-    if np.array_equal(here[:2], here[2:]):
-        return {}, ()
-    covariance, slopes = fit.stated_covariance, []
-    for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
-        step = np.zeros_like(fit.point.common)
-        step[place] = _STEP * (std or 1.0)
-        slopes.append((both(fit.point.common + step) - both(fit.point.common - step)) / (2.0 * step[place]))
-    jacobian = np.array(slopes).T
-    matrix = jacobian @ covariance @ jacobian.T
-    for effect in fit.problem.effects_at(fit.point.common):
-        unseen = np.array([*effect.unseen_form(here[0], runs), 0.0, 0.0])
-        matrix += np.diag(unseen**2)
-    estimates = {
-        name: Quantity(float(here[i]), math.sqrt(max(float(matrix[i, i]), 0.0)), "1/rad")
-        for i, name in ((2, "cn_beta"), (3, "cn_r"))
-    }
-    return estimates, tuple(map(tuple, matrix.tolist()))
-
-
-@dataclass(frozen=True)
-class Central:
-    """The centre of a mixture.
-
-    An improbable rival with a distant mean may contribute most of a variance, and move the mean by more than the
-    deviation of the answer. The central interval holds it only as far as its probability reaches.
-
-    Args:
-        value: mean of the part within the central interval.
-        std: half the length of the central interval over that of a standard normal distribution.
-        interval: the ends of the interval where it is not the one of a normal distribution; else None.
-    """
-
-    value: float
-    std: float
-    interval: tuple[float, float] | None
-
-    @classmethod
-    def of(cls, whole: NormalMixture, chosen: AnswerSettings) -> Central:
-        """The centre of a mixture, in its unit."""
-        tail = 0.5 * (1.0 - chosen.coefficient_interval)
-        low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
-        middle = whole.mean_between(low, high)
-        reach = 0.5 * (high - low)
-        std = reach / float(ndtri(1.0 - tail))
-        skew = max(abs(low - middle + reach), abs(high - middle - reach))
-        return cls(middle, std, (low, high) if skew > chosen.skewed_from * std else None)
-
-
-def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """The coefficients of the nominal model.
-
-    Args:
-        after: the averages over the answers; their squared difference from the nominal ones is added to the
-            variance.
-    """
-    found = {}
-    for place, name in enumerate(coefficients_of(nominal)):
-        value, given = _value(nominal, name), after.get(name)
-        if value is None or given is None:
-            continue
-        parts = {"causes": (value - given.value) ** 2} if given.value != value else {}
-        if given.std is None:
-            parts["noise"] = float(alone(nominal).noise[0, place])
+    before, after = given.before, given.after
+    phase = given.in_phase
+    for name in dict.fromkeys([*before, *after]):
+        nominal, with_causes = before.get(name), after.get(name)
+        label = coefficient_label(name, {**after, **before}[name].unit)
+        if name in phase:
+            which = "angle" if name.startswith("cn_beta") else "rate"
+            yield f"{label}, in phase with the {which}", nominal, phase[name]
+            yield f"{label}, beside the lag", None, with_causes
         else:
-            parts |= {source: share * given.std**2 for source, share in given.shares.items()}
-        found[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
-    return found
+            yield label, nominal, with_causes
 
 
-def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
-    """Variances by source: those within the answer, and the rest by the other answers.
+def _without_interval(given: Quantity | None) -> str:
+    return "–" if given is None else estimated(replace(given, interval=None))
 
-    The answer's own are scaled where another answer narrows the interval.
+
+def _interval(given: Quantity | None) -> str:
+    """The central interval of 0.95, with as many digits as its width allows."""
+    if given is None or not given.std:
+        return "–"
+    reach = 1.96 * given.std
+    width = with_std(given.value, reach).partition("± ")[2]
+    places = len(width.partition(".")[2]) if width.replace(".", "").isdigit() else None
+    ends = given.interval or (given.value - reach, given.value + reach)
+    return " to ".join(significant(end) if places is None else f"{end:.{places}f}" for end in ends)
+
+
+SOURCES = {
+    "noise": "noise of the readings",
+    "scatter": "scatter between the runs",
+    "misfit": "model error",
+    "small causes": "small causes that are not named",
+    "air density": "rounding of the stated air density",
+    "unseen form": "form of the cause that free decays cannot show",
+    "freed form": "freedom of the causes' forms",
+    "rivals": "other answers, weighted by probability",
+}
+"""The sources of a coefficient's variance."""
+
+
+def budget_table(given: Coefficients) -> TextTable:
+    """The uncertainty budget of the coefficients of the answer; no rows where the document has no shares.
+
+    A row for each source: its standard deviation and its share of the variance, by coefficient.
     """
-    within = sum(parts.values())
-    scale = min(1.0, variance / within) if within > 0.0 else 0.0
-    shares = {source: scale * parts.get(source, 0.0) for source in _SOURCES if source in parts}
-    return {**shares, "rivals": max(variance - scale * within, 0.0)}
+    heads: list[str] = []
+    columns = [[*SOURCES.values(), "combined standard deviation"]]
+    for name, one in given.after.items():
+        std, shares = one.std, one.shares
+        if std is None or not shares:
+            continue
+        heads.append(coefficient_label(name, one.unit))
+        cells = []
+        for part in (shares.get(source, 0.0) for source in SOURCES):
+            shown = f"{significant(std * math.sqrt(part), 2)} ({100.0 * part:.1f} %)"
+            cells.append("–" if part < 5e-4 else shown)
+        columns.append([*cells, significant(std, 2)])
+    title = "Uncertainty budget with the causes: standard deviation by source, and share of the variance"
+    rows = tuple(zip(*columns, strict=True)) if heads else ()
+    return TextTable(title, ("source", *heads), rows, right=tuple(heads))
 
 
-def _of_answer(
-    answer: Possible, campaign: Campaign, name: str
-) -> tuple[float, NormalMixture, dict[str, float]] | None:
-    """Probability, distribution and variances by source of a coefficient under one answer."""
-    fit, value = answer.fit, _value(answer.fit, name)
-    if value is None:
-        return None
-    small = alone(fit) if answer.small is None else answer.small
-    place = coefficients_of(fit).index(name)
-    misfit = float(small.scatter[place])
-    if answer.small is not None:
-        misfit = max(misfit, coefficient_move(replace(fit, residuals=small.left), name))
-    rounding = unseen = 0.0
-    if name.startswith("cn_"):
-        rounding = density_rounding(campaign.runs)
-        runs, which = wind_on_runs(fit), 0 if name == "cn_beta" else 1
-        effects = fit.problem.effects_at(fit.point.common)
-        unseen = math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[which] for effect in effects))
-    form_std = fit.settings.answer.freed_form_std
-    unfreed = None if answer.textbook is None else _value(answer.textbook, name)
-    common = {
-        "misfit": misfit**2,
-        "air density": (value * rounding) ** 2,
-        "unseen form": unseen**2,
-        "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,
-    }
-    noise, forms = small.noise[:, place], small.forms[:, place]
-    found = NormalMixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
-    within = {
-        "noise": float(small.weights @ noise),
-        "small causes": float(small.weights @ forms) + found.between,
-    }
-    return answer.probability, found, within | common
+def coefficients_line(given: Coefficients) -> str:
+    """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
+
+    Empty where none is known.
+    """
+    after = {name: one for name, one in given.after.items() if one.std}
+    if not after:
+        return ""
+    parts = []
+    for source, words in SOURCES.items():
+        shares = {name: one.shares.get(source, 0.0) for name, one in after.items()}
+        if max(shares.values()) >= _COUNTS:
+            mostly = listed(
+                [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
+            )
+            parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
+    if not parts:
+        return ""
+    if all(one.shares.keys() <= {"noise", "scatter", "air density"} for one in after.values()):
+        return f"± is the ± of tunnel identify; it includes {listed(parts)}."
+    return (
+        f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
+        "the misfit of its model, so it may be far smaller or larger."
+    )
 
 
-def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> Quantity:
-    """A coefficient, marked where the fit ends at a bound or the runs do not determine it."""
-    whole = sum(parts.values())
-    shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}
-    model = fit.problem.data.model
-    limiting = model.bounded_by(fit.problem.names, name)
-    bound = None if limiting is None else fit.bound(limiting)
-    unit = model.coefficient_units[name]
-    found = Quantity(value, None if bound else std, unit, bound=bound, shares=shares)
-    return meant_coefficient(found, fit, name)
+_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
+_MOST = 0.5  # of a variance: more than all its other sources together
 
 
-def _value(fit: Fit, name: str) -> float | None:
-    return fit.problem.data.model.coefficient(fit.problem.names, fit.point.common, name)
+def hidden_table(hidden: Sequence[Hidden], given: Coefficients) -> TextTable:
+    """Upper limits on undetected effects, and the change of each coefficient at that size."""
+    rows = []
+    names = [name for name in given.after if hidden and name in hidden[0].moves]
+    for one in hidden:
+        size = f"{significant(one.size.value, 2)}{unit_mark(beside(one.size.unit))}"
+        moves = [significant(one.moves[name].value, 2) for name in names]
+        rows.append((plain(one.effect), size, *moves))
+    heads = [f"would change {coefficient_label(name, hidden[0].moves[name].unit)} by" for name in names]
+    units = explained({one.size.unit for one in hidden})
+    title = f"Upper limits on undetected effects (95 %), which ± does not include{units}"
+    return TextTable(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
+
+
+def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
+    """The undetected effects that would change a coefficient by more than its ±; empty where none would.
+
+    The one with the greatest change against the ±, and each that states how to read the coefficients without it.
+    """
+    after, general_form = given.after, Effect.undetected
+    clauses: list[tuple[bool, str]] = []
+    for one in hidden:
+        moved = []
+        for name, own in after.items():
+            move = one.moves.get(name)
+            if move is not None and own.std and move.value > own.std:
+                by = f"{significant(move.value, 2)} {'' if own.unit == '1' else unit_mark(own.unit)}"
+                moved.append((COEFFICIENTS.get(name, name), by.strip()))
+        form = next((kind.undetected for kind in known_effects() if kind.name == one.effect), general_form)
+        template = form if moved else ""
+        general = template == general_form
+        if not moved or (general and any(said for said, _ in clauses)):
+            continue
+        size = f"{significant(abs(one.size.value), 2)}{unit_mark(beside(one.size.unit))}"
+        changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
+        words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
+        clause = template.format(changes=changes, **words)
+        clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
+    return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
+
+
+def consequence(given: Coefficients, judged: Judged) -> str:
+    """Change of the coefficients by the causes, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
+
+    Empty where no coefficient is known before and after, or no cause is named.
+    """
+    clauses = []
+    if not judged.causes or judged.causes == UNKNOWN:
+        return ""
+    phase = given.in_phase
+    for name, one in given.before.items():
+        two = {**given.after, **phase}.get(name)
+        if two is None or not one.value or not (one.determined and two.determined):
+            continue
+        label = COEFFICIENTS.get(name, name)
+        if two.std is not None and two.std > _OPEN * abs(two.value):
+            clauses.append(
+                f"{label} remains uncertain ({for_people(two.value, two.std, unit_mark(two.unit))})"
+            )
+            continue
+        label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
+        share = 100.0 * (abs(two.value) / abs(one.value) - 1.0)
+        values = _apart(one.value, two.value)
+        if one.value * two.value < 0.0:
+            clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
+        elif abs(share) < 0.5:
+            clauses.append(f"{label} changes by less than 1 %")
+        else:
+            clauses.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
+    if not clauses:
+        return ""
+    text = listed(clauses)
+    first = text[0].upper() if text[0].isascii() else text[0]  # a Greek letter is a symbol
+    return f"{first}{text[1:]}.{_of_the_rate(given) if phase else ''}"
+
+
+def _of_the_rate(given: Coefficients) -> str:
+    """The two parts of Cnr in phase with the rate, in a sentence."""
+    name = next(name for name in given.in_phase if name.startswith("cn_r"))
+    whole, own = given.in_phase[name], given.after[name]
+    lag = _digits(whole.value - own.value, 3)
+    both = (estimated(replace(one, interval=None)).replace("-", "−") for one in (whole, own))
+    return " Of Cnr in phase with the rate, {}, the lag contributes {lag} and the rate itself {}.".format(
+        *both, lag=lag
+    )
+
+
+_OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
+
+
+def _apart(before: float, after: float) -> str:
+    """Two coefficients to three digits, or to as many as distinguish them."""
+    for digits in range(3, 7):
+        one, two = _digits(before, digits), _digits(after, digits)
+        if one != two:
+            break
+    return f"{one} → {two}"
+
+
+def _digits(value: float, digits: int) -> str:
+    return f"{'−' if value < 0.0 else ''}{significant(abs(value), digits)}"
+
+
+def coefficient_note(given: Coefficients, judged: Judged) -> str:
+    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
+    if judged.cycling:
+        return _NO_DECAY
+    before = given.before
+    caveats = [effect_class(name).caveat for name in judged.causes if name != "unknown"]
+    beta = next((name for name in before if name.startswith("cn_beta")), "")
+    return " ".join(filter(None, (*caveats, size_note(beta))))
+
+
+_NO_DECAY = "no damping ratio and no derivative is stated, since no run is a free decay"
+
+
+def size_note(beta: str) -> str:
+    """The quantities identified in place of the coefficients where sizes are not stated.
+
+    Args:
+        beta: name of the quantity in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
+
+    Returns:
+        A sentence; empty where the sizes are stated.
+    """
+    area, length = "_area" in beta, "_length" in beta
+    missing = ["frontal_area"] * area + ["reference_length"] * length
+    if not missing:
+        return ""
+    return (
+        f"[rig] states no {' and no '.join(missing)}, so Cnβ{'·A' * area}{'·l' * length} and Cnr{'·A' * area}"
+        f"{'·l²' * length} are identified, not Cnβ and Cnr. State {'both' if len(missing) > 1 else 'it'} to get "
+        "Cnβ and Cnr."
+    )
+
+
+def _determined(given: Coefficients) -> list[str]:
+    """Names of the coefficients that the runs determine before and after."""
+    before, after = given.before, given.after
+    return [name for name in before if name in after and before[name].determined and after[name].determined]
+
+
+@styled
+def coefficients_figure(given: Coefficients) -> Figure:
+    """The coefficients that the runs determine, before and after, with 95 % intervals."""
+    before, after = given.before, given.after
+    names = _determined(given)
+    fig = figure(NARROW, 0.3 + 1.3 * len(names))
+    for place, name in enumerate(names, 1):
+        axes = fig.add_subplot(len(names), 1, place)
+        for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
+            std = values[name].std
+            axes.errorbar(
+                values[name].value, row, xerr=None if std is None else INTERVAL * std, color=colour,
+                marker=marker, ms=6, capsize=4,
+            )  # fmt: skip
+        axes.set_yticks([0, 1], ["before", "after"])
+        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name].unit))
+        axes.locator_params(axis="x", nbins=5)
+        grid(axes)
+    return fig

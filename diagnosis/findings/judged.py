@@ -79,6 +79,14 @@ class Judged(Protocol):
         """The coefficients with the causes, by name."""
 
     @property
+    def set_out(self) -> str:
+        """The name of the answer whose parameters are stated, such as ``most probable answer``."""
+
+    @property
+    def cycling(self) -> bool:
+        """Whether every run is in a limit cycle."""
+
+    @property
     def rest_is_significant(self) -> bool:
         """Whether a gap remains beyond chance."""
 

@@ -162,6 +162,23 @@ class Findings:
         return self.coefficients.after
 
     @property
+    def set_out(self) -> str:
+        """The name of the answer whose parameters are stated, such as ``most probable answer``."""
+        if self.decided:
+            return "answer"
+        most = max(one.probability for one in self.candidates)
+        return (
+            "most probable answer"
+            if self.candidates[0].probability >= most
+            else "most probable set of effects"
+        )
+
+    @property
+    def cycling(self) -> bool:
+        """Whether every run is in a limit cycle."""
+        return bool(self.found.limit_cycles)
+
+    @property
     def rest_is_significant(self) -> bool:
         """Whether a gap remains beyond chance."""
         return self.rest is not None and self.rest.significant

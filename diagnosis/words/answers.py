@@ -13,12 +13,3 @@ def ranked(answer: Findings) -> list[Candidate]:
     cause may be more probable.
     """
     return sorted(answer.candidates, key=lambda one: -one.probability)
-
-
-def set_out(answer: Findings) -> str:
-    """The name of the answer whose parameters are stated, such as ``most probable answer``."""
-    if answer.decision.decided:
-        return "answer"
-    first = answer.candidates[0]
-    most = max(one.probability for one in answer.candidates)
-    return "most probable answer" if first.probability >= most else "most probable set of effects"

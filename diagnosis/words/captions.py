@@ -31,7 +31,6 @@ CAPTIONS: Mapping[str, str] = {
     "stiffness; a dependence on the rate indicates damping.",
     "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
     "and unknown.",
-    "coefficients": "Estimates with 95 % intervals.",
 }
 
 

@@ -11,7 +11,6 @@ from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.answers import set_out
 from diagnosis.words.causes import said_size
 from diagnosis.words.verdict import size_words
 from identification.show.blocks import Card, Heading, Paragraph
@@ -39,7 +38,7 @@ def key_figures(answer: Findings) -> list[KeyFigure]:
     else:
         shown = [KeyFigure(label, WITHIN_THE_NOISE, f"residual {beside_noise(before)}, root mean square")]
     if causes and causes != UNKNOWN:
-        label = f"With {'the causes' if decided else f'the {set_out(answer)}'} added"
+        label = f"With {'the causes' if decided else f'the {answer.set_out}'} added"
         if _calm(answer):
             shown.append(KeyFigure(label, WITHIN_THE_NOISE, left_over(after)))
         else:
@@ -47,7 +46,7 @@ def key_figures(answer: Findings) -> list[KeyFigure]:
         shown.append(KeyFigure("Share of the gap explained", share(gap.closed), gap.closed_on))
     if answer.candidates:
         rivals = decided and answer.ambiguous_with
-        whose = "likeliest of these sets" if rivals else set_out(answer)
+        whose = "likeliest of these sets" if rivals else answer.set_out
         first = answer.candidates[0].probability
         shown.append(KeyFigure(f"Probability of the {whose}", probability(first)))
     return shown

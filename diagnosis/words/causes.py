@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.terms import BETWEEN_RUNS, scattering, without_scatter
 from diagnosis.findings.whole import Findings
-from diagnosis.search.weigh import UNKNOWN
-from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
-    estimated,
     for_people,
     listed,
     plain,
     probability,
-    significant,
     unit_mark,
 )
 from identification.show.quantity import Quantity
@@ -184,65 +177,3 @@ def advice(answer: Findings, name: str) -> str:
     for full, text in shown.items():
         said = said.replace(f"{{{full}}}", text)
     return said
-
-
-def consequence(answer: Findings) -> str:
-    """Change of the coefficients by the causes, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
-
-    Empty where no coefficient is known before and after, or no cause is named.
-    """
-    given, clauses = answer.coefficients, []
-    if not answer.causes or answer.causes == UNKNOWN:
-        return ""
-    phase = given.in_phase
-    for name, one in given.before.items():
-        two = {**given.after, **phase}.get(name)
-        if two is None or not one.value or not (one.determined and two.determined):
-            continue
-        label = COEFFICIENTS.get(name, name)
-        if two.std is not None and two.std > _OPEN * abs(two.value):
-            clauses.append(
-                f"{label} remains uncertain ({for_people(two.value, two.std, unit_mark(two.unit))})"
-            )
-            continue
-        label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
-        share = 100.0 * (abs(two.value) / abs(one.value) - 1.0)
-        values = _apart(one.value, two.value)
-        if one.value * two.value < 0.0:
-            clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
-        elif abs(share) < 0.5:
-            clauses.append(f"{label} changes by less than 1 %")
-        else:
-            clauses.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
-    if not clauses:
-        return ""
-    text = listed(clauses)
-    first = text[0].upper() if text[0].isascii() else text[0]  # a Greek letter is a symbol
-    return f"{first}{text[1:]}.{_of_the_rate(given) if phase else ''}"
-
-
-def _of_the_rate(given: Coefficients) -> str:
-    """The two parts of Cnr in phase with the rate, in a sentence."""
-    name = next(name for name in given.in_phase if name.startswith("cn_r"))
-    whole, own = given.in_phase[name], given.after[name]
-    lag = _digits(whole.value - own.value, 3)
-    both = (estimated(replace(one, interval=None)).replace("-", "−") for one in (whole, own))
-    return " Of Cnr in phase with the rate, {}, the lag contributes {lag} and the rate itself {}.".format(
-        *both, lag=lag
-    )
-
-
-_OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
-
-
-def _apart(before: float, after: float) -> str:
-    """Two coefficients to three digits, or to as many as distinguish them."""
-    for digits in range(3, 7):
-        one, two = _digits(before, digits), _digits(after, digits)
-        if one != two:
-            break
-    return f"{one} → {two}"
-
-
-def _digits(value: float, digits: int) -> str:
-    return f"{'−' if value < 0.0 else ''}{significant(abs(value), digits)}"

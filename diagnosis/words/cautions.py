@@ -9,11 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.findings.whole import Findings
 from diagnosis.model.fact import Fact, Noted
 from identification.show.numbers import part, plain, reading_shown, share
 from identification.status import Outcome, Remark
-from tunnel_sim.effects import effect_class
 
 Figures = Mapping[str, Any]
 Sentence = str | Callable[[Figures], str]
@@ -270,36 +268,3 @@ def remark(given: Noted, unit: str = "rad") -> Remark:
     """The remark of a fact about the noise, as in `said`."""
     what, remedy = REMARKS[given.fact.kind]
     return Remark(Outcome.NOTED, given.runs, said({given.fact.kind: what}, given.fact, unit), remedy)
-
-
-_NO_DECAY = "no damping ratio and no derivative is stated, since no run is a free decay"
-
-
-def coefficient_note(answer: Findings) -> str:
-    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
-    if answer.found.limit_cycles:
-        return _NO_DECAY
-    before = answer.coefficients.before
-    caveats = [effect_class(name).caveat for name in answer.causes if name != "unknown"]
-    beta = next((name for name in before if name.startswith("cn_beta")), "")
-    return " ".join(filter(None, (*caveats, size_note(beta))))
-
-
-def size_note(beta: str) -> str:
-    """The quantities identified in place of the coefficients where sizes are not stated.
-
-    Args:
-        beta: name of the quantity in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
-
-    Returns:
-        A sentence; empty where the sizes are stated.
-    """
-    area, length = "_area" in beta, "_length" in beta
-    missing = ["frontal_area"] * area + ["reference_length"] * length
-    if not missing:
-        return ""
-    return (
-        f"[rig] states no {' and no '.join(missing)}, so Cnβ{'·A' * area}{'·l' * length} and Cnr{'·A' * area}"
-        f"{'·l²' * length} are identified, not Cnβ and Cnr. State {'both' if len(missing) > 1 else 'it'} to get "
-        "Cnβ and Cnr."
-    )

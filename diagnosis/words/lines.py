@@ -5,25 +5,13 @@ from __future__ import annotations
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown
 from diagnosis.findings.terms import named_answer, scattering
 from diagnosis.findings.whole import Findings
-from diagnosis.words.answers import set_out
-from diagnosis.words.tables import SOURCES
-from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
-    explained,
     held_out_excess,
-    listed,
     plain,
     probability,
     reading_shown,
     share,
-    significant,
-    unit_mark,
 )
-from tunnel_sim.effects import Effect, known_effects
-from tunnel_sim.vocabulary.dimensions import beside
-
-_MOST = 0.5  # of a variance: more than all its other sources together
-_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
 
 
 def diagnosis_brief(answer: Findings) -> str:
@@ -32,7 +20,7 @@ def diagnosis_brief(answer: Findings) -> str:
     causes = answer.causes
     named = named_answer(causes).lower() if causes else "no gap"
     decided = answer.decision.decided
-    undecided = "" if decided else f"undecided, the {set_out(answer)} is "
+    undecided = "" if decided else f"undecided, the {answer.set_out} is "
     misfit, excess = misfit_of(answer), gap.excess_before
     size = f"{held_out_excess(excess)} times the noise variance"
     if misfit is not None:
@@ -55,59 +43,6 @@ def inclusion_line(answer: Findings) -> str:
     ordered = [*(name for name in names if name not in last), *last]
     shown = [f"{plain(name)} {probability(likely[name])}" for name in ordered]
     return f"Among the causes, with probability: {', '.join(shown)}." if shown else ""
-
-
-def coefficients_line(answer: Findings) -> str:
-    """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
-
-    Empty where none is known.
-    """
-    after = {name: given for name, given in answer.coefficients.after.items() if given.std}
-    if not after:
-        return ""
-    parts = []
-    for source, words in SOURCES.items():
-        shares = {name: given.shares.get(source, 0.0) for name, given in after.items()}
-        if max(shares.values()) >= _COUNTS:
-            mostly = listed(
-                [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
-            )
-            parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
-    if not parts:
-        return ""
-    if all(given.shares.keys() <= {"noise", "scatter", "air density"} for given in after.values()):
-        return f"± is the ± of tunnel identify; it includes {listed(parts)}."
-    return (
-        f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
-        "the misfit of its model, so it may be far smaller or larger."
-    )
-
-
-def hidden_line(answer: Findings) -> str:
-    """The undetected effects that would change a coefficient by more than its ±; empty where none would.
-
-    The one with the greatest change against the ±, and each that states how to read the coefficients without it.
-    """
-    after, general_form = answer.coefficients.after, Effect.undetected
-    clauses: list[tuple[bool, str]] = []
-    for one in answer.hidden:
-        moved = []
-        for name, given in after.items():
-            move = one.moves.get(name)
-            if move is not None and given.std and move.value > given.std:
-                by = f"{significant(move.value, 2)} {'' if given.unit == '1' else unit_mark(given.unit)}"
-                moved.append((COEFFICIENTS.get(name, name), by.strip()))
-        own = next((kind.undetected for kind in known_effects() if kind.name == one.effect), general_form)
-        template = own if moved else ""
-        general = template == general_form
-        if not moved or (general and any(said for said, _ in clauses)):
-            continue
-        size = f"{significant(abs(one.size.value), 2)}{unit_mark(beside(one.size.unit))}"
-        changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
-        words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
-        clause = template.format(changes=changes, **words)
-        clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
-    return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
 
 
 def patch_line(answer: Findings) -> str:

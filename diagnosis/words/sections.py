@@ -9,24 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from diagnosis.findings.closure import model_line, noise_line, runs_table, tests_table, waterfall_table
+from diagnosis.findings.coefficients import (
+    budget_table,
+    coefficients_line,
+    coefficients_table,
+    hidden_line,
+    hidden_table,
+)
 from diagnosis.findings.misfit import windy
 from diagnosis.findings.remainder import closable_line, closable_table
 from diagnosis.findings.terms import CHANNELS, CONDITIONS
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
-from diagnosis.words.answers import set_out
 from diagnosis.words.captions import captioned, pictured
 from diagnosis.words.cards import cause_cards, effect_cards
-from diagnosis.words.lines import coefficients_line, hidden_line, inclusion_line, patch_line
+from diagnosis.words.lines import inclusion_line, patch_line
 from diagnosis.words.symbols import symbol_rows
-from diagnosis.words.tables import (
-    budget_table,
-    candidates_table,
-    coefficients_table,
-    hidden_table,
-    lines_table,
-    parameters_table,
-    patch_table,
-)
+from diagnosis.words.tables import candidates_table, lines_table, parameters_table, patch_table
 from diagnosis.words.verdict import next_steps, rival_lines
 from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
@@ -161,7 +159,7 @@ def _causes(answer: Findings) -> Section:
     cards = cause_cards(answer)
     title = "The cause" if len(cards) == 1 else "The causes"
     if not answer.decision.decided:
-        title += f" of the {set_out(answer)}"
+        title += f" of the {answer.set_out}"
     return Section("found", title, (*cards, parameters_table(answer)) if cards else ())
 
 
@@ -199,7 +197,7 @@ def _closable(answer: Findings) -> Section:
 
 
 def _coefficients(answer: Findings) -> Section:
-    table, symbols = coefficients_table(answer), symbol_rows(answer)
+    table, symbols = coefficients_table(answer.coefficients, answer), symbol_rows(answer)
     title = "Coefficients before and after" if "change of size" in table.columns else "Coefficients"
     nothing = () if table.rows else (Detail((Paragraph("These runs give no coefficients."),)),)
     return Section(
@@ -229,12 +227,12 @@ def _uncertainty(answer: Findings, blown: bool) -> Section:
         "uncertainty",
         "Uncertainty of the coefficients",
         (
-            captioned("coefficients"),
-            Detail((budget_table(answer),)),
-            Paragraph(coefficients_line(answer)),
+            *pictured(answer, "coefficients"),
+            Detail((budget_table(answer.coefficients),)),
+            Paragraph(coefficients_line(answer.coefficients)),
             Paragraph(trade_off_line(answer.trade_off, COEFFICIENTS)),
-            Paragraph(hidden_line(answer)),
-            Detail((hidden_table(answer), beyond)),
+            Paragraph(hidden_line(answer.hidden, answer.coefficients)),
+            Detail((hidden_table(answer.hidden, answer.coefficients), beyond)),
         ),
     )
 

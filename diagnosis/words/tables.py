@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
-from diagnosis.words.answers import ranked, set_out
-from identification.printing import coefficient_label
+from diagnosis.words.answers import ranked
 from identification.show.blocks import TextTable
 from identification.show.numbers import (
     estimated,
@@ -21,9 +18,7 @@ from identification.show.numbers import (
     reading_shown,
     share,
     significant,
-    size_change,
     unit_mark,
-    with_std,
 )
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.dimensions import beside
@@ -77,96 +72,10 @@ def parameters_table(answer: Findings) -> TextTable:
         size = _estimate(answer, full, first.effect, given)
         rows.append((owner if owner != effect else "", name, size))
         effect = owner
-    whose = "Parameters" if answer.decision.decided else f"Parameters of the {set_out(answer)}"
+    whose = "Parameters" if answer.decision.decided else f"Parameters of the {answer.set_out}"
     units = explained({given.unit for given in first.parameters.values()})
     heads = ("effect", "parameter", "estimate")
     return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
-
-
-def coefficients_table(answer: Findings) -> TextTable:
-    """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
-
-    A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
-    """
-    before, after = answer.coefficients.before, answer.coefficients.after
-    named, rows = answer.names_effects, []
-    skewed = any(given.interval for given in (after or before).values())
-    for label, nominal, with_causes in _rows(answer):
-        best = with_causes or nominal
-        cells = [_without_interval(given) for given in ([nominal, with_causes] if named else [best])]
-        interval = _interval(best)
-        if skewed and best is not None and best.std:
-            cells[-1] += f"\n({interval})"
-        change = "–"
-        both = [given for given in (nominal, with_causes) if given and given.determined]
-        if len(both) == 2 and both[0].value:
-            change = size_change(*(given.value for given in both))
-        rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
-    causes = "with the causes" if answer.decision.decided else f"with the {set_out(answer)}"
-    detail = () if skewed else ("95 % interval",)
-    heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
-    title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
-    return TextTable(title, heads, tuple(rows), right=heads[1:], detail=detail)
-
-
-def _rows(answer: Findings) -> Iterator[tuple[str, Quantity | None, Quantity | None]]:
-    """Label of a coefficient, and its estimates by the nominal model and with the causes.
-
-    The nominal model has no lag, so with a named lag its coefficients compare with those in phase.
-    """
-    before, after = answer.coefficients.before, answer.coefficients.after
-    phase = answer.coefficients.in_phase
-    for name in dict.fromkeys([*before, *after]):
-        nominal, with_causes = before.get(name), after.get(name)
-        label = coefficient_label(name, {**after, **before}[name].unit)
-        if name in phase:
-            which = "angle" if name.startswith("cn_beta") else "rate"
-            yield f"{label}, in phase with the {which}", nominal, phase[name]
-            yield f"{label}, beside the lag", None, with_causes
-        else:
-            yield label, nominal, with_causes
-
-
-def _without_interval(given: Quantity | None) -> str:
-    return "–" if given is None else estimated(replace(given, interval=None))
-
-
-def _interval(given: Quantity | None) -> str:
-    """The central interval of 0.95, with as many digits as its width allows."""
-    if given is None or not given.std:
-        return "–"
-    reach = 1.96 * given.std
-    width = with_std(given.value, reach).partition("± ")[2]
-    places = len(width.partition(".")[2]) if width.replace(".", "").isdigit() else None
-    ends = given.interval or (given.value - reach, given.value + reach)
-    return " to ".join(significant(end) if places is None else f"{end:.{places}f}" for end in ends)
-
-
-SOURCES = {
-    "noise": "noise of the readings",
-    "scatter": "scatter between the runs",
-    "misfit": "model error",
-    "small causes": "small causes that are not named",
-    "air density": "rounding of the stated air density",
-    "unseen form": "form of the cause that free decays cannot show",
-    "freed form": "freedom of the causes' forms",
-    "rivals": "other answers, weighted by probability",
-}
-"""The sources of a coefficient's variance."""
-
-
-def hidden_table(answer: Findings) -> TextTable:
-    """Upper limits on undetected effects, and the change of each coefficient at that size."""
-    hidden, rows = answer.hidden, []
-    names = [name for name in answer.coefficients.after if hidden and name in hidden[0].moves]
-    for one in hidden:
-        size = f"{significant(one.size.value, 2)}{unit_mark(beside(one.size.unit))}"
-        moves = [significant(one.moves[name].value, 2) for name in names]
-        rows.append((plain(one.effect), size, *moves))
-    heads = [f"would change {coefficient_label(name, hidden[0].moves[name].unit)} by" for name in names]
-    units = explained({one.size.unit for one in hidden})
-    title = f"Upper limits on undetected effects (95 %), which ± does not include{units}"
-    return TextTable(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
 
 
 def patch_table(answer: Findings) -> TextTable:
@@ -197,25 +106,3 @@ def lines_table(answer: Findings) -> TextTable:
     )
     heads = ("run", "frequency [Hz]", "amplitude", "share of the run's gap")
     return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])
-
-
-def budget_table(answer: Findings) -> TextTable:
-    """The uncertainty budget of the coefficients of the answer; no rows where the document has no shares.
-
-    A row for each source: its standard deviation and its share of the variance, by coefficient.
-    """
-    heads: list[str] = []
-    columns = [[*SOURCES.values(), "combined standard deviation"]]
-    for name, given in answer.coefficients.after.items():
-        std, shares = given.std, given.shares
-        if std is None or not shares:
-            continue
-        heads.append(coefficient_label(name, given.unit))
-        cells = []
-        for part in (shares.get(source, 0.0) for source in SOURCES):
-            shown = f"{significant(std * math.sqrt(part), 2)} ({100.0 * part:.1f} %)"
-            cells.append("–" if part < 5e-4 else shown)
-        columns.append([*cells, significant(std, 2)])
-    title = "Uncertainty budget with the causes: standard deviation by source, and share of the variance"
-    rows = tuple(zip(*columns, strict=True)) if heads else ()
-    return TextTable(title, ("source", *heads), rows, right=tuple(heads))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.findings.candidates import CauseSize
+from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.other_motions import TwoModes
@@ -24,14 +25,7 @@ from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.rivals.two_springs import SpringError
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
-from diagnosis.words.causes import (
-    advice,
-    consequence,
-    hold_step,
-    hold_words,
-    known_and_open,
-    one_of_springs,
-)
+from diagnosis.words.causes import advice, hold_step, hold_words, known_and_open, one_of_springs
 from diagnosis.words.own_model import model_step, model_words
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
@@ -141,7 +135,7 @@ def _answer(answer: Findings, rest: str) -> str:
         )
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
     changes = {} if answer.rest_is_material else facts.immaterial
-    last = (explained, rest, _immaterial(changes) or consequence(answer))
+    last = (explained, rest, _immaterial(changes) or consequence(answer.coefficients, answer))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
     acting = []

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from diagnosis.findings.coefficients import coefficient_note
 from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.whole import Findings
-from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
+from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words
 from identification.status import Remark
@@ -57,7 +58,7 @@ def sentences(answer: Findings) -> Sentences:
         where=where_words(answer),
         rest=rest,
         closable=closable_words(answer.closable, answer),
-        note=coefficient_note(answer),
+        note=coefficient_note(answer.coefficients, answer),
         noise="" if found.noise is None else said(NOISE, found.noise, unit),
         cautions=tuple(said(CAUTIONS, one, unit) for one in found.cautions),
         remarks=tuple(remark(one, unit) for one in found.noted),

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binom, chi2
 
 from diagnosis import diagnose
-from diagnosis.findings.coefficients import Answers, Possible, coefficients
+from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.scatter import scattered

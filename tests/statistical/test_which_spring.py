@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.coefficients import coefficients, possible_answers
+from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.search.investigate import investigate
 from identification import identify
 from tests.reference.rigs import rig

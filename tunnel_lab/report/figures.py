@@ -14,11 +14,8 @@ from diagnosis.findings.misfit import run_labels
 from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
-from identification.printing import coefficient_label
 from identification.show.drawing import (
     ACCENT,
-    AFTER,
-    BEFORE,
     INK,
     NARROW,
     QUIET,
@@ -85,7 +82,6 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return makers | {
         "which": candidates_figure,
-        "coefficients": coefficients_figure,
     }
 
 
@@ -120,30 +116,6 @@ def candidates_figure(answer: Findings) -> Figure | None:
     axes.invert_yaxis()
     axes.set(xlim=(0.0, 1.12), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
     grid(axes, "x")
-    return fig
-
-
-@styled
-def coefficients_figure(answer: Findings) -> Figure | None:
-    """The coefficients that the runs determine, before and after, with 95 % intervals; None without any."""
-    before, after = answer.coefficients.before, answer.coefficients.after
-    both = [name for name in before if name in after]
-    names = [n for n in both if before[n].determined and after[n].determined]
-    if not names:
-        return None
-    fig = figure(NARROW, 0.3 + 1.3 * len(names))
-    for place, name in enumerate(names, 1):
-        axes = fig.add_subplot(len(names), 1, place)
-        for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
-            std = values[name].std
-            axes.errorbar(
-                values[name].value, row, xerr=None if std is None else INTERVAL * std, color=colour,
-                marker=marker, ms=6, capsize=4,
-            )  # fmt: skip
-        axes.set_yticks([0, 1], ["before", "after"])
-        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name].unit))
-        axes.locator_params(axis="x", nbins=5)
-        grid(axes)
     return fig
 
 

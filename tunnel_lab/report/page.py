@@ -42,7 +42,6 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
-    "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 """Text alternatives of the figures."""
 FAMILY = "DejaVu Sans"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from diagnosis.answer.linear_theory import beside, starts_beside
-from diagnosis.findings.coefficients import (
+from diagnosis.findings.averaged_coefficients import (
     Answers,
     Central,
     NormalMixture,

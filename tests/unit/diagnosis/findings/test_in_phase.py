@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.findings.coefficients import in_phase
+from diagnosis.findings.averaged_coefficients import in_phase
+from diagnosis.findings.coefficients import coefficients_table, consequence
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from diagnosis.words.causes import consequence
-from diagnosis.words.tables import coefficients_table
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from

@@ -12,8 +12,8 @@ from diagnosis.answer.linear_theory import (
     coefficient_move,
     wind_on_runs,
 )
+from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients
 from diagnosis.findings.candidates import meant_coefficient, meant_parameter
-from diagnosis.findings.coefficients import Answers, Possible, coefficients
 from diagnosis.findings.remainder import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.coefficients import coefficients, possible_answers
+from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.findings.judgements import spring_choices
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit

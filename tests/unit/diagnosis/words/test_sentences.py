@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
-from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.coefficients import Coefficients, coefficient_note, size_note
 from diagnosis.findings.found import Found
 from diagnosis.findings.remainder import closable_table, closable_words
 from diagnosis.findings.terms import KINDS
@@ -16,7 +16,7 @@ from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
 from diagnosis.settings import settings_of
 from diagnosis.where.described import Nowhere, Where
-from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
+from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.closure import model_line, noise_line, runs_table, waterfall_table
+from diagnosis.findings.coefficients import coefficients_line, hidden_line, hidden_table
 from diagnosis.words import tables
-from diagnosis.words.lines import coefficients_line, hidden_line, inclusion_line
+from diagnosis.words.lines import inclusion_line
 from diagnosis.words.sections import printed
-from diagnosis.words.tables import candidates_table, hidden_table, parameters_table
+from diagnosis.words.tables import candidates_table, parameters_table
 from diagnosis.words.verdict import rival_lines, run_words
 from identification.estimate import Estimate, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table

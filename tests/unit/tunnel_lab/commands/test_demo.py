@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.words.causes import consequence
+from diagnosis.findings.coefficients import consequence
 from identification.estimate import Estimate, Status
 from identification.show.quantity import Quantity
 from tests.support.command import Tunnel
