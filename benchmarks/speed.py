@@ -34,15 +34,16 @@ JOBS: dict[str, tuple[EffectSetting, ...]] = {
     "12 runs, three causes": (FRICTION, CUBIC, DAMPING),
     "12 runs, four causes": (FRICTION, CUBIC, DAMPING, LAG),
 }
-#: The code of a process: it diagnoses a folder, and prints processor seconds, peak MiB, and the causes.
+#: The code of a process: it diagnoses a folder, perhaps with a model and the name of its joint, and prints
+#: processor seconds, peak MiB, and the causes.
 TIMED = """
 import json, os, re, sys
 sys.path.insert(0, os.getcwd())
-from diagnosis import diagnose
+from diagnosis import diagnose, read_model
 from tunnel_sim.files.campaign_folder import read_campaign
 campaign = read_campaign(sys.argv[1])
 before = os.times()
-answer = diagnose(campaign)
+answer = diagnose(campaign, model=read_model(*sys.argv[2:], campaign) if sys.argv[2:] else None)
 after = os.times()
 seconds = after.user - before.user + after.system - before.system
 # of this process alone; the kernel's count for getrusage begins with that of the parent

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -28,9 +29,18 @@ from tunnel_reference.forms import FORMS
 from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.files.campaign_folder import write_campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Record
 
 GROWTH = (12, 48, 144)  # runs
 FRICTION = 0.004  # N m
+#: A link that moves up and down, of which a user's model lacks the rotor and the losses of the gear.
+ARM = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody><body>
+<joint name="elbow" axis="0 1 0" {}/><geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="1.5"/></body>
+</worldbody><actuator><motor name="motor" joint="elbow" gear="20"/></actuator></mujoco>"""
+GEAR = 'armature="0.05" damping="0.4" frictionloss="0.6" solreffriction="0.002 1"'
+LATE = 12  # samples by which the motor acts late, ms
 #: The beginning of the code of a process.
 HERE = "import json, os, sys, time; sys.path.insert(0, os.getcwd())\n"
 #: Prints the modules imported by a diagnosis of a folder without a gap.
@@ -173,12 +183,37 @@ def friction(runs: int, folder: Path) -> Path:
     return write_campaign(as_campaign(simulated, f"friction-{runs}"), folder)
 
 
-def diagnosed(name: str, folder: Path) -> Iterator[Measurement]:
-    """Processor seconds and peak memory of a diagnosis."""
+def joint(folder: Path) -> tuple[Path, Path]:
+    """A campaign of a joint with two faults, friction and a late motor, by plain MuJoCo, and the user's model."""
+    rng, time_s, runs = np.random.default_rng(1), 1e-3 * np.arange(18_000), []
+    truth = mujoco.MjModel.from_xml_string(ARM.format(GEAR))
+    for number, peak in enumerate((0.3, 0.2, 0.25, 0.35)):
+        turns = np.outer(time_s, np.arange(0.2, 4.0, 0.1))  # lines from 0.2 to 4 Hz
+        control = np.sin(2.0 * np.pi * (turns + rng.uniform(size=turns.shape[1]))).sum(axis=1)
+        control *= peak / np.abs(control).max()
+        data, angle = mujoco.MjData(truth), np.empty(time_s.size)
+        data.qpos[0] = np.pi / 2
+        for place, value in enumerate(np.concatenate([np.full(LATE, control[0]), control[:-LATE]])):
+            angle[place], data.ctrl[0] = data.qpos[0], value
+            mujoco.mj_step(truth, data)
+        record = Record(time_s, angle + rng.normal(0.0, 2e-4, angle.size))
+        runs.append(Run(f"r{number}", record, 0.0, drive=Drive("drive", control, "zero")))
+    campaign = Campaign("joint", RigProperties(), SensorProperties(1000.0), tuple(runs))
+    model = folder.with_suffix(".xml")
+    model.write_text(ARM.format(""))
+    return write_campaign(campaign, folder), model
+
+
+def diagnosed(name: str, folder: Path, *model: str) -> Iterator[Measurement]:
+    """Processor seconds and peak memory of a diagnosis.
+
+    Args:
+        model: file and joint of the user's model; empty: none.
+    """
     cache: dict[Path, dict[str, float]] = {}
 
     def seconds(tree: Path) -> float:
-        cache[tree] = json.loads(printed(tree, TIMED, str(folder)))
+        cache[tree] = json.loads(printed(tree, TIMED, str(folder), *model))
         return cache[tree]["seconds"]
 
     yield Measurement(name, "CPU s", seconds)
@@ -267,6 +302,7 @@ def main() -> None:
     parser.add_argument("--set", type=Path, help="a folder of campaign folders, for the 90th percentile")
     parser.add_argument("--set-turns", type=int, default=1, help="turns of the set (default: 1)")
     parser.add_argument("--growth", action="store_true", help="campaigns of 12, 48 and 144 runs")
+    parser.add_argument("--joint", action="store_true", help="a robot's joint with two faults")
     parser.add_argument("--demo", action="store_true", help="the demo")
     parser.add_argument(
         "--paper", type=Path, action="append", default=[], help="a folder for the limit; repeat"
@@ -286,6 +322,11 @@ def main() -> None:
         for runs in GROWTH if asked.growth else ():
             folder = friction(runs, Path(written) / f"runs{runs}")
             jobs += [(one, asked.turns) for one in diagnosed(f"{runs} runs of dry friction", folder)]
+        if asked.joint:
+            folder, model = joint(Path(written) / "joint")
+            jobs += [
+                (one, asked.turns) for one in diagnosed("joint, two faults", folder, str(model), "elbow")
+            ]
         jobs += [(one, asked.turns) for one in (waited(asked.still.resolve()) if asked.still else ())]
         jobs += [(one, asked.turns) for one in (demo() if asked.demo else ())]
         if asked.set:

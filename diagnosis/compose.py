@@ -33,12 +33,10 @@ from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import (
-    Remainder,
     cautions,
     immaterial,
     nearly,
     outside_the_fits,
-    remainder,
     spring_choices,
     zeros_apart,
 )
@@ -46,6 +44,7 @@ from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
+from diagnosis.findings.remainder import Remainder, remainder
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (

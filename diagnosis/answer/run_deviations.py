@@ -150,6 +150,7 @@ class RunDeviations:
 
     @classmethod
     def of(cls, fitted: Fit) -> RunDeviations | None:
+        """The runs of a fit; None where none of their numbers may scatter, or a sensitivity is not finite."""
         own = {one.name: one for one in fitted.problem.scatter}
         able = may_scatter(ALL_EFFECTS, fitted.problem.data)
         if not able:

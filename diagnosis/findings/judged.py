@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from diagnosis.settings import Settings
+from identification.show.quantity import Quantity
 from identification.status import Remark
 
 
@@ -72,6 +73,10 @@ class Judged(Protocol):
     @property
     def between_runs_remain(self) -> bool:
         """Whether differences between the runs could explain what remains."""
+
+    @property
+    def coefficients_after(self) -> Mapping[str, Quantity]:
+        """The coefficients with the causes, by name."""
 
     @property
     def rest_is_significant(self) -> bool:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.findings.closure import Confirmation, RunGap
 from diagnosis.findings.found import Nearly
-from diagnosis.findings.hidden import Hidden
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact
-from diagnosis.noise.gap import gap_test
 from diagnosis.noise.kinds import Noise
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
@@ -21,48 +19,6 @@ from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
-
-
-@dataclass(frozen=True)
-class Move:
-    """Move of a coefficient by the remainder.
-
-    Args:
-        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
-        relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
-        std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
-        material: whether the remainder is significant and moves the coefficient by more than its standard
-            deviation or by 1 %.
-    """
-
-    value: float
-    relative: float | None
-    std: float | None
-    unit: str
-    material: bool = False
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """The gap that remains after the named causes; the whole gap where none is named.
-
-    Args:
-        significant: whether it is beyond chance, by the tests of the gap.
-        excess: on held-out readings, in noise variances of a sample.
-        p_value: of the strongest test, corrected for the number of tests.
-        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
-        words: the remainder in sentences; empty until they are written.
-        further: a significant effect beside the causes that is too small to be named; empty where there is none.
-    """
-
-    significant: bool
-    excess: float
-    p_value: float
-    material: bool
-    moves: Mapping[str, Move]
-    words: str = ""
-    further: str = ""
-
 
 Estimates = Mapping[str, Quantity]
 
@@ -191,50 +147,4 @@ def spring_choices(study: Study) -> tuple[SpringError, ...]:
             spring_error(one.hypothesis.fit, ONE_SPRING.name, study.similarity), probability=one.probability
         )
         for one in (study.answer.choices if study.answer else ())
-    )
-
-
-def remainder(
-    study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
-) -> Remainder:
-    """Judge the residual gap of the answer; a remainder within chance is never material.
-
-    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
-
-    Args:
-        stated: the coefficients of the answer's fit with their standard deviations.
-        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
-        excess: on held-out readings, in noise variances of a sample.
-        hidden: the effects that could hide beside the answer.
-    """
-    random, chosen = study.random, study.settings.answer
-    if random is not None:  # its runs have innovations
-        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
-        still = [residual for run, residual in runs if run.id not in random.process.runs]
-        both = np.concatenate([*random.process.innovations, *still])
-        p_value = float(chdtrc(both.size, both @ both))
-    elif study.chosen is study.nominal:
-        p_value = study.gap.test.p_value
-    else:  # no cause changes the tests of the noise itself: those of the residuals count
-        noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
-        p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
-    further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
-    by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
-    shown = further is not None and by_effect < chosen.remains_rate <= p_value
-    p_value = min(p_value, by_effect)
-    beyond_chance = p_value < chosen.remains_rate
-    moves = {}
-    for name, given in stated.items():
-        relative = moved[name] / abs(given.value) if given.value else None
-        # by its standard deviation, or by a share, where the runs determine it
-        least = chosen.material_share
-        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
-        moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
-    return Remainder(
-        significant=beyond_chance,
-        excess=excess,
-        p_value=p_value,
-        material=any(move.material for move in moves.values()),
-        moves=moves,
-        further=further.effect if shown and further is not None else "",
     )

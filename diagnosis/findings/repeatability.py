@@ -1,4 +1,4 @@
-"""Repeatability of the runs: their chance differences, every run against the model, and the run that deviates most."""
+"""Repeatability of the runs: their chance differences, and every run against the model."""
 
 from __future__ import annotations
 
@@ -232,8 +232,8 @@ class RunRepeatability(Pictured):
         if not self.scatters:
             own = [f"{name} by {_root_mean_square(self.runs, name)}" for name in ("frequency", "damping")]
             return (
-                f"Repeatability: not determined, {self._undetermined(judged)}. The runs, one by one, deviate from the "
-                f"model in {' and in '.join(own)} (root mean square)."
+                f"Repeatability: not determined, {self._undetermined(judged)}. The runs, one by one, deviate "
+                f"from the model in {' and in '.join(own)} (root mean square)."
             )
         each = [
             f"{name} ± {_root_mean_square(self.runs, name, of_scatter=True)}"
@@ -263,9 +263,9 @@ class RunRepeatability(Pictured):
         """Every run against the model; none for fewer than two runs."""
         del judged
         caption = (
-            "Repeatability: frequency and damping ratio of every run minus the prediction of the model of all runs. "
-            "Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which depends on "
-            "wind and spring."
+            "Repeatability: frequency and damping ratio of every run minus the prediction of the model of all "
+            "runs. Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which "
+            "depends on wind and spring."
         )
         description = (
             "Frequency and damping ratio of every run minus the model's, with the scatter as a band."

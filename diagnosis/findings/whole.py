@@ -20,7 +20,7 @@ from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judged import Misfit
-from diagnosis.findings.judgements import Remainder
+from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
@@ -28,6 +28,7 @@ from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from diagnosis.where.described import Where
+from identification.show.quantity import Quantity
 from identification.status import Remark
 from identification.trade_off import TradeOff
 from tunnel_sim.files.from_json import UNWRITTEN
@@ -115,7 +116,8 @@ class Findings:
     def pictures(self) -> dict[str, Picture]:
         """The figures of the findings, by name."""
         pictured = [one for one in vars(self).values() if isinstance(one, Pictured)]
-        return {drawn.name: drawn for one in pictured for drawn in one.pictures(self)}
+        drawn = [drawn for one in pictured for drawn in one.pictures(self)]
+        return {one.name: one for one in (*drawn, *law_pictures(self.closable))}
 
     @property
     def settings(self) -> Settings:
@@ -146,6 +148,11 @@ class Findings:
     def between_runs_remain(self) -> bool:
         """Whether differences between the runs could explain what remains."""
         return self.closable is not None and self.closable.kind == "between"
+
+    @property
+    def coefficients_after(self) -> Mapping[str, Quantity]:
+        """The coefficients with the causes, by name."""
+        return self.coefficients.after
 
     @property
     def rest_is_significant(self) -> bool:

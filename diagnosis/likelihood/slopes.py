@@ -42,7 +42,8 @@ def changes(asked: Asked, count: int) -> list[Array]:
     """
     points = len(asked.runs) // count - 1
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
-    if any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects}):
+    skip = any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects})
+    if skip or any(asked.physics.program[:count]):  # a moment by expression has none
         return unknown
     motions = CompiledRuns.of(asked, like=count)
     if motions.rows["twist_stiffness"].any():

@@ -15,7 +15,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array, Record, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,14 +247,12 @@ class RunData:
             )
         return self.samples.means(self.samples.time)
 
-    @property
+    @cached_property
     def sample_times(self) -> Array:
-        """Time of every sample in the blocks since the first block's start, shape (m,), s."""
+        """Time of every sample in the blocks since the first block's start, shape (m,), s: one object."""
         if self.samples is not None:
             return self.samples.time
-        return np.asarray(
-            np.arange(self.reading.size * self.block) * (self.interval / self.block), np.float64
-        )
+        return read_only(np.arange(self.reading.size * self.block) * (self.interval / self.block))
 
     @property
     def plain(self) -> bool:

@@ -12,8 +12,6 @@ CAPTIONS: Mapping[str, str] = {
     "residuals. The first view shows the cycles in which the models differ most.",
     "how-far": "Misfit of every run before and after. Filled circles: the run was held out of the fit, "
     "and only its release was refitted. Open circles: the run was part of the fit.",
-    "law": "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within "
-    "the band. The part that the coefficients and the zero of the model absorb is subtracted.",
     "where-runs": "Excess of every run over time: the mean squared residual of the nominal model over the "
     "noise variance, minus one, on a logarithmic scale. Empty cells are within three standard deviations of "
     "the noise.",

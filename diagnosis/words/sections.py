@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from diagnosis.findings.misfit import windy
+from diagnosis.findings.remainder import closable_line, closable_table
 from diagnosis.findings.terms import CHANNELS, CONDITIONS
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.answers import set_out
@@ -22,12 +23,10 @@ from diagnosis.words.lines import (
     noise_line,
     patch_line,
 )
-from diagnosis.words.remainder import closable_line
 from diagnosis.words.symbols import symbol_rows
 from diagnosis.words.tables import (
     budget_table,
     candidates_table,
-    closable_table,
     coefficients_table,
     hidden_table,
     lines_table,
@@ -200,11 +199,15 @@ def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
 
 
 def _closable(answer: Findings) -> Section:
-    drawn = captioned("law")
+    drawn = pictured(answer, "law")
     return Section(
         "closable",
         "What could explain the residual gap",
-        (Paragraph(closable_line(answer)), closable_table(answer), drawn),
+        (
+            Paragraph(closable_line(answer.closable, answer.rest, answer)),
+            closable_table(answer.closable, answer),
+            *drawn,
+        ),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from diagnosis.findings.misfit import misfit_text, unit_of
-from diagnosis.findings.terms import KINDS, answer_name
+from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked, set_out
 from identification.printing import coefficient_label
@@ -17,7 +17,6 @@ from identification.show.numbers import (
     explained,
     held_out_excess,
     p_text,
-    percent,
     plain,
     probability,
     reading_shown,
@@ -134,26 +133,6 @@ def waterfall_table(answer: Findings) -> TextTable:
     title = f"Gap {answer.waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
     heads = ("cause added", "residual gap", "without this cause")
     return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
-
-
-def closable_table(answer: Findings) -> TextTable:
-    """Share that each kind could explain, in per cent, the named kind first.
-
-    A table without rows where nothing remains beyond chance.
-    """
-    found, chosen = answer.closable, answer.settings.remainder
-    kind = "" if found is None else found.kind
-    ceilings = sorted(found.ceilings if found else (), key=lambda one: one.kind != kind)
-    rows = [
-        (
-            KINDS[one.kind],
-            percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
-            one.held_out,
-        )
-        for one in ceilings
-    ]
-    title = "Share of the residual gap that each kind of law could explain, estimated without a formula"
-    return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 
 def coefficients_table(answer: Findings) -> TextTable:

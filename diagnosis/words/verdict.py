@@ -9,6 +9,7 @@ from diagnosis.findings.candidates import CauseSize
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.other_motions import TwoModes
+from diagnosis.findings.remainder import formula_step
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -32,7 +33,6 @@ from diagnosis.words.causes import (
     one_of_springs,
 )
 from diagnosis.words.own_model import model_step, model_words
-from diagnosis.words.remainder import formula_step
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     beside_noise,
@@ -532,7 +532,7 @@ def next_steps(answer: Findings) -> list[str]:
     elif causes == UNKNOWN:
         steps += [
             "Read where the model departs from the runs, and examine the rig there.",
-            f"{formula_step(answer) or _SUSPECT}.",
+            f"{formula_step(answer.closable) or _SUSPECT}.",
         ]
     else:
         of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
@@ -540,7 +540,7 @@ def next_steps(answer: Findings) -> list[str]:
         steps += [
             *(f"{step}." for step in [hold_step(answer)] if step),
             *(f"{advice(answer, name)}." for name in to_mend),
-            *(f"{step}." for step in [formula_step(answer)] if step),
+            *(f"{step}." for step in [formula_step(answer.closable)] if step),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]

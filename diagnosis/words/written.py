@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from diagnosis.findings.misfit import unit_of
+from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.whole import Findings
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said
-from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.verdict import verdict
 from diagnosis.words.where import where_words
 from identification.status import Remark
@@ -46,13 +46,17 @@ def sentences(answer: Findings) -> Sentences:
     Args:
         document: the diagnosis in JSON's types; its text fields are ignored.
     """
-    found, rest, model = answer.found, rest_words(answer), answer.model
+    found, rest, model = (
+        answer.found,
+        "" if answer.rest is None else answer.rest.in_words(answer),
+        answer.model,
+    )
     unit = unit_of(answer)
     return Sentences(
         verdict=verdict(answer, rest),
         where=where_words(answer),
         rest=rest,
-        closable=closable_words(answer),
+        closable=closable_words(answer.closable, answer),
         note=coefficient_note(answer),
         noise="" if found.noise is None else said(NOISE, found.noise, unit),
         cautions=tuple(said(CAUTIONS, one, unit) for one in found.cautions),

@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,10 +29,8 @@ from identification.show.drawing import (
     QUIET,
     SIGMAS,
     array,
-    colour_bar,
-    faded,
 )
-from identification.show.numbers import plain, probability, significant, unit_shown
+from identification.show.numbers import plain, probability, significant
 from identification.show.style import (
     COLOURS,
     INTERVAL,
@@ -68,11 +65,6 @@ _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
 #: By independent variable of a law: the label of its axis, and the factor on radians or seconds.
-_AXES = {
-    "angle": ("angle [°]", degrees(1.0)),
-    "rate": ("rate [°/s]", degrees(1.0)),
-    "time": ("time since the start [s]", 1.0),
-}
 
 
 def diagnosis_figures(answer: Findings) -> dict[str, Figure]:
@@ -107,7 +99,6 @@ def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     return makers | {
         "which": candidates_figure,
         "how-far": closure_figure,
-        "law": law_figure,
         "coefficients": coefficients_figure,
     }
 
@@ -323,36 +314,4 @@ def backbone_figure(answer: Findings) -> Figure:
         longest = max(len(labels[curve["id"]]) for curve in chosen)
         columns = min(3, _LEGEND // (longest + _HANDLE)) or 1
         fig.legend(loc="outside lower center", ncols=columns, fontsize="x-small" if longest > _LONG else None)
-    return fig
-
-
-@styled
-def law_figure(answer: Findings) -> Figure | None:
-    """The law without a formula, with its 95 % band; in a map, white cells are within it. None without a law."""
-    curve = None if answer.closable is None else answer.closable.curve
-    if curve is None:
-        return None
-    shape = [len(axis) for axis in curve.places]
-    moment = curve.unit == "N m"
-    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve.unit == "rad" else "rad/s2")
-    values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
-    name = f"{'error of the reading' if curve.unit == 'rad' else 'missing moment'} [{unit}]"
-    (label, *others), scales = zip(*(_AXES[axis] for axis in curve.over), strict=True)
-    places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve.places, strict=True)]
-    fig = figure(NARROW, 3.2)
-    axes = fig.add_subplot()
-    axes.set_xlabel(label)
-    if len(shape) == 1:
-        (place,), band = places, INTERVAL * std
-        axes.fill_between(place, values - band, values + band, color=AFTER, alpha=0.25, lw=0)
-        axes.plot(place, values, color=AFTER)
-        axes.set_ylabel(name)
-        grid(axes)
-        return fig
-    reach = float(np.max(np.abs(values))) or 1.0
-    shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
-    colours = faded(AFTER, BEFORE)
-    mesh = axes.pcolormesh(*places, shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest")
-    axes.set_ylabel(*others)
-    colour_bar(fig, mesh, axes, label=name)
     return fig

@@ -44,7 +44,6 @@ DESCRIPTIONS = {
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
     "how-far": "Misfit of every run with the nominal model and with the causes added.",
-    "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
 """Text alternatives of the figures."""

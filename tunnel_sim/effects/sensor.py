@@ -291,7 +291,8 @@ class DroppedSamples(Effect):
         """The true time runs ahead of the stamps after every instant."""
         if self.is_null:
             return time_s
-        return time_s + _lost(time_s, self.lost_time, (self._instants(drawn) * stated.duration).tolist())
+        instants = (self._instants(drawn) * stated.duration).tolist()
+        return _after_losses(Same(read_only(time_s)), 0.0, self.lost_time, tuple(instants))
 
     def _instants(self, drawn: Drawn) -> Array:
         """Shares of the run, shape (n,)."""
@@ -307,7 +308,7 @@ def _lost(time_s: Array, lost_time: float, instants: Sequence[float]) -> Array:
 
 @lru_cache(maxsize=64)
 def _after_losses(times: Same, delay: float, lost_time: float, instants: tuple[float, ...]) -> Array:
-    """The true times of an input's samples, s: one object for equal losses, whose lines are computed once."""
+    """The true times of samples, s: one object for equal losses, whose lines and responses are computed once."""
     return read_only(times.array + _lost(times.array + delay, lost_time, instants))
 
 

@@ -274,13 +274,17 @@ def creep_rate(model: mujoco.MjModel, rest: float) -> float:
     Args:
         model: its joint has a ``frictionloss``.
         rest: position of the joint at which no other moment acts, rad.
+
+    Returns:
+        0 where another moment at the rest exceeds the friction, so that the engine shows no such rate.
     """
     data, forces = mujoco.MjData(model), []
     for rate in (0.0, _SLOW):
         data.qpos[0], data.qvel[0] = rest, rate
         mujoco.mj_forward(model, data)
         forces.append(float(data.qfrc_constraint[0]))
-    return float(model.dof_frictionloss[0]) * _SLOW / (forces[0] - forces[1])
+    rise = forces[0] - forces[1]
+    return float(model.dof_frictionloss[0]) * _SLOW / rise if rise > 0.0 else 0.0
 
 
 def _write_spring(

@@ -16,6 +16,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot separate a shorter part from rounding
 _ULPS = 8.0  # at least, so that the times still increase in other units
+_EVEN = 1e-9  # of an interval: a smaller departure from even samples is rounding
 _SERIES = 0.01  # interval over time constant, below which a series is more accurate
 _FIRST_LOOK = 32  # intervals of the first search for the end of a ramp
 _BENT = 0.03  # change of an input over the greatest moment, or over itself, in which a soft limit is nearly a line
@@ -134,11 +135,12 @@ class InputSamples:
             return self
         width = np.diff(self.time_s)
         slope = (self.before - self.after) / width
-        ratio = width / lag
+        even = np.ptp(width) <= _EVEN * width[0]
+        ratio = (np.mean(width, keepdims=True) if even else width) / lag
         left, missed = np.exp(-ratio), -np.expm1(-ratio)
         line = self.after - slope * lag  # asymptote of the response, at the interval's start
         added = np.concatenate([self.values[:1], line * missed + slope * width])
-        state = recurrence(np.append(0.0, left), added)
+        state = recurrence(left[0] if even else np.append(0.0, left), added)
         departure = state[:-1] - line
         mean, tilt = missed / ratio, _tilt(ratio, left, missed)
         begun = line + departure * (mean - 0.5 * tilt)

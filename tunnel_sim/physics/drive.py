@@ -22,6 +22,7 @@ from tunnel_sim.vocabulary.quantities import (
 from tunnel_sim.vocabulary.record import Array, read_only
 
 _EVEN = 1e-6  # of an interval: a smaller departure from even samples is rounding
+_ULPS = 8.0  # of a time: the rounding of a difference of times
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ class DriveMoment:
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         finite = all(map(isfinite, (self.scale, self.delay, self.offset)))
-        finite = finite and bool(np.isfinite(self.time_s).all() and np.isfinite(self.values).all())
+        finite = finite and _is_finite(Same(self.time_s)) and _is_finite(Same(self.values))
         if self.time_s.shape != self.values.shape or not self.time_s.size or not finite:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
@@ -84,7 +85,7 @@ class DriveMoment:
         offset = self.offset if self.scale else 0.0
         if self.actuator == DIRECT and offset == self.offset:
             return self
-        given = self.actuator.exerted(InputSamples(self.time_s, self.values, self.held), self.scale)
+        given = _exerted(Same(self.time_s), Same(self.values), self.held, self.actuator, self.scale)
         return DriveMoment(
             given.time_s, given.values, self.scale, self.delay, given.held, self.on_body, offset=offset
         )
@@ -97,12 +98,10 @@ class DriveMoment:
             return exerted
         return replace(exerted, values=exerted.values + exerted.offset / exerted.scale, offset=0.0)
 
-    @cached_property
+    @property
     def interval(self) -> Seconds:
         """Time between its samples; 0 where they are not even."""
-        interval = float(self.time_s[-1] - self.time_s[0]) / max(1, self.time_s.size - 1)
-        even = self.time_s[0] + interval * np.arange(self.time_s.size)
-        return interval if np.max(np.abs(self.time_s - even)) <= _EVEN * interval else 0.0
+        return _interval(Same(self.time_s))
 
     @property
     def through_actuator(self) -> bool:
@@ -190,7 +189,13 @@ class DriveMoment:
 def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
     """Level and slope, per s, of an input's delayed samples from given times since the run's start on."""
     kinks = drive.time_s + drive.delay
-    piece = np.searchsorted(kinks, starts, side="right") - 1  # -1 before the first sample
+    return _levels(drive, kinks, np.searchsorted(kinks, starts, side="right") - 1, starts)
+
+
+def _levels(
+    drive: DriveMoment, kinks: Times, piece: NDArray[np.intp], starts: Times
+) -> tuple[PerSample, PerSample]:
+    """As `_pieces`, of known pieces between the delayed samples; −1 before the first."""
     at = np.clip(piece, 0, kinks.size - 1)
     slope = np.append(np.diff(drive.values) / np.diff(drive.time_s), 0.0)[at]
     slope = np.where((piece < 0) | drive.held, 0.0, slope)
@@ -201,10 +206,13 @@ def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
     """Impulses of an input's delayed samples between times, and their first moments about the earlier time."""
     kinks = drive.time_s + drive.delay
     inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
-    starts = np.sort(np.concatenate([ends[:-1], inside]), kind="stable")  # of two sorted parts: fast
-    level, slope = _pieces(drive, starts)
-    last, length = ends.size - 1, np.diff(np.append(starts, ends[-1]))
-    within = np.searchsorted(ends, starts, side="right") - 1
+    last, both = ends.size - 1, np.concatenate([ends[:-1], inside])
+    order = np.argsort(both, kind="stable")  # of two sorted parts: fast
+    starts, begins = both[order], order < last
+    within = np.cumsum(begins) - 1
+    piece = np.searchsorted(kinks, ends[0], side="right") - 1 + np.cumsum(~begins)
+    level, slope = _levels(drive, kinks, piece, starts)
+    length = np.diff(np.append(starts, ends[-1]))
     impulse = length * (level + slope * length / 2.0)
     product = (starts - ends[within]) * impulse + length**2 * (level / 2.0 + slope * length / 3.0)
     integrals = (np.bincount(within, values, last) for values in (impulse, product))
@@ -223,6 +231,27 @@ class Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Same) and other.array is self.array
+
+
+@lru_cache(maxsize=128)
+def _is_finite(values: Same) -> bool:
+    return bool(np.isfinite(values.array).all())
+
+
+@lru_cache(maxsize=64)
+def _interval(time_s: Same) -> Seconds:
+    """As `DriveMoment.interval`."""
+    times = time_s.array
+    interval = float(times[-1] - times[0]) / max(1, times.size - 1)
+    even = times[0] + interval * np.arange(times.size)
+    return interval if np.max(np.abs(times - even)) <= _EVEN * interval else 0.0
+
+
+@lru_cache(maxsize=64)
+def _exerted(time_s: Same, values: Same, held: bool, actuator: ActuatorLimits, scale: float) -> InputSamples:
+    """The samples behind an actuator: one object, by which their lines and responses are kept."""
+    given = actuator.exerted(InputSamples(time_s.array, values.array, held), scale)
+    return InputSamples(read_only(given.time_s), read_only(given.values), given.held)
 
 
 @lru_cache(maxsize=64)
@@ -248,17 +277,23 @@ class _Course:
     """An input as straight lines from the run's start on, and the places of some times on them.
 
     Args:
-        lengths: of the lines but the last, s, shape (lines − 1,), or one number for all.
+        lengths: of the lines, s, or the three by which they follow each other, shape (lengths,).
+        length: the place of every line's among them, but the last's, shape (lines − 1,).
+        alternate: whether the lines after the first have two lengths by turns.
         level, slope: of the lines, in the unit of the samples, and per s, shape (lines,).
         line: on which each time is, shape (n,).
-        since: time since that line's start, s, shape (n,); None where every time is at one.
+        between: places of the times that are not at a line's start, shape (m,).
+        since: of these, time since their line's start, s, shape (m,).
     """
 
-    lengths: Array | float
+    lengths: Array
+    length: NDArray[np.intp]
+    alternate: bool
     level: PerSample
     slope: PerSample
     line: NDArray[np.intp]
-    since: Times | None
+    between: NDArray[np.intp]
+    since: Times
 
 
 @lru_cache(maxsize=64)
@@ -268,13 +303,26 @@ def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _C
     kinks = drive.time_s + delay
     starts = np.concatenate([[0.0], kinks[kinks > within]])
     level, slope = _pieces(drive, starts + within)
-    lengths: Array | float = np.diff(starts)
-    if drive.interval and np.all(np.abs(lengths - drive.interval) <= within):
-        lengths = drive.interval
+    lengths = np.diff(starts)
+    number = np.arange(lengths.size)
+    in_turn = np.where(number > 0, 2 - number % 2, 0)  # as the samples of an input with a lag, and even ones
+    rounding = max(within, _ULPS * float(np.spacing(starts[-1])))
+    alternate = bool(lengths.size > 2 and np.all(np.abs(lengths - lengths[in_turn]) <= rounding))
+    if alternate and drive.interval:
+        lengths[1:] = drive.interval
     line = np.maximum(np.searchsorted(starts, time_s + within, side="right") - 1, 0)
     since = np.maximum(time_s - starts[line], 0.0)
-    apart = np.max(since, initial=0.0) > within
-    return _Course(lengths, level - slope * within, slope, line, since if apart else None)
+    between = np.flatnonzero(since > rounding)
+    return _Course(
+        lengths[:3] if alternate else lengths,
+        in_turn if alternate else number,
+        alternate,
+        level - slope * within,
+        slope,
+        line,
+        between,
+        since[between],
+    )
 
 
 @lru_cache(maxsize=64)
@@ -282,18 +330,25 @@ def _mode(times: Same, values: Same, held: bool, delay: float, root: complex, at
     """As `DriveMoment.mode`, in the unit of the samples and s."""
     course = _course(times, values, held, delay, at)
 
-    def forced(since: Array | float, level: Array, slope: Array) -> np.ndarray:  # from z = 0
+    def weights(since: Array) -> tuple[np.ndarray, np.ndarray]:  # of level and slope, from z = 0
         turn = root * since
         grown = np.expm1(turn)
-        found: np.ndarray = level * (grown / root) + slope * ((grown - turn) / root**2)
-        return found
+        return grown / root, (grown - turn) / root**2
 
-    factor = np.exp(root * course.lengths)
-    added = forced(course.lengths, course.level[:-1], course.slope[:-1])
-    state = np.concatenate([[0j], recurrence(factor, added)])  # at the starts of lines
+    by_level, by_slope = (weight[course.length] for weight in weights(course.lengths))
+    factor, added = np.exp(root * course.lengths), by_level * course.level[:-1] + by_slope * course.slope[:-1]
+    state = np.zeros(added.size + 1, np.complex128)  # at the starts of lines
+    if course.alternate:  # over two lines at once
+        one, other = factor[1], factor[2]
+        pairs = other * added[1:-1:2] + added[2::2]
+        state[1::2] = recurrence(one * other, np.append(added[:1], pairs))[: state[1::2].size]
+        state[2::2] = one * state[1:-1:2] + added[1::2]
+    else:
+        state[1:] = recurrence(factor, added)
     found = state[course.line]
-    if course.since is not None:
-        beyond = forced(course.since, course.level[course.line], course.slope[course.line])
-        found = np.exp(root * course.since) * found + beyond
+    if course.between.size:
+        line, (by_level, by_slope) = course.line[course.between], weights(course.since)
+        beyond = by_level * course.level[line] + by_slope * course.slope[line]
+        found[course.between] = np.exp(root * course.since) * found[course.between] + beyond
     found.flags.writeable = False
     return found

@@ -14,14 +14,13 @@ from diagnosis.answer.linear_theory import (
 )
 from diagnosis.findings.candidates import meant_coefficient, meant_parameter
 from diagnosis.findings.coefficients import Answers, Possible, coefficients
-from diagnosis.findings.judgements import remainder
+from diagnosis.findings.remainder import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
 from diagnosis.settings import Settings
-from diagnosis.words.remainder import rest_words
 from identification.show.quantity import Quantity
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
 from tunnel_sim.effects import effect_class

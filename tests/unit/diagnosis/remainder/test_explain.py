@@ -12,6 +12,7 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import diagnose
+from diagnosis.findings.remainder import closable_line, closable_table, closable_words
 from diagnosis.findings.terms import KINDS
 from diagnosis.likelihood.ceiling import (
     Ceiling,
@@ -33,8 +34,6 @@ from diagnosis.remainder.formula import Formula, FormulaTerm, choose, effect_of,
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
-from diagnosis.words.remainder import closable_line, closable_words
-from diagnosis.words.tables import closable_table
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tests.support.gap_campaigns import answer, campaign, nominal

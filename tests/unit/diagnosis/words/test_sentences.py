@@ -10,14 +10,13 @@ from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.found import Found
+from diagnosis.findings.remainder import closable_table, closable_words
 from diagnosis.findings.terms import KINDS
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
 from diagnosis.settings import settings_of
 from diagnosis.where.described import Nowhere, Where
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
-from diagnosis.words.remainder import closable_words, rest_words
-from diagnosis.words.tables import closable_table
 from diagnosis.words.verdict import next_steps
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
+from diagnosis.findings.remainder import law_figure
 from diagnosis.words.symbols import symbol_rows
 from identification.show.drawing import inline_svg
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import render_report
-from tunnel_lab.report.figures import law_figure
 from tunnel_lab.report.where import place_figure
 
 

@@ -1,9 +1,12 @@
 """Inputs as one line for each step move a body as their samples do, between which the step ends early."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.actuator import Actuator
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
@@ -89,3 +92,27 @@ def test_samples_at_the_starts_of_steps_are_lines_as_they_are():
     assert lines.values is drive.values
     assert lines.slopes == pytest.approx([20.0, -10.0, 0.0, 30.0, 0.0])
     assert lines.interval == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+@pytest.mark.parametrize("delay", [-0.013, 0.0, 0.0042])
+def test_the_response_to_even_samples_is_that_to_the_same_input_in_uneven_ones(held, lag, delay):
+    """A further sample on the input's line, or on its step, changes nothing but the order of the lengths."""
+    time, values = 0.01 * np.arange(300), np.random.default_rng(1).normal(size=300).cumsum()
+    among = 0.5 * (time[100] + time[101])
+    there = values[100] if held else 0.5 * (values[100] + values[101])
+    ends, root = np.arange(0.0, 2.9, 0.03), complex(-0.7, 40.0)
+    even, uneven = (
+        DriveMoment(t, v, delay=delay, held=held, actuator=Actuator(lag=lag)).mode(root, ends)
+        for t, v in ((time, values), (np.insert(time, 101, among), np.insert(values, 101, there)))
+    )
+    within = 1e-4 if lag else 1e-9  # a response with a lag is a line in each interval, however short
+    assert np.max(np.abs(even - uneven)) < within * np.max(np.abs(even))
+
+
+def test_the_samples_behind_an_actuator_are_computed_once_for_equal_inputs():
+    drive = DriveMoment(np.arange(50) * 0.1, np.sin(np.arange(50.0)), actuator=Actuator(lag=0.3))
+    later = replace(drive, delay=0.05, offset=1.0)
+    assert later.exerted.values is drive.exerted.values
+    assert later.exerted.time_s is drive.exerted.time_s

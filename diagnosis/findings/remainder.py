@@ -1,0 +1,365 @@
+"""The remaining gap, its influence on the coefficients, and the part of it that could be explained."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import degrees
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtrc
+
+from diagnosis.findings.finding import Picture
+from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.judged import Judged
+from diagnosis.findings.judgements import Estimates
+from diagnosis.findings.misfit import rms_shown
+from diagnosis.findings.terms import KINDS, scattering
+from diagnosis.likelihood.ceiling import Ceiling
+from diagnosis.noise.gap import gap_test
+from diagnosis.remainder.closable import Closable, Curve, Law, Line
+from diagnosis.search.study import Study
+from diagnosis.search.weigh import UNKNOWN
+from identification.printing import COEFFICIENTS
+from identification.show.blocks import TextTable
+from identification.show.drawing import AFTER, BEFORE, NARROW, colour_bar, faded
+from identification.show.numbers import (
+    change_up_to,
+    left_over,
+    listed,
+    part,
+    percent,
+    plain,
+    significant,
+    unit_mark,
+    unit_shown,
+    with_std,
+)
+from identification.show.style import INTERVAL, figure, grid, styled
+from tunnel_sim.effects.registry import known_effects
+from tunnel_sim.vocabulary.dimensions import beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Move:
+    """Move of a coefficient by the remainder.
+
+    Args:
+        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
+        relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
+        std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
+        material: whether the remainder is significant and moves the coefficient by more than its standard
+            deviation or by 1 %.
+    """
+
+    value: float
+    relative: float | None
+    std: float | None
+    unit: str
+    material: bool = False
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The gap that remains after the named causes; the whole gap where none is named.
+
+    Args:
+        significant: whether it is beyond chance, by the tests of the gap.
+        excess: on held-out readings, in noise variances of a sample.
+        p_value: of the strongest test, corrected for the number of tests.
+        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
+        words: the remainder in sentences; empty until they are written.
+        further: a significant effect beside the causes that is too small to be named; empty where there is none.
+    """
+
+    significant: bool
+    excess: float
+    p_value: float
+    material: bool
+    moves: Mapping[str, Move]
+    words: str = ""
+    further: str = ""
+
+    def in_words(self, judged: Judged) -> str:
+        """The remaining gap, in sentences."""
+        rest, causes = self, judged.causes
+        after, named = judged.coefficients_after, judged.names_effects
+        moves, excess, misfit = rest.moves, rest.excess, judged.misfit
+        size = left_over(excess) if misfit is None else f"{rms_shown(misfit, excess)} root mean square"
+        larger = (
+            excess > 1.0
+        )  # than the noise: people see it in the fit, whatever it does to the coefficients
+        if larger and misfit is not None:
+            size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
+        left = f"the residual ({size})" if named else "the gap"
+        subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]
+        material = [name for name, move in moves.items() if move.material]
+        known = [name for name, move in moves.items() if move.std is not None]
+        if not causes:
+            words = "No gap: nothing remains beyond the noise."
+        elif not rest.significant:
+            words = "The residual is within the noise."
+        elif material:
+            moved = _each({name: change_up_to(moves[name].value, after[name]) for name in material})
+            start = f"Part of the gap remains: {left}" if named else subject
+            words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
+        elif not known:
+            words = f"{subject} changes no coefficient that these runs determine."
+        else:
+            most = {name: max(moves[name].value, moves[name].std or 0.0) for name in known}
+            bounds = _each(
+                {name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()}
+            )
+            words = (
+                f"{subject} changes {bounds}." if named else f"The gap is immaterial: it changes {bounds}."
+            )
+        if rest.further:
+            words += f" {plain(rest.further).capitalize()} is significant, but too small to be named."
+        return words
+
+
+def remainder(
+    study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
+) -> Remainder:
+    """Judge the residual gap of the answer; a remainder within chance is never material.
+
+    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
+
+    Args:
+        stated: the coefficients of the answer's fit with their standard deviations.
+        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
+        excess: on held-out readings, in noise variances of a sample.
+        hidden: the effects that could hide beside the answer.
+    """
+    random, chosen = study.random, study.settings.answer
+    if random is not None:  # its runs have innovations
+        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
+        still = [residual for run, residual in runs if run.id not in random.process.runs]
+        both = np.concatenate([*random.process.innovations, *still])
+        p_value = float(chdtrc(both.size, both @ both))
+    elif study.chosen is study.nominal:
+        p_value = study.gap.test.p_value
+    else:  # no cause changes the tests of the noise itself: those of the residuals count
+        noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
+        p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
+    further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
+    by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
+    shown = further is not None and by_effect < chosen.remains_rate <= p_value
+    p_value = min(p_value, by_effect)
+    beyond_chance = p_value < chosen.remains_rate
+    moves = {}
+    for name, given in stated.items():
+        relative = moved[name] / abs(given.value) if given.value else None
+        # by its standard deviation, or by a share, where the runs determine it
+        least = chosen.material_share
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
+        moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
+    return Remainder(
+        significant=beyond_chance,
+        excess=excess,
+        p_value=p_value,
+        material=any(move.material for move in moves.values()),
+        moves=moves,
+        further=further.effect if shown and further is not None else "",
+    )
+
+
+def _each(sizes: dict[str, str]) -> str:
+    """Coefficients with the sizes of their changes."""
+    return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
+
+
+def closable_words(found: Closable | None, judged: Judged) -> str:
+    """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
+    if found is None:
+        return ""
+    named = judged.causes != UNKNOWN and judged.decided
+    beyond = " beyond the scatter between runs" if scattering(judged.causes) else ""
+    left = "the residual gap" if named else f"the gap{beyond}"
+    ceilings = found.ceilings
+    if found.kind == "noise":
+        chosen = judged.settings.remainder
+        most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
+        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
+        return (
+            f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
+            "noise."
+        )
+    of_others = _measured_otherwise(judged, found.kind, ceilings)
+    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found.line)])
+
+
+def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
+    """The share of the kind beside those of the others, its place, and its formula."""
+    kind, where, law = found.kind, found.events, found.law
+    best = next(one for one in ceilings if one.kind == kind)
+    sentences = [
+        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {left} (measured on "
+        f"held-out {best.held_out})."
+    ]
+    if found.alike:
+        sentences.append(
+            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found.alike)}."
+        )
+    elif found.next_most is not None:
+        alike = all(one.held_out == best.held_out for one in ceilings)
+        other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
+        sentences.append(f"{other} would explain more than {percent(max(found.next_most, 0.0))}.")
+    if where and kind != "line":
+        run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
+        largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
+        sentences.append(f"Most of it is in {largest}{run}.")
+    if law is not None:
+        formula = law.effect.get("moment") or law.effect["reading"]
+        explains = percent(law.closed, law.std)
+        sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
+    return sentences
+
+
+def _with_values(law: Law) -> str:
+    """The numbers of a formula, as a clause; empty where it has none."""
+    stated, said, unknown = law.effect.get("parameters", {}), [], []
+    for name, (value, std) in law.parameters.items():
+        if not 0.0 < std < _UNKNOWN * abs(value):
+            unknown.append(name)
+            continue
+        unit = stated.get(name, {}).get("unit", "1")
+        said.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
+    left = f"{listed(unknown)} not determined by these runs" if unknown else ""
+    return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
+
+
+_UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
+
+
+def formula_step(found: Closable | None) -> str:
+    """How to try the formula of the remainder, without a full stop; empty where there is none."""
+    if found is None or found.law is None:
+        return ""
+    return (
+        "Write the formula as an effect with --propose FILE, and diagnose again with --effects-file FILE: its "
+        "probability among the known effects tells whether it is the cause"
+    )
+
+
+def _measured_otherwise(judged: Judged, kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
+    """The kind that explains more than the named one, on other held-out readings, and why it is not named.
+
+    Empty where no kind does.
+    """
+    chosen = judged.settings.remainder
+    best = next(one for one in ceilings if one.kind == kind)
+    others = (one for one in ceilings if one.determined(chosen) and one.held_out != best.held_out)
+    most = max(others, key=lambda one: one.closed, default=best)
+    if most.closed <= best.closed:
+        return []
+    return [
+        f"{KINDS[most.kind].capitalize()} would explain {percent(most.closed, most.std)}, measured on "
+        f"{most.held_out}. A law common to all runs is preferred if it explains {part(chosen.common_first)} of "
+        "that share or more, since it can be a property of the rig."
+    ]
+
+
+def _line(found: Line | None) -> list[str]:
+    """A steady line, in a sentence; none without one."""
+    if found is None:
+        return []
+    frequency = with_std(found.frequency_hz, found.frequency_std_hz)
+    mark, factor = unit_shown(found.unit)
+    amplitude = with_std(factor * found.amplitude, factor * found.amplitude_std)
+    amplitude += mark if mark == "°" else f" {mark}"
+    return [
+        f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
+        "alone shows a line in less than "
+        f"{100.0 * found.false_alarm_rate:.2g} % of campaigns."
+    ]
+
+
+_LABEL = "What could explain the residual gap"
+
+
+def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged) -> str:
+    """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
+    if found:
+        return f"{_LABEL}: {found.words}"
+    if rest is None or not judged.causes:
+        return ""
+    if not rest.significant:
+        return f"{_LABEL}: nothing beyond chance (p = {rest.p_value:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in judged.causes):
+        return f"{_LABEL}: not stated, since any law would explain part of a random moment."
+    return ""
+
+
+def closable_table(found: Closable | None, judged: Judged) -> TextTable:
+    """Share that each kind could explain, in per cent, the named kind first.
+
+    A table without rows where nothing remains beyond chance.
+    """
+    chosen = judged.settings.remainder
+    kind = "" if found is None else found.kind
+    ceilings = sorted(found.ceilings if found else (), key=lambda one: one.kind != kind)
+    rows = [
+        (
+            KINDS[one.kind],
+            percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
+            one.held_out,
+        )
+        for one in ceilings
+    ]
+    title = "Share of the residual gap that each kind of law could explain, estimated without a formula"
+    return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
+
+
+def law_pictures(found: Closable | None) -> tuple[Picture, ...]:
+    """The law without a formula; none without one."""
+    if found is None or found.curve is None:
+        return ()
+    caption = (
+        "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within the "
+        "band. The part that the coefficients and the zero of the model absorb is subtracted."
+    )
+    description = "The missing moment, or error of the reading, as a curve with its band or as a map."
+    return (Picture("law", caption, description, partial(law_figure, found.curve)),)
+
+
+_AXES = {
+    "angle": ("angle [°]", degrees(1.0)),
+    "rate": ("rate [°/s]", degrees(1.0)),
+    "time": ("time since the start [s]", 1.0),
+}
+
+
+@styled
+def law_figure(curve: Curve) -> Figure:
+    """The law without a formula, with its 95 % band; in a map, white cells are within it."""
+    shape = [len(axis) for axis in curve.places]
+    moment = curve.unit == "N m"
+    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve.unit == "rad" else "rad/s2")
+    values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
+    name = f"{'error of the reading' if curve.unit == 'rad' else 'missing moment'} [{unit}]"
+    (label, *others), scales = zip(*(_AXES[axis] for axis in curve.over), strict=True)
+    places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve.places, strict=True)]
+    fig = figure(NARROW, 3.2)
+    axes = fig.add_subplot()
+    axes.set_xlabel(label)
+    if len(shape) == 1:
+        (place,), band = places, INTERVAL * std
+        axes.fill_between(place, values - band, values + band, color=AFTER, alpha=0.25, lw=0)
+        axes.plot(place, values, color=AFTER)
+        axes.set_ylabel(name)
+        grid(axes)
+        return fig
+    reach = float(np.max(np.abs(values))) or 1.0
+    shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
+    colours = faded(AFTER, BEFORE)
+    mesh = axes.pcolormesh(*places, shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest")
+    axes.set_ylabel(*others)
+    colour_bar(fig, mesh, axes, label=name)
+    return fig
