@@ -97,7 +97,7 @@ def test_sensitivities_agree_with_central_differences(name):
     ]
     point = Point(common, np.array(own))
     for r, (by_common, by_own) in enumerate(sensitivities(problem, point)):
-        for columns, which in ((by_common, "common"), (by_own, "release")):
+        for columns, which in ((by_common, "common"), (by_own, "per_run")):
             for j in range(columns.shape[1]):
                 h = 1e-5 * max(abs(getattr(point, which)[..., j].max()), 1e-2)
                 ends = []
