@@ -20,6 +20,7 @@ from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judged import Misfit
+from diagnosis.findings.place import place_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.patch.written_model import PatchedModel
@@ -121,6 +122,7 @@ class Findings:
             one.name: one
             for one in (
                 *drawn,
+                *place_pictures(self.where, self),
                 *closure_pictures(self.gap, self.waterfall, self),
                 *law_pictures(self.closable),
             )

@@ -17,20 +17,19 @@ from diagnosis.findings.coefficients import (
     hidden_table,
 )
 from diagnosis.findings.misfit import windy
+from diagnosis.findings.place import lines_table, place_rows
 from diagnosis.findings.remainder import closable_line, closable_table
-from diagnosis.findings.terms import CHANNELS, CONDITIONS
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from diagnosis.words.captions import captioned, pictured
 from diagnosis.words.cards import cause_cards, effect_cards
 from diagnosis.words.lines import inclusion_line, patch_line
 from diagnosis.words.symbols import symbol_rows
-from diagnosis.words.tables import candidates_table, lines_table, parameters_table, patch_table
+from diagnosis.words.tables import candidates_table, parameters_table, patch_table
 from diagnosis.words.verdict import next_steps, rival_lines
 from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
     Block,
     Detail,
-    Figure,
     Heading,
     Listing,
     Pairs,
@@ -39,10 +38,8 @@ from identification.show.blocks import (
     TextTable,
     brief,
 )
-from identification.show.numbers import significant, unit_shown
+from identification.show.numbers import significant
 from tunnel_sim.vocabulary.campaign import Campaign
-
-_UNDETERMINED = "not shown by the residuals alone"
 
 
 def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Section, ...]:
@@ -91,13 +88,7 @@ def printed(answer: Findings) -> tuple[Block, ...]:
 
 
 def _place(answer: Findings) -> Section:
-    grid = answer.figure_data.get("grid") or {}
-    axis = "the wind speed" if grid.get("wind_speeds") else "time"
-    caption = (
-        f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
-        "hold no sample or are within three standard deviations of the noise."
-    )
-    return Section("place", "Where the gap is", (Figure("place", caption),))
+    return Section("place", "Where the gap is", pictured(answer, "place"))
 
 
 def _closes(answer: Findings) -> Section:
@@ -105,39 +96,14 @@ def _closes(answer: Findings) -> Section:
 
 
 def _where(answer: Findings) -> Section:
-    figures = (
-        captioned("where-runs"),
-        captioned("where-profiles"),
-        captioned("where-spectrum"),
-        captioned("where-backbones"),
-        captioned("where-phase-plane"),
-        captioned("where-moment"),
-    )
-    place = (Detail((Pairs(place_rows(answer)),)),) if answer.causes else ()
+    figures = pictured(answer, *(name for name in answer.pictures if name.startswith("where-")))
+    place = (Detail((Pairs(place_rows(answer.where, answer)),)),) if answer.causes else ()
     words = Paragraph(answer.where.words, "Where")
     return Section(
         "where",
         "Where the model departs from the runs",
         (words, *place, *figures, Detail((lines_table(answer),))),
     )
-
-
-def place_rows(answer: Findings) -> tuple[tuple[str, str], ...]:
-    """The place of the gap, field by field."""
-    where, degree = answer.where, unit_shown("rad")[1]
-    rows = [("Runs that show it", ", ".join(where.runs) or "–")]
-    for label, interval, factor, unit in (
-        ("Time", where.time_s, 1.0, " s"),
-        ("Amplitude", where.amplitude_rad, degree, "°"),
-        ("Frequency", where.frequency_hz, 1.0, " Hz"),
-    ):
-        ends = [significant(factor * value, 3) for value in interval or ()]
-        rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
-    rows.append(("Acts on", CHANNELS.get(where.channel or "", _UNDETERMINED)))
-    if windy(answer):
-        condition = where.condition
-        rows.append(("Acts", _UNDETERMINED if condition is None else CONDITIONS[condition]))
-    return tuple(rows)
 
 
 def _which(answer: Findings) -> Section:

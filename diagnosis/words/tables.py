@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.terms import answer_name
 from diagnosis.findings.whole import Findings
 from diagnosis.words.answers import ranked
@@ -15,7 +14,6 @@ from identification.show.numbers import (
     held_out_excess,
     plain,
     probability,
-    reading_shown,
     share,
     significant,
     unit_mark,
@@ -91,18 +89,3 @@ def patch_table(answer: Findings) -> TextTable:
 def _numbers(values: Sequence[float]) -> str:
     last = max((i for i, value in enumerate(values) if value), default=0)
     return " ".join(significant(value, 4) for value in values[: last + 1])
-
-
-def lines_table(answer: Findings) -> TextTable:
-    """Narrow lines in the residuals."""
-    rows = tuple(
-        (
-            line["run"],
-            significant(line["frequency_hz"], 4),
-            reading_shown(line["amplitude_rad"], 2, unit_of(answer)),
-            share(min(line["share"], 1.0)),
-        )
-        for line in answer.figure_data.get("lines", [])
-    )
-    heads = ("run", "frequency [Hz]", "amplitude", "share of the run's gap")
-    return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from diagnosis.findings.coefficients import coefficient_note
 from diagnosis.findings.misfit import unit_of
+from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.whole import Findings
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.words.verdict import verdict
-from diagnosis.words.where import where_words
 from identification.status import Remark
 
 
@@ -55,7 +55,7 @@ def sentences(answer: Findings) -> Sentences:
     unit = unit_of(answer)
     return Sentences(
         verdict=verdict(answer, rest),
-        where=where_words(answer),
+        where=where_words(answer.where, answer.found.place or answer.found.nowhere, answer),
         rest=rest,
         closable=closable_words(answer.closable, answer),
         note=coefficient_note(answer.coefficients, answer),

@@ -228,9 +228,9 @@ class ShownAnswer:
         """The figures of the report's summary."""
 
         def drawings() -> list[str]:
+            from diagnosis.findings.place import runs_figure
             from identification.show.drawing import inline_svg
             from tunnel_lab.report.page import descriptions
-            from tunnel_lab.report.where import runs_figure
 
             drawn = {"waterfall": diagnosis_figure(answer, "waterfall")}
             if not answer.repeated.repeats(answer):

@@ -115,8 +115,8 @@ def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[s
         TunnelError: for an unknown figure or run, or a diagnosis without curves.
     """
     from tunnel_lab.report import draw
+    from tunnel_lab.report.charts import fit_pages
     from tunnel_lab.report.diagnosis_file import read_diagnosis
-    from tunnel_lab.report.where import fit_pages
 
     answer, drawn = read_diagnosis(file), dict[str, "Figure"]()
     where, again = shown(file), "diagnose the campaign again"

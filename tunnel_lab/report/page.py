@@ -22,8 +22,8 @@ from diagnosis.words.sections import sections
 from diagnosis.words.verdict import headline
 from identification.show.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
 from identification.show.drawing import inline_svg, shown_text
+from tunnel_lab.report.charts import Chart, charts, fit_charts, fit_figure
 from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
-from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -33,14 +33,7 @@ if TYPE_CHECKING:
 
 
 DESCRIPTIONS = {
-    "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
     "fit": "The measured and predicted readings of both models against time, and below them the residuals.",
-    "where-runs": "Heat map of the excess of every run over time.",
-    "where-profiles": "Excess against time and against amplitude, and the missing moment against time.",
-    "where-spectrum": "Residual power against frequency, with the nominal model and with the causes added.",
-    "where-backbones": "Frequency and damping ratio of each run against amplitude, relative to the nominal model.",
-    "where-phase-plane": "Map of the missing moment over angle and rate.",
-    "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
 }
 """Text alternatives of the figures."""

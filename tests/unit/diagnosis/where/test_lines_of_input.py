@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
+from diagnosis.findings.place import where_words
 from diagnosis.model.joint import Joint
-from diagnosis.words.where import where_words
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array, Record

@@ -11,12 +11,11 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.findings.decision import Predictions, decision
+from diagnosis.findings.place import place_rows, where_words
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.where.place import locate
-from diagnosis.words.sections import place_rows
 from diagnosis.words.verdict import headline, next_steps, verdict
-from diagnosis.words.where import where_words
 from tests.support.contradictions import contradictions
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import campaign as gap_campaign

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from diagnosis.findings.closure import waterfall_table
+from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.repeatability import width_text
 from diagnosis.words.lines import diagnosis_brief, inclusion_line
 from diagnosis.words.tables import candidates_table, parameters_table
 from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
-from diagnosis.words.where import where_words
 from tests.support.diagnosis_document import CAUSE, scattering_document
 
 Document = dict[str, Any]

@@ -10,6 +10,7 @@ from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, coefficient_note, size_note
 from diagnosis.findings.found import Found
+from diagnosis.findings.place import REASONS, reason, where_words
 from diagnosis.findings.remainder import closable_table, closable_words
 from diagnosis.findings.terms import KINDS
 from diagnosis.model.fact import Fact, Noted
@@ -18,7 +19,6 @@ from diagnosis.settings import settings_of
 from diagnosis.where.described import Nowhere, Where
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.words.verdict import next_steps
-from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document

@@ -12,7 +12,7 @@ import pytest
 
 from diagnosis.findings.misfit import run_labels
 from tests.support.diagnosis_document import IDS
-from tunnel_lab.report.where import charts
+from tunnel_lab.report.charts import charts
 
 Document = dict[str, Any]
 

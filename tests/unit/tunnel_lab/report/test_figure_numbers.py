@@ -14,13 +14,13 @@ from matplotlib.colors import to_hex
 
 from diagnosis.findings.friction_curve import friction_figure
 from diagnosis.findings.misfit import run_labels
+from diagnosis.findings.place import backbone_figure
 from diagnosis.findings.remainder import law_figure
 from identification.show.style import styled
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
 from tests.support.shown_numbers import numbers
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
-from tunnel_lab.report.figures import backbone_figure
 
 Document = dict[str, Any]
 

@@ -14,7 +14,7 @@ from diagnosis.compose import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from tests.support.gap_campaigns import campaign, nominal, studied
-from tunnel_lab.report.where import fit_charts, fit_figure, fit_pages
+from tunnel_lab.report.charts import fit_charts, fit_figure, fit_pages
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 

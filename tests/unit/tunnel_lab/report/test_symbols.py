@@ -6,12 +6,12 @@ import re
 
 import pytest
 
+from diagnosis.findings.place import place_figure
 from diagnosis.findings.remainder import law_figure
 from diagnosis.words.symbols import symbol_rows
 from identification.show.drawing import inline_svg
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import render_report
-from tunnel_lab.report.where import place_figure
 
 
 def test_symbols_of_coefficients_and_causes_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
