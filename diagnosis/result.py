@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import polars as pl
 
+from diagnosis.findings.sections import diagnosis_brief, printed
 from diagnosis.findings.whole import Findings
-from diagnosis.words.lines import diagnosis_brief
-from diagnosis.words.sections import printed
-from diagnosis.words.written import sentences
+from diagnosis.findings.written import sentences
 from identification.estimate import as_pandas, correlated, wide_frame
 from identification.show.blocks import as_notebook, as_text
 from tunnel_sim.files.writing import as_json

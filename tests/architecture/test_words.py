@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from diagnosis.findings.judgements import cautions
+from diagnosis.findings.verdict import verdict
+
 ROOT = Path(__file__).parents[2] / "diagnosis"
 CALLS = ("TunnelError", "Remark")
 """What is said of bad input and in the examination is written where it arises."""
@@ -84,8 +87,6 @@ def test_a_sentence_is_told_from_other_text(source: str, count: int) -> None:
 
 
 def test_every_kind_of_fact_has_a_sentence_and_every_sentence_a_fact() -> None:
-    from diagnosis.words import cautions, verdict, where
-
     known = {
         *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *verdict.RIVALS, *where.REASONS,
     }  # fmt: skip

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import tomli_w
 from nicegui import ui
 
+from diagnosis.findings.verdict import distinguishes
 from diagnosis.result import Diagnosis
-from diagnosis.words.verdict import distinguishes
 from identification.show.blocks import Paragraph, typeset
 from identification.show.numbers import plain
 from tunnel_lab.bench import work
@@ -198,9 +198,9 @@ class ShownAnswer:
     """The answer in words and figures, and fits with causes chosen by hand."""
 
     def __init__(self, session: Session, answer: Diagnosis) -> None:
-        from diagnosis.words.cards import key_figures
-        from diagnosis.words.sections import sections
-        from diagnosis.words.verdict import headline
+        from diagnosis.findings.cards import key_figures
+        from diagnosis.findings.sections import sections
+        from diagnosis.findings.verdict import headline
 
         words, kind = headline(answer)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
@@ -334,7 +334,7 @@ def show_closure(closure: Closure, answer: Diagnosis) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.words.verdict import next_steps, rival_lines, run_to_make, unplannable
+    from diagnosis.findings.verdict import next_steps, rival_lines, run_to_make, unplannable
 
     answer = read_diagnosis(session)
     assert answer is not None  # else the stage is closed
@@ -386,7 +386,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.words.verdict import too_close
+        from diagnosis.findings.verdict import too_close
 
         self._place.clear()
         with self._fault.around():

@@ -157,7 +157,7 @@ def diagnose(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
-    from diagnosis.words.sections import printed
+    from diagnosis.findings.sections import printed
     from tunnel_sim.files.writing import json_text, write_json
 
     del effects_file  # its effects are known already
@@ -241,7 +241,7 @@ def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
     Args:
         native: whether in MuJoCo's own elements alone.
     """
-    from diagnosis.words.cautions import UNPATCHED
+    from diagnosis.findings.cautions import UNPATCHED
 
     if answer.model is None:
         said = zip(answer.cautions, answer.found.cautions, strict=True)

@@ -15,11 +15,11 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from diagnosis.findings.captions import captioned
+from diagnosis.findings.cards import key_figures
+from diagnosis.findings.sections import sections
+from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
-from diagnosis.words.captions import captioned
-from diagnosis.words.cards import key_figures
-from diagnosis.words.sections import sections
-from diagnosis.words.verdict import headline
 from identification.show.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
 from identification.show.drawing import inline_svg, shown_text
 from tunnel_lab.report.charts import Chart, charts, fit_charts, fit_figure

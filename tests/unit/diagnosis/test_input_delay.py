@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
+from diagnosis.findings.verdict import headline
 from diagnosis.model.rig import SpringModel
-from diagnosis.words.verdict import headline
 from tests.marks import slow
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.engine.virtual_campaign import plan_effects

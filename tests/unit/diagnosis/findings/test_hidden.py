@@ -10,11 +10,11 @@ from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients, possible_answers
 from diagnosis.findings.coefficients import hidden_line, hidden_table
 from diagnosis.findings.hidden import hidden_effects
+from diagnosis.findings.sections import printed
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import investigate, nominal_study
-from diagnosis.words.sections import printed
 from tests.reference.free_decays import damped_cosine
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal, studied

@@ -13,7 +13,7 @@ import pytest
 from scipy.signal import cont2discrete, dlsim
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.words.verdict import headline, next_steps
+from diagnosis.findings.verdict import headline, next_steps
 from identification import identify
 from tests.unit.diagnosis.test_input_delay import DELAY, campaign
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign

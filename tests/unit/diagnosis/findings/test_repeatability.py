@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.run_deviations import ScatterLimits
+from diagnosis.findings.cautions import CAUTIONS, said
 from diagnosis.findings.judgements import zeros_apart
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.units import own_repeatability
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered
-from diagnosis.words.cautions import CAUTIONS, said
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign

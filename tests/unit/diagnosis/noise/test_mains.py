@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
+from diagnosis.findings.cautions import remark
 from diagnosis.likelihood.mains_lines import mains_line, mains_lines
 from diagnosis.noise.mains import find_hum, hum_noted, refine_frequency, remove_hum
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
-from diagnosis.words.cautions import remark
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import SIX, Setting, angle_of, with_records

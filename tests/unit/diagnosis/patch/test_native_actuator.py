@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from diagnosis.findings.cautions import PATCH, said
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import with_law
 from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.patched_model import found_law
-from diagnosis.words.cautions import PATCH, said
 from tests.reference.robot_joints import MOTOR, NOISE, TIME, multisine, robot, robot_campaign
 from tests.support.robots import own_model
 from tunnel_sim.effects import effect_class

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import pytest
 
+from diagnosis.findings.cautions import CAUTIONS
 from diagnosis.remainder.ways import AnyLaw, ListedLaws, NotSought, way_for
-from diagnosis.words.cautions import CAUTIONS
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ import pytest
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.findings.judgements import spring_choices
+from diagnosis.findings.verdict import next_steps, verdict
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.search.choices import _exchanged, choices
 from diagnosis.search.investigate import investigate
 from diagnosis.search.study import _gap_beside
-from diagnosis.words.verdict import next_steps, verdict
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, campaign, precise
 from tunnel_sim.effects import effect_class, effect_from

@@ -14,13 +14,13 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.by_hand import ByHand
 from diagnosis.diagnosable import choose
+from diagnosis.findings.verdict import headline, next_steps, verdict
 from diagnosis.search import disturbed as disturbed_runs
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import beyond_the_others, disturbances, undisturbed
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from diagnosis.where.jumps import Jumps, jumps
-from diagnosis.words.verdict import headline, next_steps, verdict
 from identification.examination.examine import examine
 from identification.status import Outcome
 from tests.marks import slow

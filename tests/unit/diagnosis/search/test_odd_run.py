@@ -13,11 +13,11 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from diagnosis import diagnose
+from diagnosis.findings.verdict import headline, next_steps
 from diagnosis.result import Diagnosis
 from diagnosis.search.disturbed import undisturbed
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
-from diagnosis.words.verdict import headline, next_steps
 from tests.marks import slow
 from tests.support.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from

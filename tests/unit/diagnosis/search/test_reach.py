@@ -6,9 +6,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from diagnosis import vocabulary
+from diagnosis.findings.cautions import CAUTIONS
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.reach import unexplained_floor
-from diagnosis.words.cautions import CAUTIONS
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -12,10 +12,10 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.place import place_rows, where_words
+from diagnosis.findings.verdict import headline, next_steps, verdict
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.where.place import locate
-from diagnosis.words.verdict import headline, next_steps, verdict
 from tests.support.contradictions import contradictions
 from tests.support.diagnosis_document import document
 from tests.support.gap_campaigns import campaign as gap_campaign

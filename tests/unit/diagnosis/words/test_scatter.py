@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
+from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.closure import waterfall_table
 from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.repeatability import width_text
-from diagnosis.words.lines import diagnosis_brief, inclusion_line
-from diagnosis.words.tables import candidates_table, parameters_table
-from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
+from diagnosis.findings.sections import diagnosis_brief
+from diagnosis.findings.verdict import headline, next_steps, undecided_words, verdict
 from tests.support.diagnosis_document import CAUSE, scattering_document
 
 Document = dict[str, Any]

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.findings.answers import candidates_figure
+from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
+from diagnosis.findings.sections import sections
+from diagnosis.findings.verdict import headline, next_steps, run_words, size_words, undecided_words
 from diagnosis.settings import Settings
-from diagnosis.words import sections, tables
-from diagnosis.words.cards import cause_cards, effect_cards, key_figures
-from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import left_over, probability
 from tests.support.diagnosis_document import (
@@ -32,7 +33,6 @@ from tests.support.diagnosis_document import (
     scattering_document,
 )
 from tests.support.shown_numbers import all_blocks, assert_known, assert_shows, assert_units
-from tunnel_lab.report.figures import candidates_figure
 
 Document = dict[str, Any]
 

@@ -7,19 +7,19 @@ from typing import Any
 import pytest
 
 from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, coefficient_note, size_note
 from diagnosis.findings.found import Found
 from diagnosis.findings.place import REASONS, reason, where_words
 from diagnosis.findings.remainder import closable_table, closable_words
 from diagnosis.findings.terms import KINDS
+from diagnosis.findings.verdict import next_steps
+from diagnosis.findings.written import sentences
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
 from diagnosis.settings import settings_of
 from diagnosis.where.described import Nowhere, Where
-from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
-from diagnosis.words.verdict import next_steps
-from diagnosis.words.written import sentences
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document
 

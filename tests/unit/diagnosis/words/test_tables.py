@@ -12,13 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.closure import model_line, noise_line, runs_table, waterfall_table
 from diagnosis.findings.coefficients import coefficients_line, hidden_line, hidden_table
-from diagnosis.words import tables
-from diagnosis.words.lines import inclusion_line
-from diagnosis.words.sections import printed
-from diagnosis.words.tables import candidates_table, parameters_table
-from diagnosis.words.verdict import rival_lines, run_words
+from diagnosis.findings.sections import printed
+from diagnosis.findings.verdict import rival_lines, run_words
 from identification.estimate import Estimate, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs

@@ -8,20 +8,20 @@ from typing import Any
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
+from diagnosis.findings.answers import candidates_table, parameters_table
+from diagnosis.findings.cards import key_figures
+from diagnosis.findings.causes import said_size
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap, runs_table
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import immaterial, nearly
 from diagnosis.findings.reported import held_out_totals
+from diagnosis.findings.sections import diagnosis_brief
+from diagnosis.findings.verdict import headline, next_steps, rival_lines, undecided_words, verdict
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.settings import Settings
-from diagnosis.words.cards import key_figures
-from diagnosis.words.causes import said_size
-from diagnosis.words.lines import diagnosis_brief
-from diagnosis.words.tables import candidates_table, parameters_table
-from diagnosis.words.verdict import headline, next_steps, rival_lines, undecided_words, verdict
 from identification.show.blocks import typeset
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import campaign, document

@@ -15,7 +15,7 @@ import pytest
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from diagnosis.words.verdict import next_steps, run_to_make
+from diagnosis.findings.verdict import next_steps, run_to_make
 from identification.show.blocks import TextTable
 from tests.support.diagnosis_document import document
 from tests.support.import_files import decay

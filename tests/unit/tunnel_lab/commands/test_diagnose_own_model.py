@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnosis.findings.cautions import UNPATCHED
 from diagnosis.model.fact import Fact
-from diagnosis.words.cautions import UNPATCHED
 from tests.reference import robot_joints
 from tests.reference.free_decays import Setting, campaign
 from tests.reference.robot_joints import LEVEL, MOTOR, robot, robot_campaign

@@ -6,8 +6,8 @@ from html import escape
 
 import pytest
 
-from diagnosis.words.cards import key_figures
-from diagnosis.words.sections import printed, sections
+from diagnosis.findings.cards import key_figures
+from diagnosis.findings.sections import printed, sections
 from identification.show.blocks import Figure, TextTable, as_html, as_text, lines, typeset
 from tests.support.diagnosis_document import campaign, document
 from tests.support.shown_numbers import all_blocks

@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.findings.place import place_figure
 from diagnosis.findings.remainder import law_figure
-from diagnosis.words.symbols import symbol_rows
+from diagnosis.findings.symbols import symbol_rows
 from identification.show.drawing import inline_svg
 from tests.support.diagnosis_document import campaign, document
 from tunnel_lab.report import render_report

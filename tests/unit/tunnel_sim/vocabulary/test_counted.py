@@ -34,10 +34,10 @@ TWO_OR_MORE = {
     "tunnel_sim/vocabulary/record.py",  # samples of a record
     "diagnosis/model/joint.py",  # springs that differ
     "identification/examination/self_excited.py",  # cycles of a steady oscillation
-    "diagnosis/words/causes.py",  # springs of which one is off
+    "diagnosis/findings/causes.py",  # springs of which one is off
     "tunnel_sim/files/importing/inputs.py",  # columns of which one has to be chosen
     "diagnosis/words/remainder.py",  # one run has words of its own
-    "diagnosis/words/cautions.py",  # one run has words of its own
+    "diagnosis/findings/cautions.py",  # one run has words of its own
     "diagnosis/words/where.py",  # one run has words of its own
 }
 """Files whose counts are never one, and why."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.coefficients import coefficient_note
 from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
+from diagnosis.findings.verdict import verdict
 from diagnosis.findings.whole import Findings
-from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, remark, said
-from diagnosis.words.verdict import verdict
 from identification.status import Remark
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+from diagnosis.findings.causes import said_size
 from diagnosis.findings.closure import WITHIN_THE_NOISE
 from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
+from diagnosis.findings.verdict import size_words
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.words.causes import said_size
-from diagnosis.words.verdict import size_words
 from identification.show.blocks import Card, Heading, Paragraph
 from identification.show.numbers import beside_noise, left_over, plain, probability, share, times_noise
 from tunnel_sim.effects import known_effects

@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.findings.candidates import CauseSize
+from diagnosis.findings.causes import advice, hold_step, hold_words, known_and_open, one_of_springs
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.other_motions import TwoModes
+from diagnosis.findings.patch import model_step, model_words
 from diagnosis.findings.remainder import formula_step
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
@@ -25,8 +27,6 @@ from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.rivals.two_springs import SpringError
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
-from diagnosis.words.causes import advice, hold_step, hold_words, known_and_open, one_of_springs
-from diagnosis.words.own_model import model_step, model_words
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     beside_noise,
@@ -99,7 +99,7 @@ def verdict(answer: Findings, rest: str) -> str:
         *_with_second_modes(_answer(answer, rest), answer),
         _choices(answer),
         hold_words(answer),
-        model_words(answer),
+        model_words(answer.model, answer),
         *(RIVALS[rival.kind](rival.figures) for rival in found.rivals),
     ]
     return " ".join(filter(None, parts))
@@ -505,7 +505,7 @@ def next_steps(answer: Findings) -> list[str]:
     if (run := run_to_make(answer)) is not None and answer.ambiguous_with:
         words = f"Make the run that distinguishes the answers: {_run_words(answer, run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
-    if step := model_step(answer):
+    if step := model_step(answer.model, answer):
         steps.append(f"{step}.")
     if not causes and any(remark.withholds for remark in answer.remarks):
         return [*steps, "Diagnose again: no coefficients are given."]

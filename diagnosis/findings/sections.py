@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
+from diagnosis.findings.captions import captioned, pictured
+from diagnosis.findings.cards import cause_cards, effect_cards
 from diagnosis.findings.closure import model_line, noise_line, runs_table, tests_table, waterfall_table
 from diagnosis.findings.coefficients import (
     budget_table,
@@ -16,16 +19,14 @@ from diagnosis.findings.coefficients import (
     hidden_line,
     hidden_table,
 )
-from diagnosis.findings.misfit import windy
+from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, windy
+from diagnosis.findings.patch import patch_line, patch_table
 from diagnosis.findings.place import lines_table, place_rows
 from diagnosis.findings.remainder import closable_line, closable_table
+from diagnosis.findings.symbols import symbol_rows
+from diagnosis.findings.terms import named_answer
+from diagnosis.findings.verdict import next_steps, rival_lines
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
-from diagnosis.words.captions import captioned, pictured
-from diagnosis.words.cards import cause_cards, effect_cards
-from diagnosis.words.lines import inclusion_line, patch_line
-from diagnosis.words.symbols import symbol_rows
-from diagnosis.words.tables import candidates_table, parameters_table, patch_table
-from diagnosis.words.verdict import next_steps, rival_lines
 from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
     Block,
@@ -38,7 +39,7 @@ from identification.show.blocks import (
     TextTable,
     brief,
 )
-from identification.show.numbers import significant
+from identification.show.numbers import held_out_excess, probability, share, significant
 from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -209,7 +210,11 @@ def _patch(answer: Findings) -> Section:
     return Section(
         "patch",
         "The model with the causes",
-        (Paragraph(patch_line(answer)), Listing(tuple(notes), title), patch_table(answer)),
+        (
+            Paragraph(patch_line(answer.model, answer)),
+            Listing(tuple(notes), title),
+            patch_table(answer.model),
+        ),
     )
 
 
@@ -273,3 +278,23 @@ TERMS = (
     ("±, σ", "one standard deviation; intervals are 95 %"),
 )
 """Units and terms of the report."""
+
+
+def diagnosis_brief(answer: Findings) -> str:
+    """An answer in three lines: its causes, its gap, and the next step."""
+    gap, first = answer.gap, answer.candidates[0]
+    causes = answer.causes
+    named = named_answer(causes).lower() if causes else "no gap"
+    decided = answer.decision.decided
+    undecided = "" if decided else f"undecided, the {answer.set_out} is "
+    misfit, excess = misfit_of(answer), gap.excess_before
+    size = f"{held_out_excess(excess)} times the noise variance"
+    if misfit is not None:
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
+    closed = f"; {share(gap.closed)} explained {gap.closed_on}" if answer.names_effects else ""
+    likely = probability(first.probability)
+    return (
+        f"Diagnosis of {answer.campaign!r}: {undecided}{named} (probability {likely})\n"
+        f"  gap {size}{closed}\n"
+        "  print() shows all; .plot(), .write_report(path), .to_frame()"
+    )

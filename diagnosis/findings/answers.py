@@ -1,13 +1,17 @@
-"""The tables of a diagnosis, from its document. Columns for which only a page has room are details."""
+"""The answers considered, with their probabilities and parameters: tables and a figure."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import textwrap
+from typing import TYPE_CHECKING
 
-from diagnosis.findings.terms import answer_name
+import numpy as np
+
+from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.terms import answer_name, scattering
 from diagnosis.findings.whole import Findings
-from diagnosis.words.answers import ranked
 from identification.show.blocks import TextTable
+from identification.show.drawing import ACCENT, NARROW, QUIET
 from identification.show.numbers import (
     estimated,
     explained,
@@ -15,11 +19,23 @@ from identification.show.numbers import (
     plain,
     probability,
     share,
-    significant,
     unit_mark,
 )
 from identification.show.quantity import Quantity
+from identification.show.style import figure, grid, styled
 from tunnel_sim.vocabulary.dimensions import beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def ranked(answer: Findings) -> list[Candidate]:
+    """The answers of a document, the most probable first.
+
+    The document starts with its answer. If undecided, that is the most probable set of effects, and an unknown
+    cause may be more probable.
+    """
+    return sorted(answer.candidates, key=lambda one: -one.probability)
 
 
 def candidates_table(answer: Findings) -> TextTable:
@@ -76,16 +92,41 @@ def parameters_table(answer: Findings) -> TextTable:
     return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
 
 
-def patch_table(answer: Findings) -> TextTable:
-    """The changes of the patch; a table without rows where no model was given."""
-    model, rows = answer.model, []
-    for one in model.written if model else ():
-        numbers = _numbers(one.before), _numbers(one.after)
-        rows.append((one.name, *numbers, unit_mark(beside(one.unit, ""))))
-    heads = ("attribute", "before", "after", "unit")
-    return TextTable(f"Changes to {model.file if model else ''}", heads, tuple(rows), heads[1:3])
+def inclusion_line(answer: Findings) -> str:
+    """The effects that may be among the causes, most probable first; empty where none is probable enough."""
+    least = answer.settings.words.effect_listed
+    likely = dict(sorted(answer.inclusion.items(), key=lambda item: -item[1]))
+    names = [name for name, value in likely.items() if value >= least]
+    last = scattering(names)  # scatter is common to every answer
+    ordered = [*(name for name in names if name not in last), *last]
+    shown = [f"{plain(name)} {probability(likely[name])}" for name in ordered]
+    return f"Among the causes, with probability: {', '.join(shown)}." if shown else ""
 
 
-def _numbers(values: Sequence[float]) -> str:
-    last = max((i for i, value in enumerate(values) if value), default=0)
-    return " ".join(significant(value, 4) for value in values[: last + 1])
+SHOWN = 8
+"""Most answers drawn."""
+
+
+_LABEL = 24  # characters in a line of a label
+
+
+@styled
+def candidates_figure(answer: Findings) -> Figure | None:
+    """The answers that are not improbable; None for fewer than two, where words suffice."""
+    least = answer.settings.words.answer_drawn
+    shown = [c for c in ranked(answer)[:SHOWN] if c.probability >= least]
+    if len(shown) < 2:
+        return None
+    names = [textwrap.fill(plain(answer_name(candidate.effect)), _LABEL) for candidate in shown]
+    fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
+    axes = fig.add_subplot()
+    values = [candidate.probability for candidate in shown]
+    colours = [ACCENT if candidate is answer.candidates[0] else QUIET for candidate in shown]
+    axes.barh(range(len(shown)), values, color=colours, height=0.6)
+    for index, value in enumerate(values):
+        axes.text(value + 0.01, index, probability(value), va="center")
+    axes.set_yticks(range(len(shown)), names)
+    axes.invert_yaxis()
+    axes.set(xlim=(0.0, 1.12), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
+    grid(axes, "x")
+    return fig
