@@ -333,6 +333,9 @@ def test_the_uncertainty_budget(given: Document) -> None:
     assert tables.budget_table(findings_of(given)).rows == ()
 
 
+LATE = {"outcome": "left out", "runs": ["beta"], "what": "it begins late", "remedy": "cut it"}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -340,8 +343,7 @@ def test_the_uncertainty_budget(given: Document) -> None:
         ({"causes": ["unknown"]}, ["examine the rig", "--effects-file"]),
         ({"ambiguous_with": []}, ["Model the damping that grows", "compare", "with the causes"]),
         ({}, ["spring of 81.5 N m/rad", "Model the damping that grows", "compare", "with the causes"]),
-        ({"causes": [], "rest": None, "remarks": [{"outcome": "left out", "runs": ["beta"], "what": "late", "remedy": "cut it"}]},
-         ["beta: cut it.", "nominal model"]),
+        ({"causes": [], "rest": None, "remarks": [LATE]}, ["beta: cut it.", "nominal model"]),
         ({"causes": ["unknown"], "rest": {"material": True}}, ["examine", "--effects-file", "Do not trust"]),
     ],
 )  # fmt: skip
