@@ -12,11 +12,10 @@ from diagnosis import diagnose
 from diagnosis.findings.coefficients import Answers, Possible, coefficients
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.search.scatter import scattered
 from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
+from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class, effect_from
-from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 RATE = 1e-3  # of false alarms, for both ends together
 TRUE = {"cn_beta": CN_BETA, "cn_r": CN_R}

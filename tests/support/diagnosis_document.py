@@ -33,7 +33,8 @@ def findings_of(written: Mapping[str, Any]) -> Diagnosis:
     Args:
         written: some of the fields of `document`, and of the parts of a diagnosis.
     """
-    return Diagnosis.from_json_dict(_filled({**_NOTHING, **written}, _PARTS))
+    given = {**_NOTHING, **written}
+    return Diagnosis.from_json_dict({name: _filled(value, _PARTS.get(name)) for name, value in given.items()})
 
 
 def _filled(given: Any, empty: Any) -> Any:

@@ -3,11 +3,10 @@
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.search.scatter import scattered
 from identification import identify
 from tests.support.gap_campaigns import campaign
+from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class, effect_from
-from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 KINDS = [effect_class(name) for name in (*SCATTERED, "coulomb_friction", "cubic_stiffness")]
 

@@ -11,7 +11,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.words.causes import consequence
 from diagnosis.words.tables import coefficients_table
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -47,11 +47,11 @@ def test_both_parts_are_said_and_the_sum_is_compared_with_the_nominal_model():
         "after": {"cn_r": {"value": -0.143, "std": 0.049, "unit": "1/rad"}},
         "in_phase": {"cn_r": same},
     }
-    assert consequence(given) == (
+    assert consequence(findings_of(given)) == (
         "The size of Cnr changes by less than 1 %. Of Cnr in phase with the rate, −0.36000 ± 0.00020, the lag "
         "contributes −0.217 and the rate itself −0.143 ± 0.049."
     )
-    whole, own = coefficients_table(given).rows
+    whole, own = coefficients_table(findings_of(given)).rows
     assert "in phase with the rate" in whole[0]
     assert "beside the lag" in own[0]
     assert own[1] == own[-1] == "–"

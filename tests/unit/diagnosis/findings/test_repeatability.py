@@ -98,7 +98,7 @@ def test_zeros_that_would_close_an_unexplained_gap_are_mentioned(apart: float) -
     assert bool(facts) == (apart > 0.0)
     for fact in facts:
         assert fact.figures["share"] > 0.9
-        assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact.to_json_dict())
+        assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact)
         stated = replace(data, sensor=replace(data.sensor, zero="common"))
         assert zeros_apart(studied(stated, nominal(data))) == ()
 

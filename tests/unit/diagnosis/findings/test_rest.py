@@ -23,6 +23,7 @@ from diagnosis.model.rig import PerInertia
 from diagnosis.settings import Settings
 from diagnosis.words.remainder import rest_words
 from identification.estimate import Quantity
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.writing import as_json
@@ -86,7 +87,7 @@ def judged(study, moved, std, excess=0.4):
         "rest": as_json(found),
         "coefficients": {"after": as_json(stated)},
     }
-    return replace(found, words=rest_words(document))
+    return replace(found, words=rest_words(findings_of(document)))
 
 
 def unknown(data, base):

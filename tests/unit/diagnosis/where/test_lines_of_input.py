@@ -50,7 +50,7 @@ def test_the_drive_is_not_called_a_force_on_the_rig() -> None:
     found = diagnose(campaign(), kinds=vocabulary(include=["coulomb_friction"]))
     assert found.where is not None
     assert found.where.channel != "forcing"
-    assert "spectral line" not in where_words(found.to_json_dict())
+    assert "spectral line" not in where_words(found)
 
 
 @pytest.mark.slow
