@@ -127,7 +127,7 @@ def test_campaigns_of_one_name_go_by_their_files(tunnel: Tunnel, tmp_path: Path)
         ({"gap": document()["gap"] | {"closed": -0.5}}, "-0.5"),
         (
             {"coefficients": {"before": {}, "after": {"zeta": {"value": "1", "std": None, "unit": "1"}}}},
-            "coefficients.after.zeta.value",
+            "coefficients.after.zeta.va",
         ),
     ],
 )
