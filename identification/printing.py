@@ -227,7 +227,9 @@ def estimate_blocks(
 
 def notes(document: Document) -> list[str]:
     """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
-    from identification.trade_off import TradeOff  # loads numpy, for which the help of the command cannot wait
+    from identification.trade_off import (
+        TradeOff,  # loads numpy, for which the help of the command cannot wait
+    )
 
     remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     beside = [
