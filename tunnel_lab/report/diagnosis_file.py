@@ -32,8 +32,8 @@ def _check(found: Diagnosis) -> None:
     """Refuse values of the right type that cannot be shown."""
     if not found.candidates:
         raise ValueError("'candidates' is empty")
-    named = (found.coefficients.before, found.coefficients.after, found.coefficients.in_phase)
-    named += tuple(candidate.parameters for candidate in found.candidates)
+    stated = (found.coefficients.before, found.coefficients.after, found.coefficients.in_phase)
+    named = [*stated, *(candidate.parameters for candidate in found.candidates)]
     texts = [found.campaign, *found.causes, *found.ambiguous_with]
     texts += [candidate.effect for candidate in found.candidates] + [
         name for group in named for name in group
