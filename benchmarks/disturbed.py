@@ -60,16 +60,16 @@ def answered(one: Simulated, name: str) -> dict[str, Any]:
             accused = nominal_study(chosen.campaign, chosen.kinds).disturbed
             seconds = time.process_time() - begun
             return {"name": name, "truth": truth, "disturbed": as_json(accused), "seconds": seconds}
-        found = diagnose(campaign).to_json_dict()
+        found = diagnose(campaign)
     except TunnelError as error:
         return {"name": name, "truth": truth, "error": str(error)}
     return {
         "name": name,
         "truth": truth,
-        "causes": found["causes"],
-        "decided": found["decided"],
-        "probability": found["candidates"][0]["probability"],
-        "disturbed": found["disturbed"],
+        "causes": list(found.causes),
+        "decided": found.decision.decided,
+        "probability": found.candidates[0].probability,
+        "disturbed": as_json(found.disturbed),
         "seconds": time.process_time() - begun,
     }
 

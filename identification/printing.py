@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import concise, significant, unit, unit_mark, with_std
 from identification.status import SYSTEMATIC, Remark, Status
-from identification.trade_off import Combination, TradeOff
 from tunnel_sim.vocabulary.errors import counted
+
+if TYPE_CHECKING:
+    from identification.trade_off import Combination, TradeOff
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -81,10 +83,14 @@ def estimate_blocks(
 
 def notes(document: Document) -> list[str]:
     """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
+    from identification.trade_off import (
+        TradeOff,  # loads numpy, for which the help of the command cannot wait
+    )
+
     remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     beside = [
         *repeatability_lines(document),
-        *filter(None, [trade_off_line(TradeOff.from_json_dict(document["trade_off"]), SYMBOLS)]),
+        *filter(None, [trade_off_line(TradeOff.from_json_dict(document.get("trade_off")), SYMBOLS)]),
     ]
     return [*beside, *(f"Note: {note}" for note in (*remarks, *status_lines(document)))]
 

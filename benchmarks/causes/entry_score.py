@@ -141,7 +141,7 @@ def log_score(cases: Sequence[Case]) -> float | None:
     Args:
         cases: truth and answer of every campaign; a missing answer counts as a half for every cause.
     """
-    stated = {c.name: dict.fromkeys(NAMES, 0.5) | c.answer["inclusion"] for c in cases}
+    stated = {c.name: dict.fromkeys(NAMES, 0.5) | c.answer.inclusion for c in cases}
     scores = []
     for c in cases:
         p = {n: float(np.clip(v, FLOOR, 1.0 - FLOOR)) for n, v in stated[c.name].items() if n not in c.small}
@@ -173,7 +173,7 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     found.pop("group", None)
     given = [(c.probability, c.right) for c in cases if c.probability is not None]
     error, bins = calibration([p for p, _ in given], [right for _, right in given])
-    seconds = [float(c.answer["wall_s"]) for c in cases]
+    seconds = [c.answer.wall_s or 0.0 for c in cases]
     return {
         "campaigns": len(cases),
         **found,

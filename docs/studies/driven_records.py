@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,10 +23,12 @@ from diagnosis.diagnosable import choose
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.model.parameters import Point
+from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from identification import identify
 from identification.show.style import save
+from tunnel_lab.report.diagnosis_file import read_diagnosis
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.writing import write_whole
@@ -61,16 +62,16 @@ class Predicted:
     error: Mapping[str, Array]
 
 
-def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
+def fitted(campaign: Campaign, answer: Diagnosis) -> tuple[Fit, Fit]:
     """The nominal model, and the model with the effects of a diagnosis' likeliest answer, fitted to all runs.
 
     Args:
-        document: of the diagnosis; the fit of its effects starts from its parameters.
+        answer: the diagnosis; the fit of its effects starts from its parameters.
     """
-    likeliest = document["candidates"][0]
+    likeliest = answer.candidates[0]
     parameters = {  # parameters of a single effect have no prefix
-        name if "." in name else f"{likeliest['effect']}.{name}": given
-        for name, given in likeliest["parameters"].items()
+        name if "." in name else f"{likeliest.effect}.{name}": given
+        for name, given in likeliest.parameters.items()
     }
     kinds = vocabulary(list(dict.fromkeys(name.split(".")[0] for name in parameters)))
     with answering_with(kinds):
@@ -82,7 +83,7 @@ def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
     problem = replace(nominal.problem, effects=chosen.kinds, free_forms=tuple(sorted(freed)))
     values = dict(zip(nominal.problem.names, nominal.point.common.tolist(), strict=True))
     for name, given in parameters.items():
-        values[name] = study.similarity.similar(given["value"], infos[name].unit)
+        values[name] = study.similarity.similar(given.value, infos[name].unit)
     start = Point(np.array([values[name] for name in problem.names]), nominal.point.per_run)
     return nominal, fit(problem, start)
 
@@ -160,15 +161,15 @@ def arrow_figure(nominal: Predicted, causes: Predicted, interval: float, reach: 
     return figure
 
 
-def silverbox(campaign: Campaign, document: Mapping[str, Any], image: Path) -> str:
+def silverbox(campaign: Campaign, answer: Diagnosis, image: Path) -> str:
     """The part of the page on the Silverbox.
 
     Args:
         campaign: the arrow and the multisines.
-        document: the diagnosis of the multisines alone.
+        answer: the diagnosis of the multisines alone.
         image: the figure to write.
     """
-    nominal, whole = fitted(campaign, document)
+    nominal, whole = fitted(campaign, answer)
     runs = whole.problem.data.runs
     seen = [np.full(run.reading.size, run.id != ARROW) for run in runs]
     models = {
@@ -204,9 +205,9 @@ def silverbox(campaign: Campaign, document: Mapping[str, Any], image: Path) -> s
 An electronic Duffing oscillator at 68 Hz (Wigren and Schoukens 2013); volts are taken as radians. Ten runs are
 multisines. The *arrow* is noise that grows until it exceeds them.
 
-The diagnosis of the ten multisines: {document["verdict"]}
+The diagnosis of the ten multisines: {answer.verdict}
 
-{parameters(document)}
+{parameters(answer)}
 
 The likeliest set is fitted to the multisines and predicts the arrow from its input. Only the initial state comes
 from the arrow itself; it dies out within a quarter of a second. Root mean square errors in mV:
@@ -232,30 +233,30 @@ def campaign_without(campaign: Campaign, run_id: str) -> Campaign:
     return replace(campaign, runs=tuple(run for run in campaign.runs if run.id != run_id))
 
 
-def parameters(document: Mapping[str, Any]) -> str:
+def parameters(answer: Diagnosis) -> str:
     """Parameters of the likeliest answer as a list."""
     lines = []
-    for name, given in document["candidates"][0]["parameters"].items():
-        std = "" if given["std"] is None else f" ± {given['std']:.1g}"
-        unit = "" if given["unit"] == "1" else f" {given['unit']}"
-        lines.append(f"- `{name}`: {given['value']:.4g}{std}{unit}")
+    for name, given in answer.candidates[0].parameters.items():
+        std = "" if given.std is None else f" ± {given.std:.1g}"
+        unit = "" if given.unit == "1" else f" {given.unit}"
+        lines.append(f"- `{name}`: {given.value:.4g}{std}{unit}")
     return "\n".join(lines)
 
 
-def emps(campaign: Campaign, document: Mapping[str, Any]) -> str:
+def emps(campaign: Campaign, answer: Diagnosis) -> str:
     """The part of the page on the positioning axis.
 
     Args:
-        document: the diagnosis of the whole record.
+        answer: the diagnosis of the whole record.
     """
-    found = document["candidates"][0]["parameters"] | document["coefficients"]["after"]
+    found = {**answer.candidates[0].parameters, **answer.coefficients.after}
     rows = []
     for name, (published, unit) in PUBLISHED.items():
         key = next(key for key in found if key.endswith(name))
         given = found[key]
-        std = "" if given["std"] is None else f" ± {given['std']:.2g}"
-        rows.append(f"| `{key}` | {given['value']:.4g}{std} {unit} | {published:g} {unit} |")
-    nominal, whole = fitted(campaign, document)
+        std = "" if given.std is None else f" ± {given.std:.2g}"
+        rows.append(f"| `{key}` | {given.value:.4g}{std} {unit} | {published:g} {unit} |")
+    nominal, whole = fitted(campaign, answer)
     (run,) = whole.problem.data.runs
     half = np.arange(run.reading.size) < run.reading.size // 2
     errors = [1e3 * rms(predicted(model, [half]).error[run.id][~half]) for model in (nominal, whole)]
@@ -263,7 +264,7 @@ def emps(campaign: Campaign, document: Mapping[str, Any]) -> str:
 A positioning axis: the motor's force drives a free carriage in closed loop (Janot, Gautier and
 Brunot 2019). Metres are taken as radians, newtons as N m.
 
-The diagnosis: {document["verdict"]}
+The diagnosis: {answer.verdict}
 
 | | found | published |
 |---|---|---|
@@ -278,16 +279,15 @@ The validation record used in the literature is not among these data.
 """
 
 
-def diagnosed(campaign: Campaign, answers: Path | None, name: str) -> Mapping[str, Any]:
-    """The document of a diagnosis, read where it exists, otherwise computed and kept."""
+def diagnosed(campaign: Campaign, answers: Path | None, name: str) -> Diagnosis:
+    """A diagnosis, read where it exists, otherwise made and kept."""
     path = None if answers is None else answers / f"{name}.json"
     if path is not None and path.exists():
-        found: Mapping[str, Any] = json.loads(path.read_text("utf-8"))
-        return found
-    document = diagnose(campaign).to_json_dict()
+        return read_diagnosis(path)
+    found = diagnose(campaign)
     if path is not None:
-        write_whole(path, json.dumps(document).encode())
-    return document
+        write_whole(path, json.dumps(found.to_json_dict()).encode())
+    return found
 
 
 def main() -> None:

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 from diagnosis import diagnose
 from diagnosis.result import Diagnosis
@@ -77,10 +76,10 @@ EXPECTED: Mapping[str, Expected] = {
 }
 
 
-def judge(expected: Expected, document: Mapping[str, Any]) -> bool:
+def judge(expected: Expected, answer: Diagnosis) -> bool:
     """Whether all expected causes and no others are named, and the required words are present."""
-    named = set(document["causes"])
-    said = " ".join((document["verdict"], *document["cautions"]))
+    named = set(answer.causes)
+    said = " ".join((answer.verdict, *answer.cautions))
     return expected.causes <= named <= expected.causes | expected.also and expected.words in said
 
 
@@ -93,30 +92,30 @@ def records(folder: Path | None) -> dict[str, Campaign]:
     return found
 
 
-def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple[str, str]:
-    """One record's row and part of the page, from the document of its diagnosis or the reason for its refusal."""
+def section(name: str, answer: Diagnosis | str, images: Path) -> tuple[str, str]:
+    """One record's row and part of the page, from its diagnosis or the reason for the refusal."""
     expected = EXPECTED[name]
-    if isinstance(document, str):
+    if isinstance(answer, str):
         row = f"| [{name}](#{name}) | {_names(expected.causes)} | refused | | wrong |"
-        return row, f"## {name}\nThe source: {expected.why}\n\nThe diagnosis refuses it: {document}.\n"
-    best = document["candidates"][0]
-    right = "right" if judge(expected, document) else "wrong"
+        return row, f"## {name}\nThe source: {expected.why}\n\nThe diagnosis refuses it: {answer}.\n"
+    best = answer.candidates[0]
+    right = "right" if judge(expected, answer) else "wrong"
     row = (
-        f"| [{name}](#{name}) | {_names(expected.causes)} | {_names(document['causes'])} | "
-        f"{best['probability']:.2f} | {right} |"
+        f"| [{name}](#{name}) | {_names(expected.causes)} | {_names(answer.causes)} | "
+        f"{best.probability:.2f} | {right} |"
     )
-    caution = [text for text in document["cautions"] if expected.words and expected.words in text]
+    caution = [text for text in answer.cautions if expected.words and expected.words in text]
     parts = [
         f"## {name}",
         f"The source: {expected.why}\n",
-        f"The diagnosis ({right}): {document['verdict']}\n",
+        f"The diagnosis ({right}): {answer.verdict}\n",
     ]
     parts += [f"It adds: {text}\n" for text in caution]
-    for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]:
-        std = "" if given["std"] is None else f" ± {given['std']:.1g}"
-        unit = "" if given["unit"] == "1" else f" {given['unit']}"
-        parts.append(f"- `{key}`: {given['value']:.4g}{std}{unit}")
-    figure = diagnosis_figure(Diagnosis.from_json_dict(document), "waterfall")
+    for key, given in list(best.parameters.items())[:_KEY_PARAMETERS]:
+        std = "" if given.std is None else f" ± {given.std:.1g}"
+        unit = "" if given.unit == "1" else f" {given.unit}"
+        parts.append(f"- `{key}`: {given.value:.4g}{std}{unit}")
+    figure = diagnosis_figure(answer, "waterfall")
     if figure is not None:
         path = images / f"real-records-{name}.png"
         save(figure, path)
@@ -153,7 +152,7 @@ def main() -> None:
     parts = []
     for name, campaign in found.items():
         try:
-            answer: Mapping[str, Any] | str = diagnose(campaign).to_json_dict()
+            answer: Diagnosis | str = diagnose(campaign)
         except TunnelError as refused:
             answer = str(refused)
         row, text = section(name, answer, images)

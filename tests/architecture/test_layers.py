@@ -80,7 +80,7 @@ def test_the_import_contracts_hold() -> None:
         slow("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
         slow("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
         slow("identification/statistics.py", "import identification.signal.frequency"),
-        ("diagnosis/result.py", "import diagnosis.search.investigate"),
+        ("diagnosis/result.py", "import diagnosis.compose"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
         slow("tunnel_lab/cli.py", "import tunnel_reference.forms"),
         slow("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),

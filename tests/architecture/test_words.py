@@ -1,4 +1,4 @@
-"""Sentences of a diagnosis are in one room: nothing else in the package holds one."""
+"""Sentences of a diagnosis are with its findings: no numerics hold one."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.findings.judgements import cautions
-from diagnosis.findings.verdict import verdict
+from diagnosis.findings import cautions, place, verdict
 
 ROOT = Path(__file__).parents[2] / "diagnosis"
 CALLS = ("TunnelError", "Remark")
@@ -50,10 +49,10 @@ def sentences(source: str) -> list[str]:
 def modules() -> list[Path]:
     """The modules outside the rooms that hold sentences.
 
-    Those are the words, the settings, whose origins are a page, and the nominal models, each of which brings what
+    Those are the findings, the settings, whose origins are a page, and the nominal models, each of which brings what
     is said of it alone in its one file.
     """
-    rooms = {"words", "settings", "model"}
+    rooms = {"findings", "settings", "model"}
     return [path for path in sorted(ROOT.rglob("*.py")) if rooms.isdisjoint(path.relative_to(ROOT).parts)]
 
 
@@ -67,9 +66,9 @@ def test_no_exception_is_left_over() -> None:
     assert {name for name in EXCEPTIONS if not sentences((ROOT / name).read_text("utf-8"))} == set()
 
 
-def test_the_room_of_words_holds_them() -> None:
+def test_the_room_of_findings_holds_them() -> None:
     assert len(modules()) > 60
-    assert len(sentences((ROOT / "words" / "cautions.py").read_text("utf-8"))) > 20
+    assert len(sentences((ROOT / "findings" / "cautions.py").read_text("utf-8"))) > 20
 
 
 @pytest.mark.parametrize(
@@ -88,10 +87,11 @@ def test_a_sentence_is_told_from_other_text(source: str, count: int) -> None:
 
 def test_every_kind_of_fact_has_a_sentence_and_every_sentence_a_fact() -> None:
     known = {
-        *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *verdict.RIVALS, *where.REASONS,
+        *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *verdict.RIVALS, *place.REASONS,
     }  # fmt: skip
     used, texts = set(), set()
-    for path in modules():
+    told = [path for path in ROOT.rglob("*.py") if "Fact(" in path.read_text("utf-8") or path in modules()]
+    for path in told:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             texts.add(text_of(node))
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Fact":

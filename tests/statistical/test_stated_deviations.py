@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
-from tests.unit.diagnosis.findings.test_hidden import SCATTERED, scattered
+from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class, effect_from
 
 RATE = 1e-3  # of false alarms, for both ends together

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from diagnosis.result import Diagnosis
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -23,6 +25,56 @@ def campaign() -> Campaign:
     return Campaign(
         "by hand", RigProperties(0.11, 0.036, 0.625, 0.225), SensorProperties(500.0, None, 4e-4), tuple(runs)
     )
+
+
+def findings_of(written: Mapping[str, Any]) -> Diagnosis:
+    """The diagnosis that a document states; what a document written by hand leaves out is empty.
+
+    Args:
+        written: some of the fields of `document`, and of the parts of a diagnosis.
+    """
+    given = {**_NOTHING, **written}
+    return Diagnosis.from_json_dict({name: _filled(value, _PARTS.get(name)) for name, value in given.items()})
+
+
+def _filled(given: Any, empty: Any) -> Any:
+    """A part of a document with the fields that it lacks.
+
+    Args:
+        empty: the fields of such a part, as they are where nothing is stated; of a list, one member in a list.
+    """
+    if isinstance(empty, Mapping) and isinstance(given, Mapping):
+        return {**empty, **{name: _filled(value, empty.get(name)) for name, value in given.items()}}
+    if isinstance(empty, list) and empty and isinstance(given, list):
+        return [_filled(one, empty[0]) for one in given]
+    return given
+
+
+_NOTHING: Mapping[str, Any] = {
+    "campaign": "by hand", "causes": [], "decided": True, "credible": [], "common": {}, "gap": {}, "where": {},
+    "candidates": [], "ambiguous_with": [], "next_run": None, "coefficients": {}, "confirmation": {}, "noise": {},
+    "waterfall": [], "waterfall_on": "", "without": {},
+}  # fmt: skip
+_PARTS: Mapping[str, Any] = {
+    "common": {"effects": {}, "channels": {}},
+    "gap": {
+        "detected": False, "excess_before": 0.0, "excess_after": 0.0, "closed": 0.0, "closed_on": "", "runs": [],
+        "false_alarm_rate": 0.01, "p_value": 1.0,
+    },
+    "where": {"channel": None, "condition": None},
+    "candidates": [{"excess_after": 0.0, "closed": 0.0}],
+    "rest": {"significant": False, "excess": 0.0, "p_value": 1.0, "material": False, "moves": {}},
+    "coefficients": {"before": {}, "after": {}},
+    "confirmation": {
+        "agrees": True, "largest_difference_rad": 0.0, "run": "", "rms_difference_rad": 0.0, "tolerance_rad": 0.0,
+    },
+    "noise": {"std": 4e-4, "stated_std": None, "source": "estimated"},
+    "closable": {"excess": 1.0},
+    "model": {
+        "joint": "yaw", "free": [], "rest_rad": 0.0, "zero_rad": 0.0, "written": [], "notes": [],
+        "differences": [], "closed": 0.0, "closed_by_fit": 0.0, "closed_on": "",
+    },
+}  # fmt: skip
 
 
 def rms(excess: Any) -> Any:

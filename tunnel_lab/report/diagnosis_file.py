@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnosis.result import Diagnosis
-from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.toml_input import check_version
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import shown
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
+READING_UNITS = {"rad", "rad/s", "rad/s2"}
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
@@ -20,4 +22,31 @@ def read_diagnosis(path: Path) -> Diagnosis:
     """
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
-    return Diagnosis.from_json_dict(document, where=shown(path), remedy=REMEDY)
+    found = Diagnosis.from_json_dict(document, where=shown(path), remedy=REMEDY)
+    with as_described("is not a diagnosis", shown(path), REMEDY):
+        _check(found)
+    return found
+
+
+def _check(found: Diagnosis) -> None:
+    """Refuse values of the right type that cannot be shown."""
+    if not found.candidates:
+        raise ValueError("'candidates' is empty")
+    stated = (found.coefficients.before, found.coefficients.after, found.coefficients.in_phase)
+    named = [*stated, *(candidate.parameters for candidate in found.candidates)]
+    texts = [found.campaign, *found.causes, *found.ambiguous_with]
+    texts += [candidate.effect for candidate in found.candidates] + [
+        name for group in named for name in group
+    ]
+    if not all(text.isprintable() for text in texts):
+        raise ValueError("a name has line breaks or control characters")
+    for share in (found.gap.closed, *(candidate.probability for candidate in found.candidates)):
+        if not 0.0 <= share <= 1.0:
+            raise ValueError(f"{share:g} is not a share from 0 to 1")
+    for given in (one for group in named for one in group.values()):
+        dimension(given.unit)
+        if given.std is not None and given.std < 0.0:
+            raise ValueError(f"a standard deviation is {given.std:g}")
+    units = {found.figure_data.get("unit", "rad"), *([found.gap.misfit.unit] if found.gap.misfit else [])}
+    for unit in units - READING_UNITS:
+        raise ValueError(f"{unit!r} is no unit of a reading")

@@ -78,7 +78,7 @@ def test_it_is_named_with_its_value(delay: float, kinds: Sequence[type[Effect]])
     assert found.found.hold is None  # no hold is wrong by two samples
     # of 4 ms, ωτ is 0.05 at the resonance: a lag of the actuator is then nearly the same
     rival = 0.0 < delay < 0.01 and kinds is ALL_EFFECTS
-    said = headline(found.to_json_dict())[0]
+    said = headline(found)[0]
     assert said.startswith("either input delay") if rival else said == "input delay"
     assert ("actuator lag" in said) == rival
 

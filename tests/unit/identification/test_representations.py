@@ -11,6 +11,8 @@ import pytest
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, RunGap, Where
 from diagnosis.answer.held_out import ON_RUNS
 from diagnosis.findings.closure import Confirmation, NoiseSummary
+from diagnosis.findings.decision import decision
+from diagnosis.settings import Settings
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.show.blocks import (
     Detail,
@@ -154,6 +156,7 @@ def diagnosis() -> Diagnosis:
         ),
         confirmation=Confirmation(True, 1e-6, "a", 1e-7, 1e-5),
         noise=NoiseSummary(4e-4, None, "estimated", "from the records"),
+        decision=decision([("coulomb_friction", 0.97), ("none", 0.03)], Settings().answer),
         blind_spots=("a drift",),
         cautions=("few runs",),
     )

@@ -12,7 +12,7 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from identification import identify
 from identification.estimate import Estimate
 from identification.printing import SYMBOLS, trade_off_line
-from identification.trade_off import ROLES, Combination, Role, Setting, separating, trade_off
+from identification.trade_off import ROLES, Combination, Role, Setting, TradeOff, separating, trade_off
 from tests.reference.free_decays import Setting as Condition
 from tests.reference.free_decays import campaign
 from tests.support.gap_campaigns import campaign as gap_campaign
@@ -103,11 +103,11 @@ def test_an_estimate_names_the_damping_of_two_near_wind_speeds_and_not_once_its_
     near, apart = identify(windy(19.0, 21.0)), identify(windy(0.0, 19.0, 21.0))
     document = near.to_json_dict()
     assert apart.trade_off is None
-    assert trade_off_line(apart.to_json_dict(), SYMBOLS) == ""
+    assert trade_off_line(apart.trade_off, SYMBOLS) == ""
     correlation = near.covariance_matrix / np.outer(*2 * [np.sqrt(np.diag(near.covariance_matrix))])
     strongest = np.max(np.abs(np.triu(correlation, 1)))
     assert abs(near.trade_off.correlation) == pytest.approx(strongest)
-    line = trade_off_line(document, SYMBOLS)
+    line = trade_off_line(near.trade_off, SYMBOLS)
     assert line.startswith("What trades off: Cn")
     shown = line.partition("(correlation ")[2].partition(")")[0]
     assert float(shown.replace("−", "-")) == pytest.approx(near.trade_off.correlation, abs=0.005)
@@ -129,8 +129,7 @@ def test_a_fit_of_a_diagnosis_names_its_pair_and_leaves_out_what_lies_at_a_bound
     common[places[0]] = 0.0  # its lower bound
     at_bound = replace(base, covariance=matrix, point=replace(base.point, common=common))
     assert least_separated(at_bound, gap_campaign()) is None
-    document = {"trade_off": vars(found)}
-    words = trade_off_line(document, {"mechanical_damping": "damping", "cn_r": "Cnr"})
+    words = trade_off_line(found, {"mechanical_damping": "damping", "cn_r": "Cnr"})
     assert "damping and Cnr are poorly separable in these runs (correlation 0.99)" in words
 
 
@@ -138,8 +137,8 @@ def test_a_fit_of_a_diagnosis_names_its_pair_and_leaves_out_what_lies_at_a_bound
     ("value", "shown"), [(0.976, "0.98"), (-0.9938, "−0.994"), (0.99978, "0.9998"), (-1.0, "−1.000000")]
 )
 def test_a_correlation_is_told_from_one(value, shown):
-    found = {"parameters": ["cn_r", "cn_beta"], "correlation": value, "remedy": "do it"}
-    assert f"(correlation {shown})" in trade_off_line({"trade_off": found}, SYMBOLS)
+    found = TradeOff(("cn_r", "cn_beta"), value, "do it")
+    assert f"(correlation {shown})" in trade_off_line(found, SYMBOLS)
 
 
 def test_the_combination_of_least_variance_is_stated_and_the_split_respects_the_bounds_of_both():
@@ -151,9 +150,8 @@ def test_the_combination_of_least_variance_is_stated_and_the_split_respects_the_
     assert found.value == pytest.approx(0.0031)
     assert found.std == pytest.approx(1e-4)
     assert found.of_second == pytest.approx((0.0, 0.0031))
-    document = {"parameters": ["mechanical_damping", "structural_damping.loss_factor"], "correlation": -1.0,
-                "remedy": "add runs", "together": vars(found)}  # fmt: skip
-    line = trade_off_line({"trade_off": document}, {"zeta": "ζ", "mechanical_damping": "damping"})
+    pair = TradeOff(("mechanical_damping", "structural_damping.loss_factor"), -1.0, "add runs", found)
+    line = trade_off_line(pair, {"zeta": "ζ", "mechanical_damping": "damping"})
     assert line.startswith(
         "What the runs determine: the whole damping ratio, ζ + 0.500 × structural damping (loss factor) = "
         "0.00310 ± 0.00010; of it structural damping (loss factor) contributes 0 to 0.0031. What trades off: "

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from diagnosis.findings.decision import Decision, Predictions, decision
 from diagnosis.findings.terms import SCATTERS
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import settings_of
+from diagnosis.settings import Settings
 from identification.statistics import Proportion
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.files.toml_input import NotNegative
@@ -53,6 +53,10 @@ class _Truth(_Read):
     in_phase: dict[str, float] = {}
 
 
+class _Settings(_Read):
+    settings: dict[str, int | float] = {}
+
+
 class _Candidate(_Read):
     effect: str
     probability: _Probability
@@ -73,7 +77,9 @@ class _Gap(_Read):
     closed: float | None = None
 
 
-class _Spread(_Read):
+class ScoredSpread(_Read):
+    """The width of a scatter between runs, relative, its 90 % interval, and whether the runs show it."""
+
     effect: str
     width: NotNegative
     interval: tuple[NotNegative, NotNegative] = Field(strict=False)
@@ -81,23 +87,38 @@ class _Spread(_Read):
 
 
 class _Repeatability(_Read):
-    spreads: list[_Spread] = []
+    spreads: list[ScoredSpread] = []
 
 
-class _Answer(_Read):
+class ScoredAnswer(_Read):
+    """The scored part of an answer, which may be of another method and lack the rest of a diagnosis.
+
+    Args:
+        causes: None: there is no answer.
+        doubts: against its predictions.
+        wall_s: time that it took, s; None where it is not stated.
+    """
+
     causes: list[str] | None
     repeatability: _Repeatability | None = None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
+    doubts: list[Any] = []
     inclusion: dict[str, _Probability] = {}
     coefficients: _Coefficients = _Coefficients()
     gap: _Gap | None = None
-    wall_s: float = 0.0
+    wall_s: float | None = None
+    provenance: _Settings = _Settings()
+
+    @property
+    def closed(self) -> float | None:
+        """Share of the gap that the causes close; None where it is not stated."""
+        return None if self.gap is None else self.gap.closed
 
     @model_validator(mode="after")
-    def _closed_where_named(self) -> _Answer:
+    def _closed_where_named(self) -> ScoredAnswer:
         causes = [name for name in self.causes or () if name not in SCATTERS]
-        if causes and causes != ["unknown"] and (self.gap is None or self.gap.closed is None):
+        if causes and causes != ["unknown"] and self.closed is None:
             raise ValueError("causes without the share of the gap that they close")
         return self
 
@@ -145,7 +166,7 @@ class Case:
             it.
         coefficients: true ``cn_beta`` and ``cn_r``, 1/rad; those in phase with angle and rate where a lag of the
             air acts that the answer does not name (decision 0004).
-        answer: the diagnosis' document.
+        answer: the scored part of the diagnosis.
         small: effects that act but need not be found, sorted.
         time_scale: time over that of the standard rig, a ratio.
         few_runs: whether the protocol has few springs and speeds.
@@ -159,7 +180,7 @@ class Case:
     withheld: bool
     severity: float | None
     coefficients: Mapping[str, float]
-    answer: Mapping[str, Any]
+    answer: ScoredAnswer
     small: tuple[str, ...] = ()
     time_scale: float = 1.0
     few_runs: bool = False
@@ -170,22 +191,22 @@ class Case:
     @property
     def causes(self) -> tuple[str, ...] | None:
         """The causes answered, without scatter between runs; None where there is no answer."""
-        found = self.answer["causes"]
+        found = self.answer.causes
         return None if found is None else tuple(name for name in found if name not in SCATTERS)
 
     @property
     def named_scatter(self) -> frozenset[str]:
         """The quantities said to scatter between the runs."""
         return frozenset(
-            {SCATTERS[name] for name in self.answer["causes"] or () if name in SCATTERS}
-            | {number for number, spread in self.spreads.items() if spread["shown"]}
+            {SCATTERS[name] for name in self.answer.causes or () if name in SCATTERS}
+            | {number for number, spread in self.spreads.items() if spread.shown}
         )
 
     @property
-    def spreads(self) -> dict[str, Mapping[str, Any]]:
-        """The answer on the scatter of each quantity: its ``width``, ``interval`` and whether it is ``shown``."""
-        said = (self.answer.get("repeatability") or {}).get("spreads", ())
-        return {SCATTERS[one["effect"]]: one for one in said if one["effect"] in SCATTERS}
+    def spreads(self) -> dict[str, ScoredSpread]:
+        """The answer on the scatter of each quantity."""
+        said = [] if self.answer.repeatability is None else self.answer.repeatability.spreads
+        return {SCATTERS[one.effect]: one for one in said if one.effect in SCATTERS}
 
     @property
     def right(self) -> bool:
@@ -228,21 +249,18 @@ class Case:
     @property
     def probability(self) -> float | None:
         """Probability of the answer given; None where it is not among the candidates."""
-        wanted = " + ".join(self.answer["causes"] or ()) or "none"
-        for candidate in self.answer.get("candidates", ()):
-            if candidate["effect"] == wanted:
-                return float(candidate["probability"])
-        return None
+        wanted = " + ".join(self.answer.causes or ()) or "none"
+        return next((one.probability for one in self.answer.candidates if one.effect == wanted), None)
 
     @property
     def decision(self) -> Decision | None:
         """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
-        answers = [(c["effect"], float(c["probability"])) for c in self.answer.get("candidates", ())]
+        answers = [(one.effect, one.probability) for one in self.answer.candidates]
         if not answers:
             return None
-        held_out = Predictions(held_out=(self.answer.get("gap") or {}).get("closed"))
-        found = decision(answers, settings_of(self.answer).answer, held_out)
-        return replace(found, decided=found.decided and not self.answer.get("doubts"))
+        settings = Settings().changed(self.answer.provenance.settings)
+        found = decision(answers, settings.answer, Predictions(held_out=self.answer.closed))
+        return replace(found, decided=found.decided and not self.answer.doubts)
 
     @property
     def stated_wrongly(self) -> bool:
@@ -262,24 +280,25 @@ class Case:
     @property
     def rival(self) -> bool:
         """Whether the true effects were not the answer, but were named as a possible confusion."""
-        mentioned = {*(self.causes or ()), *self.answer.get("ambiguous_with", ())}
+        mentioned = {*(self.causes or ()), *self.answer.ambiguous_with}
         return not self.right and set(self.truth) <= mentioned
 
     def error(self, name: str, when: str) -> CoefficientError | None:
         """Error of ``cn_beta`` or ``cn_r``, ``before`` or ``after`` the causes are added; None if not stated."""
-        found = self.answer.get("coefficients", {}).get(when, {}).get(name)
+        stated = self.answer.coefficients
+        found = (stated.before if when == "before" else stated.after).get(name)
         truth = self.coefficients.get(name)
-        if found is None or not truth or not (found["std"] or 0.0) > 0.0:
+        if found is None or not truth or not found.std:
             return None
-        error, reach = found["value"] - truth, 1.96 * found["std"]
-        low, high = found.get("interval") or (found["value"] - reach, found["value"] + reach)
-        return CoefficientError(error / found["std"], error / abs(truth), low <= truth <= high)
+        error, reach = found.value - truth, 1.96 * found.std
+        low, high = found.interval or (found.value - reach, found.value + reach)
+        return CoefficientError(error / found.std, error / abs(truth), low <= truth <= high)
 
 
 def case(
     name: str, truth: Mapping[str, Any], answer: Mapping[str, Any], excluded: Sequence[str] = ()
 ) -> Case:
-    """Combine a truth, from the key, and an answer, the diagnosis' document.
+    """Combine a truth, from the key, and an answer: the document of a diagnosis, or the scored part of one.
 
     Args:
         excluded: effects withheld from the vocabulary; a truth with one of them is ``unknown``.
@@ -288,18 +307,18 @@ def case(
         ValueError: when truth or answer is malformed (pydantic's, with the place).
     """
     stated = _Truth.model_validate(truth)
-    _Answer.model_validate(answer)
+    said = ScoredAnswer.model_validate(answer)
     effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
     lagging = {kind.name for kind in known_effects() if kind.in_phase is not Effect.in_phase}
-    meant = truth if lagging & {*(answer["causes"] or ())} else {**truth, **stated.in_phase}
+    meant = truth if lagging & {*(said.causes or ())} else {**truth, **stated.in_phase}
     return Case(
         name=name,
         truth=UNKNOWN if withheld else effects,
         withheld=withheld,
         severity=stated.severity,
         coefficients={key: float(meant[key]) for key in NAMES if key in meant},
-        answer=answer,
+        answer=said,
         small=tuple(sorted(stated.small)),
         time_scale=stated.scale.time,
         few_runs=stated.few_runs,
@@ -414,7 +433,7 @@ def inclusions(cases: Sequence[Case]) -> list[tuple[list[float], list[bool]]]:
     result = []
     for c in cases:
         beside = {*c.small, *SCATTERS}
-        stated = {name: p for name, p in c.answer.get("inclusion", {}).items() if name not in beside}
+        stated = {name: p for name, p in c.answer.inclusion.items() if name not in beside}
         if stated:
             result.append((list(stated.values()), [name in c.truth for name in stated]))
     return result

@@ -98,14 +98,14 @@ def _found(names: Sequence[str], normal: Sequence[Case], repeating: Sequence[Cas
         if name in c.scatter.widths
     ]
     said = [(c, name) for c in (*normal, *repeating) for name in names if name in c.named_scatter]
-    intervals = [(true, *spread["interval"]) for _, _, true, spread in acting if spread is not None]
+    intervals = [(true, *spread.interval) for _, _, true, spread in acting if spread is not None]
     return FoundScatter(
         names[0] if len(names) == 1 else ALL,
         named=Proportion.of([name in c.named_scatter for c, name, _, _ in acting]),
         false=Proportion.of([name not in c.scatter.widths for c, name in said]),
         within=Proportion.of(
             [
-                spread is not None and true / FACTOR <= spread["width"] <= true * FACTOR
+                spread is not None and true / FACTOR <= spread.width <= true * FACTOR
                 for _, _, true, spread in acting
             ]
         ),

@@ -303,7 +303,7 @@ class BlindScore:
 
     def closure(self) -> tuple[Proportion, float, float]:
         """For rightly named campaigns: proportion that closes 0.95 on held-out runs; median and 5th percentile."""
-        closed = [float(c.answer["gap"]["closed"]) for c in self.cases if c.named_rightly]
+        closed = [c.answer.closed or 0.0 for c in self.cases if c.named_rightly]
         if not closed:
             return Proportion(0, 0), 0.0, 0.0
         return (
@@ -336,7 +336,7 @@ class BlindScore:
 
     def seconds(self) -> tuple[float, float, float]:
         """Wall time per campaign, s: median, 90th percentile and largest; zeros where it is not known."""
-        times = [float(c.answer["wall_s"]) for c in self.cases if "wall_s" in c.answer]
+        times = [c.answer.wall_s for c in self.cases if c.answer.wall_s is not None]
         if not times:
             return 0.0, 0.0, 0.0
         return float(np.median(times)), float(np.quantile(times, 0.9)), max(times)

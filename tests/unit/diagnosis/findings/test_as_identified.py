@@ -5,7 +5,7 @@ import pytest
 from diagnosis import diagnose
 from identification import identify
 from tests.support.gap_campaigns import campaign
-from tests.unit.diagnosis.findings.test_hidden import SCATTERED, scattered
+from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class, effect_from
 
 KINDS = [effect_class(name) for name in (*SCATTERED, "coulomb_friction", "cubic_stiffness")]

@@ -8,19 +8,18 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients, possible_answers
-from diagnosis.findings.coefficients import hidden_line, hidden_table
 from diagnosis.findings.hidden import hidden_effects
 from diagnosis.findings.sections import printed
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import investigate, nominal_study
-from tests.reference.free_decays import damped_cosine
-from tests.support.diagnosis_document import document
-from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal, studied
+from tests.support.diagnosis_document import document, findings_of
+from tests.support.gap_campaigns import CN_BETA, CN_R, NOISE, campaign, nominal, studied
+from tests.support.rendered import hidden_line, hidden_table
+from tests.support.scattered_runs import SCATTERED, scattered
 from tests.unit.diagnosis.noise.test_colour import colour, with_zero
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from, known_effects
-from tunnel_sim.vocabulary.record import Record
 
 
 def found_beside(data, *names):
@@ -118,27 +117,6 @@ def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
     assert rises[1] > 16.0
 
 
-SCATTERED = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter")
-
-
-def scattered(seed=5):
-    """Twelve runs in closed form, with scatter of 0.3 % in speed, 0.05 % in stiffness and 1 % in damping."""
-    rng, time, runs = np.random.default_rng(seed), np.arange(0.0, 10.0, 0.01), []
-    base = campaign(duration=0.1)
-    for number in range(12):
-        like = base.runs[number % len(base.runs)]
-        spring = like.spring_stiffness * (1.0 + 5e-4 * rng.standard_normal())
-        speed = like.wind_speed * (1.0 + 3e-3 * rng.standard_normal())
-        damper = DAMPING * (1.0 + 1e-2 * rng.standard_normal())
-        area = 0.5 * 1.2 * 0.036 * 0.625
-        stiffness = spring - area * speed**2 * CN_BETA
-        rate = damper - area * 0.625 * speed * CN_R
-        swing = damped_cosine(time, rate / INERTIA, stiffness / INERTIA, 0.35, 0.0)
-        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
-        runs.append(replace(like, id=f"r{number}", record=record))
-    return replace(base, runs=tuple(runs), sensor=replace(base.sensor, sample_rate=100.0))
-
-
 def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     lag = {
         "effect": "unsteady_aero_lag",
@@ -152,19 +130,19 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     given = document() | {"hidden": [lag]}
     for name, std in (("cn_beta", 1e-3), ("cn_r", 3e-3)):
         given["coefficients"]["after"][name] = {"value": -0.17, "std": std, "unit": "1/rad"}
-    line = hidden_line(given)
+    line = hidden_line(findings_of(given))
     assert "due to the rate alone differs by up to 0.0061 1/rad if a lag of 0.011 l/V" in line
     assert "Cnβ" not in line  # it moves far less than its standard deviation
     drift = {**lag, "effect": "wind_speed_drift", "size": {"value": 2e-4, "std": None, "unit": "1"}}
-    both = hidden_line(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]})
+    both = hidden_line(findings_of(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]}))
     assert both.endswith(
         "Wind speed drift of up to 0.00020 is not excluded and would change Cnr by 0.0061 1/rad."
     )
-    (row,) = hidden_table(given).rows
+    (row,) = hidden_table(findings_of(given)).rows
     assert row[0] == "unsteady aero lag"
     assert "0.0061" in row[-1]
-    assert any(line in str(block) for block in printed(given))
-    assert hidden_line(given | {"hidden": []}) == ""
+    assert any(line in str(block) for block in printed(findings_of(given)))
+    assert hidden_line(findings_of(given | {"hidden": []})) == ""
 
 
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.averaged_coefficients import in_phase
-from diagnosis.findings.coefficients import coefficients_table, consequence
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
+from tests.support.rendered import coefficients_table, consequence
 from tunnel_sim.effects import effect_class, effect_from
 
 LAG = effect_class("unsteady_aero_lag")
@@ -46,11 +46,11 @@ def test_both_parts_are_said_and_the_sum_is_compared_with_the_nominal_model():
         "after": {"cn_r": {"value": -0.143, "std": 0.049, "unit": "1/rad"}},
         "in_phase": {"cn_r": same},
     }
-    assert consequence(given) == (
+    assert consequence(findings_of(given)) == (
         "The size of Cnr changes by less than 1 %. Of Cnr in phase with the rate, −0.36000 ± 0.00020, the lag "
         "contributes −0.217 and the rate itself −0.143 ± 0.049."
     )
-    whole, own = coefficients_table(given).rows
+    whole, own = coefficients_table(findings_of(given)).rows
     assert "in phase with the rate" in whole[0]
     assert "beside the lag" in own[0]
     assert own[1] == own[-1] == "–"

@@ -52,10 +52,10 @@ def test_a_guessed_hold_is_said_as_the_second_reading_of_the_delay() -> None:
     answer = diagnose(held(None), kinds=FEW)
     assert answer.causes == (DELAY.name,)
     assert answer.candidates[0].parameters["delay"].value == pytest.approx(HALF, rel=0.05)
-    assert headline(answer.to_json_dict())[0] == "input delay or wrong hold"
+    assert headline(answer)[0] == "input delay or wrong hold"
     assert "or it keeps its value between samples, as a controller's command does" in answer.verdict
     assert "since drive_hold is not stated" in answer.verdict
-    assert any('state drive_hold = "zero" for the runs' in step for step in next_steps(answer.to_json_dict()))
+    assert any('state drive_hold = "zero" for the runs' in step for step in next_steps(answer))
 
 
 def test_a_hold_that_is_stated_wrongly_is_said_too() -> None:
@@ -74,9 +74,7 @@ def test_a_smooth_input_that_is_stated_as_held_seems_early() -> None:
     answer = diagnose(replace(smooth, runs=runs), kinds=FEW)
     assert answer.causes == (DELAY.name,)
     assert "acts 1 ms earlier than recorded, about half a sample (1 ms); or it is linear" in answer.verdict
-    assert any(
-        'state drive_hold = "linear" for the runs' in step for step in next_steps(answer.to_json_dict())
-    )
+    assert any('state drive_hold = "linear" for the runs' in step for step in next_steps(answer))
 
 
 def test_identify_says_that_linear_is_assumed() -> None:

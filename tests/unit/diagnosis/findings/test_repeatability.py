@@ -38,7 +38,7 @@ def found(errors: np.ndarray) -> RunRepeatability:
     base = nominal(with_speeds(errors))
     layered = scattered(base, ALL_EFFECTS)
     assert layered is not None
-    given = repeatability(evident(layered))
+    given = RunRepeatability.find(evident(layered))
     assert given is not None
     return given
 
@@ -99,7 +99,7 @@ def test_zeros_that_would_close_an_unexplained_gap_are_mentioned(apart: float) -
     assert bool(facts) == (apart > 0.0)
     for fact in facts:
         assert fact.figures["share"] > 0.9
-        assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact.to_json_dict())
+        assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact)
         stated = replace(data, sensor=replace(data.sensor, zero="common"))
         assert zeros_apart(studied(stated, nominal(data))) == ()
 
@@ -120,7 +120,7 @@ def with_damping(errors: np.ndarray, seed: int = 0) -> Campaign:
 
 
 def limits(data: Campaign) -> ScatterLimits:
-    given = repeatability(nominal(data))
+    given = RunRepeatability.find(nominal(data))
     assert given is not None
     assert given.limits is not None
     return given.limits

@@ -21,8 +21,10 @@ from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
 from diagnosis.settings import Settings
-from identification.show.quantity import Quantity
+from identification.estimate import Quantity
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
+from tests.support.rendered import rest_words
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.writing import as_json
 
@@ -85,7 +87,7 @@ def judged(study, moved, std, excess=0.4):
         "rest": as_json(found),
         "coefficients": {"after": as_json(stated)},
     }
-    return replace(found, words=rest_words(document))
+    return replace(found, words=rest_words(findings_of(document)))
 
 
 def unknown(data, base):

@@ -12,6 +12,7 @@ import pytest
 from diagnosis.findings.cautions import PATCH, said
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
+from diagnosis.model.fact import Fact
 from diagnosis.model.joint import with_law
 from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_actuator import controlled, native_actuator
@@ -98,7 +99,7 @@ def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
     wanted = simulate_joint(engine, model.law.rest, start, 0.5, 0).angle
 
     samples = history_of(0.0125, engine.opt.timestep)
-    note = said(PATCH, {"kind": "delayed control", "index": 0, "samples": samples})
+    note = said(PATCH, Fact("delayed control", {"index": 0, "samples": samples}))
     call = note[note.index("mujoco.mj_init") :].rstrip(".")
 
     def replayed(*, filled: bool) -> np.ndarray:

@@ -79,8 +79,8 @@ def test_the_rise_of_friction_with_the_angle_is_proposed(tmp_path: Path) -> None
     assert law.effect["moment"] == "k*abs(b)*sign(r)"
     assert law.closed > 0.9
     assert law.parameters["k"][0] == pytest.approx(-BY_ANGLE, rel=0.05)
-    assert "The formula k*abs(b)*sign(r) explains" in found.to_json_dict()["closable"]["words"]
-    path = write_proposal(tmp_path / "law.toml", found.to_json_dict())
+    assert "The formula k*abs(b)*sign(r) explains" in found.closable.words
+    path = write_proposal(tmp_path / "law.toml", found)
     assert path is not None
     assert tomllib.loads(path.read_text())["effects"][0]["name"].startswith("proposed_")
     assert next(kind.name for kind in read_effects(path)).startswith("proposed_")

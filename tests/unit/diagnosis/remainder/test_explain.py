@@ -12,7 +12,6 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import diagnose
-from diagnosis.findings.remainder import closable_line, closable_table, closable_words
 from diagnosis.findings.terms import KINDS
 from diagnosis.likelihood.ceiling import (
     Ceiling,
@@ -36,7 +35,9 @@ from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.rigs import rig
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import answer, campaign, nominal
+from tests.support.rendered import closable_line, closable_table, closable_words
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
@@ -111,8 +112,7 @@ def test_its_curve_is_the_missing_moment(detent):
 def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp_path):
     study, found = detent
     assert found.law.closed > 0.97
-    document = {"closable": as_json(found)}
-    path = write_proposal(tmp_path / "law.toml", document)
+    path = write_proposal(tmp_path / "law.toml", findings_of({"closable": as_json(found)}))
     (kind,) = read_effects(path)
     assert kind.name == "proposed_angle"
     assert study.similarity.moment == pytest.approx(16.0 / 33.01, rel=0.1)  # so its units did change
@@ -222,9 +222,9 @@ def test_more_noise_cannot_be_closed():
 def test_nothing_is_proposed_without_a_gap(tmp_path):
     study = study_of("", 0.0)
     assert closable(study, significant=False) is None
-    assert write_proposal(tmp_path / "law.toml", {"closable": None}) is None
+    assert write_proposal(tmp_path / "law.toml", findings_of({"closable": None})) is None
     assert not (tmp_path / "law.toml").exists()
-    assert closable_table({"closable": None}).rows == ()
+    assert closable_table(findings_of({"closable": None})).rows == ()
 
 
 REST = {"significant": False, "p_value": 0.4321}
@@ -249,7 +249,7 @@ REST = {"significant": False, "p_value": 0.4321}
     ],
 )
 def test_beside_every_named_answer_it_says_what_could_be_closed(causes, rest, said):
-    words = closable_line({"closable": None, "causes": causes, "rest": rest})
+    words = closable_line(findings_of({"closable": None, "causes": causes, "rest": rest}))
     assert words.startswith(said)
     assert bool(words) == bool(said)
 
@@ -273,11 +273,11 @@ def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
 def test_the_table_names_every_kind(detent):
     _, found = detent
     document = {"closable": as_json(found)}
-    assert {row[0] for row in closable_table(document).rows} == {
+    assert {row[0] for row in closable_table(findings_of(document)).rows} == {
         text for kind, text in KINDS.items() if kind not in ("noise", "line")
     }
-    words = closable_words(document | {"causes": ["unknown"], "decided": True})
-    assert f"{closable_table(document).rows[0][0].capitalize()} could explain " in words
+    words = closable_words(findings_of(document | {"causes": ["unknown"], "decided": True}))
+    assert f"{closable_table(findings_of(document)).rows[0][0].capitalize()} could explain " in words
 
 
 def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):
@@ -396,7 +396,8 @@ def test_a_kind_whose_share_is_not_determined_is_not_chosen():
     assert chosen_kind(common, single, Settings().remainder) == "event"
     assert chosen_kind(common, {}, Settings().remainder) is None
     assert chosen_kind(common, {"event": evidence("event", 0.01)}, Settings().remainder) is None
-    table = closable_table({"closable": {"ceilings": [asdict(common["angle"].ceiling)]}})
+    rest = {"kind": "angle", "ceilings": [asdict(common["angle"].ceiling)]}
+    table = closable_table(findings_of({"closable": rest}))
     assert table.rows[0][1] == "not determined"
 
 

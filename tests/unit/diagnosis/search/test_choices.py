@@ -17,7 +17,7 @@ from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.search.choices import _exchanged, choices
 from diagnosis.search.investigate import investigate
 from diagnosis.search.study import _gap_beside
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, campaign, precise
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -81,12 +81,12 @@ def test_the_first_step_is_to_tell_the_springs_apart(study):
     given = document() | {"causes": [NAME], "ambiguous_with": []}
     springs = sorted(spring_choices(study), key=lambda one: one.stiffness)
     given["found"] |= {"choices": [asdict(one) | {"probability": 0.5} for one in springs]}
-    assert next_steps(given)[0] == (
+    assert next_steps(findings_of(given))[0] == (
         "Add runs with a third spring, or measure the stiffness of both springs again (16.12 and 44.84 N m/rad): "
         "these runs do not show which of them is off."
     )
-    assert not any("Measure the stiffness of that spring" in step for step in next_steps(given))
-    assert verdict(given, "").endswith(
+    assert not any("Measure the stiffness of that spring" in step for step in next_steps(findings_of(given)))
+    assert verdict(findings_of(given), "").endswith(
         "One of the two springs is off, and these runs do not show which: 16.12 N m/rad is 1.96 % softer than "
         "stated (50 %), or 44.84 N m/rad is 2.00 % stiffer than stated (50 %). The coefficients are "
         "averaged over both."

@@ -24,7 +24,7 @@ from diagnosis.where.jumps import Jumps, jumps
 from identification.examination.examine import examine
 from identification.status import Outcome
 from tests.marks import slow
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import campaign, nominal, with_blow
 from tunnel_reference.disturbance import FORMS
 from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
@@ -194,7 +194,7 @@ def test_the_causes_beside_a_blow_are_those_planted() -> None:
     assert (found["causes"], found["decided"]) == (["coulomb_friction", "cubic_stiffness"], True)
     assert [one["run"] for one in found["disturbed"]] == ["r07"]
     assert found["verdict"].startswith("Run r07 was disturbed at 5.4")
-    assert next_steps(found)[0].startswith("Repeat run r07, which was disturbed at 5.4")
+    assert next_steps(findings_of(found))[0].startswith("Repeat run r07, which was disturbed at 5.4")
     truth = {"coulomb_friction.friction_moment": 0.004, "cubic_stiffness.coefficient": 0.03}
     for name, value in truth.items():
         given = found["candidates"][0]["parameters"][name]
@@ -213,7 +213,7 @@ def test_a_blow_is_not_taken_for_a_clock_that_drifts() -> None:
 def test_without_a_cause_there_is_no_gap_beside_the_blow() -> None:
     found = diagnose(with_blow(campaign(), 5e-3, 4.0, "r2"), kinds=FEW).to_json_dict()
     assert found["causes"] == []
-    assert headline(found) == ("No gap; run r2 disturbed", "none")
+    assert headline(findings_of(found)) == ("No gap; run r2 disturbed", "none")
     assert not found["gap"]["detected"]
 
 
@@ -227,8 +227,8 @@ def test_by_hand_the_same_runs_are_used() -> None:
 def test_the_words_say_what_is_left_out_and_what_to_do() -> None:
     one = {"run": "run_7", "at_s": 5.04321, "kept_until_s": None, "p_value": 1e-9, "used": False}
     given = document() | {"disturbed": [one, one | {"run": "r8", "kept_until_s": 4.5}]}
-    assert headline(given)[0].endswith("; runs run_7, r8 disturbed")
-    assert next_steps(given)[:2] == [
+    assert headline(findings_of(given))[0].endswith("; runs run_7, r8 disturbed")
+    assert next_steps(findings_of(given))[:2] == [
         "Repeat run run_7, which was disturbed at 5.043 s.",
         "Repeat run r8, which was disturbed at 5.043 s.",
     ]
@@ -248,7 +248,8 @@ def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monke
     found = diagnose(struck, kinds=FEW).to_json_dict()
     (one,) = found["disturbed"]
     assert (one["run"], one["kept_until_s"], one["used"]) == ("r2", None, True)
-    assert "It is used nevertheless, because the other runs do not determine the model." in verdict(found, "")
+    words = verdict(findings_of(found), "")
+    assert "It is used nevertheless, because the other runs do not determine the model." in words
 
 
 def test_rows_too_few_for_the_harmonics_are_not_judged() -> None:

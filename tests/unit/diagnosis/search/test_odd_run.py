@@ -19,6 +19,7 @@ from diagnosis.search.disturbed import undisturbed
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
 from tests.marks import slow
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -106,14 +107,16 @@ def answer(plain: Campaign) -> Diagnosis:
 
 def test_the_words_name_the_odd_run(answer: Diagnosis) -> None:
     document = answer.to_json_dict()
-    assert headline(document) == ("No gap; run r5 differs from the others", "none")
+    assert headline(answer) == ("No gap; run r5 differs from the others", "none")
     assert answer.verdict.startswith(
         "Run r5 differs from the others. Without it there is no gap, so it is not used."
     )
-    assert next_steps(document)[0].startswith("Repeat run r5, which differs from the others")
+    assert next_steps(answer)[0].startswith("Repeat run r5, which differs from the others")
     assert document["disturbed"][0]["at_s"] is None
     part = document | {"disturbed": [document["disturbed"][0] | {"kept_from_s": 0.4}]}
-    assert next_steps(part)[0] == "Look at the release of run r5: its free motion begins at 0.4 s."
+    assert (
+        next_steps(findings_of(part))[0] == "Look at the release of run r5: its free motion begins at 0.4 s."
+    )
 
 
 def test_an_odd_run_is_left_out_or_its_start(plain: Campaign, answer: Diagnosis) -> None:

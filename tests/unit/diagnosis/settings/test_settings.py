@@ -37,6 +37,7 @@ KNOWN_IN_SEVERAL = {
     "model_error": "a misfit that needs no cause needs no form either",
     "alike_within": "of random moments of two sources, and of two kinds of one source",
     "remains_rate": "whether a residual is beyond chance, with the causes or, for a judgement on them, without",
+    "immaterial": "the finding that it decides has its name",
     "unknown_from": "the rest of the answers are weighed again without a refused one",
     "coefficient_interval": "an interval has one probability, within bounds or without",
     "leak": "wherever channels are compared",
@@ -65,8 +66,8 @@ KNOWN_IN_SEVERAL = {
     "steady_line_rate": "the sentence states the rate",
 }
 
-#: Where usual settings may be made: what people call, and what has no campaign.
-VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py"}
+#: Where usual settings may be made: what people call, what has no campaign, and an answer that states its changes.
+VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py", "whole.py"}
 
 
 @cache

@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
-from diagnosis.findings.place import where_words
 from diagnosis.model.joint import Joint
+from tests.support.rendered import where_words
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array, Record
@@ -50,7 +50,7 @@ def test_the_drive_is_not_called_a_force_on_the_rig() -> None:
     found = diagnose(campaign(), kinds=vocabulary(include=["coulomb_friction"]))
     assert found.where is not None
     assert found.where.channel != "forcing"
-    assert "spectral line" not in where_words(found.to_json_dict())
+    assert "spectral line" not in where_words(found)
 
 
 @pytest.mark.slow

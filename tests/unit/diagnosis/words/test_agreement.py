@@ -11,15 +11,15 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.findings.decision import Predictions, decision
-from diagnosis.findings.place import place_rows, where_words
 from diagnosis.findings.verdict import headline, next_steps, verdict
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.where.place import locate
 from tests.support.contradictions import contradictions
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import campaign as gap_campaign
 from tests.support.gap_campaigns import nominal
+from tests.support.rendered import place_rows, where_words
 from tunnel_sim.effects import Effect, effect_class, effect_from, known_effects
 
 ROOT = Path(__file__).parents[4]
@@ -46,8 +46,9 @@ def answered(
 
 
 def printed(one: dict[str, Any]) -> str:
-    rows = " ".join(f"{label}: {value}." for label, value in place_rows(one))
-    return f"{verdict(one, '')} Where: {where_words(one)} {rows} {' '.join(next_steps(one))}"
+    found = findings_of(one)
+    rows = " ".join(f"{label}: {value}." for label, value in place_rows(found))
+    return f"{verdict(found, '')} Where: {where_words(found)} {rows} {' '.join(next_steps(found))}"
 
 
 def sets() -> Iterator[tuple[type[Effect], ...]]:
@@ -75,11 +76,11 @@ def test_causes_that_do_not_agree_with_the_place_are_undecided_between_them_and_
     one = answered(("cubic_stiffness",), "forcing", "blow", "always", 0.97)
     assert (one["decided"], one["unpredictive"]) == (False, "cubic_stiffness")
     assert [doubt["kind"] for doubt in one["doubts"]] == ["elsewhere"]
-    assert headline(one) == ("Undecided: cubic stiffness, and more", "open")
-    said = verdict(one, "")
+    assert headline(findings_of(one)) == ("Undecided: cubic stiffness, and more", "open")
+    said = verdict(findings_of(one), "")
     assert "explain the gap" not in said
     assert "Cubic stiffness fits best, but the residuals point elsewhere: look at runs " in said
-    steps = " ".join(next_steps(one))
+    steps = " ".join(next_steps(findings_of(one)))
     assert "Look at runs " in steps
     assert "Do not repair the rig on this answer" in steps
     agreed = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always", 0.97)
@@ -93,7 +94,7 @@ def test_a_random_moment_may_shift_frequency_and_damping(reason: str) -> None:
     for name in ("buffeting", "ambient_vibration"):
         one = answered((name,), channel, reason, "wind_on", 0.97)
         assert one["decided"]
-        assert "It looks like a change of the" in where_words(one)
+        assert "It looks like a change of the" in where_words(findings_of(one))
         assert not contradictions(one, printed(one))
     assert not answered(("buffeting",), "sensor", "harmonics", "wind_on", 0.97)["decided"]
 
@@ -102,9 +103,9 @@ def test_a_gap_whose_rest_could_change_the_coefficients_is_not_immaterial() -> N
     one = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always")
     one["found"]["immaterial"] = {"cn_beta": 1e-4, "cn_r": 1e-4}
     one["rest"]["material"] = False
-    assert "The gap is immaterial" in verdict(one, "")
+    assert "The gap is immaterial" in verdict(findings_of(one), "")
     one["rest"]["material"] = True
-    assert "The gap is immaterial" not in verdict(one, "")
+    assert "The gap is immaterial" not in verdict(findings_of(one), "")
     assert not contradictions(one, printed(one))
 
 

@@ -9,19 +9,20 @@ import pytest
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
-from diagnosis.findings.coefficients import Coefficients, coefficient_note, size_note
+from diagnosis.findings.coefficients import Coefficients, size_note
+from diagnosis.findings.decision import decision
 from diagnosis.findings.found import Found
-from diagnosis.findings.place import REASONS, reason, where_words
-from diagnosis.findings.remainder import closable_table, closable_words
+from diagnosis.findings.place import REASONS, reason
 from diagnosis.findings.terms import KINDS
 from diagnosis.findings.verdict import next_steps
 from diagnosis.findings.written import sentences
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
-from diagnosis.settings import settings_of
+from diagnosis.settings import Settings
 from diagnosis.where.described import Nowhere, Where
-from identification.show.quantity import Quantity
-from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document
+from identification.estimate import Quantity
+from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document, findings_of
+from tests.support.rendered import closable_table, closable_words, coefficient_note, rest_words, where_words
 
 Document = dict[str, Any]
 
@@ -34,11 +35,11 @@ def given() -> Document:
 def placed(given: Document, **changes: Any) -> str:
     """Where the gap is, with changes of the facts of its place."""
     given["found"]["place"] |= changes
-    return where_words(given)
+    return where_words(findings_of(given))
 
 
 def test_where_the_gap_is_says_runs_places_bands_and_reasons(given: Document) -> None:
-    assert where_words(given) == (
+    assert where_words(findings_of(given)) == (
         "88 % of the gap is in 2 of 3 runs (alpha, gamma); its power is 4.2 times as large with the wind on. Four "
         "fifths of the gap lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
         "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on "
@@ -74,7 +75,7 @@ def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document
         "Coulomb friction and quadratic damping act there; gravity stiffness acts on the restoring moment."
     )
     assert "does not agree" not in text
-    text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)
+    text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False, elsewhere=True)
     assert text.endswith(
         "That does not agree with cubic stiffness and sensor drift: cubic stiffness acts on the restoring moment "
         "and sensor drift acts on the sensor reading."
@@ -82,7 +83,7 @@ def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document
 
 
 def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
-    text = placed(given, compared=["cubic_stiffness"], agrees=False)
+    text = placed(given, compared=["cubic_stiffness"], agrees=False, elsewhere=True)
     assert text.endswith("That does not agree with cubic stiffness: it acts on the restoring moment.")
     assert placed(given, compared=[]).endswith("show it too.")
     given["where"] |= {"channel": None, "condition": None}
@@ -105,7 +106,7 @@ def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
 )
 def test_without_a_gap_it_is_nowhere(given: Document, within_step: bool, end: str) -> None:
     given["found"] |= {"place": None, "nowhere": {"runs": 3, "p_value": 0.42, "within_step": within_step}}
-    text = where_words(given)
+    text = where_words(findings_of(given))
     assert text.startswith("Nowhere: in 3 runs the residual is")
     assert text.endswith(end)
 
@@ -124,7 +125,7 @@ FIGURES = {
 @pytest.mark.parametrize("table", [CAUTIONS, PATCH])
 def test_every_caveat_and_note_is_a_sentence_of_its_figures(table: Any) -> None:
     for kind in table:
-        text = said(table, {"kind": kind, **FIGURES})
+        text = said(table, Fact(kind, FIGURES))
         assert text.endswith(".")
         assert text[0].isupper() or text.startswith("frictionloss")
         assert "{" not in text
@@ -132,38 +133,36 @@ def test_every_caveat_and_note_is_a_sentence_of_its_figures(table: Any) -> None:
 
 def test_every_reason_is_a_clause_of_its_figures() -> None:
     for texts in (
-        [reason({"kind": kind, **FIGURES}) for kind in REASONS],
-        [said(NOISE, {"kind": kind, **FIGURES}) for kind in NOISE],
+        [reason(Fact(kind, FIGURES)) for kind in REASONS],
+        [said(NOISE, Fact(kind, FIGURES)) for kind in NOISE],
     ):
         assert not any(text.endswith(".") or "{" in text or text[0].isupper() for text in texts)
         assert len(set(texts)) == len(texts)
 
 
 def test_caveats_state_their_figures() -> None:
-    few = {"kind": "few runs", "runs": 1, "driven": False, "windy": False}
-    assert said(CAUTIONS, few).endswith("Add runs with other springs and release angles.")
-    assert said(CAUTIONS, few).startswith(
-        "There is one run only: the form of the decay alone distinguishes the causes."
-    )
-    assert "A fault of this run cannot be told from a cause." in said(CAUTIONS, few)
-    assert "fault" not in said(CAUTIONS, few | {"runs": 2})
-    assert said(CAUTIONS, few | {"runs": 2, "windy": True}).endswith(
-        "springs, wind speeds and release angles."
-    )
-    assert said(CAUTIONS, few | {"runs": 2, "driven": True}).endswith(
+    def few(runs: int, *, driven: bool = False, windy: bool = False) -> str:
+        return said(CAUTIONS, Fact("few runs", {"runs": runs, "driven": driven, "windy": windy}))
+
+    assert few(1).endswith("Add runs with other springs and release angles.")
+    assert few(1).startswith("There is one run only: the form of the decay alone distinguishes the causes.")
+    assert "A fault of this run cannot be told from a cause." in few(1)
+    assert "fault" not in few(2)
+    assert few(2, windy=True).endswith("springs, wind speeds and release angles.")
+    assert few(2, driven=True).endswith(
         "form of the motion alone distinguishes the causes. Add runs with other inputs."
     )
-    left_out = said(CAUTIONS, {"kind": "another mode", "ratio": 1.5, "runs": ["r1", "r3"]})
+    left_out = said(CAUTIONS, Fact("another mode", {"ratio": 1.5, "runs": ["r1", "r3"]}))
     assert "at least 1.5 times as fast as the same spring with the wind off: r1, r3." in left_out
-    differs = said(CAUTIONS, {"kind": "not confirmed", **FIGURES})
-    assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in differs
-    rates = said(CAUTIONS, {"kind": "not confirmed", **FIGURES}, "rad/s")
-    assert "by 0.0011 °/s (root mean square over beta)" in rates
+    differs = Fact("not confirmed", FIGURES)
+    assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in said(
+        CAUTIONS, differs
+    )
+    assert "by 0.0011 °/s (root mean square over beta)" in said(CAUTIONS, differs, "rad/s")
 
 
 def test_remarks_on_the_noise_have_their_remedies() -> None:
-    folded = {"kind": "folded hum", "line_hz": 100.0, "places_hz": [40.0, 60.0], "runs": ["a", "b"]}
-    found = remark(folded)
+    found = remark(Noted(("a", "b"), Fact("folded hum", {"line_hz": 100.0, "places_hz": [40.0, 60.0]})))
     assert found.runs == ("a", "b")
     assert found.what.endswith("is above half the sample rate and appears at 40 to 60 Hz")
     assert found.remedy == "sample faster to see it at its true frequency"
@@ -191,36 +190,39 @@ def test_what_unstated_sizes_leave_open(beta: str, words: str) -> None:
 
 
 def test_the_note_on_the_coefficients(given: Document) -> None:
-    assert coefficient_note(given | {"causes": []}) == ""
-    assert coefficient_note(given | {"causes": ["unknown"]}) == ""
-    cycling = given | {"found": given["found"] | {"limit_cycles": [{"runs": ["a"], "what": "it settles"}]}}
+    assert coefficient_note(findings_of(given | {"causes": []})) == ""
+    assert coefficient_note(findings_of(given | {"causes": ["unknown"]})) == ""
+    cycle = {"outcome": "noted", "runs": ["a"], "what": "it settles", "remedy": "none"}
+    cycling = given | {"found": given["found"] | {"limit_cycles": [cycle]}}
     assert (
-        coefficient_note(cycling)
+        coefficient_note(findings_of(cycling))
         == "no damping ratio and no derivative is stated, since no run is a free decay"
     )
 
 
 def test_what_remains(given: Document) -> None:
-    assert rest_words(given) == (
+    assert rest_words(findings_of(given)) == (
         "The residual (0.00946° root mean square) changes Cnβ by less than 0.28 % and Cnr by less than 4.6 %."
     )
     rest = given["rest"]
     large = given | {"rest": rest | {"excess": 445.0}}  # the fit shows it, whatever it does to coefficients
-    assert rest_words(large).startswith(
+    assert rest_words(findings_of(large)).startswith(
         "Part of the gap remains: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less "
         "than"
     )
-    assert rest_words(given | {"causes": ["unknown"]}).startswith("The gap is immaterial: it changes Cnβ by")
-    assert rest_words(given | {"causes": []}) == "No gap: nothing remains beyond the noise."
+    assert rest_words(findings_of(given | {"causes": ["unknown"]})).startswith(
+        "The gap is immaterial: it changes Cnβ by"
+    )
+    assert rest_words(findings_of(given | {"causes": []})) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
-    assert rest_words(calm) == (
+    assert rest_words(findings_of(calm)) == (
         "The residual is within the noise. Sensor drift is significant, but too small to be named."
     )
     rest["moves"]["cn_r"]["material"] = True
-    assert rest_words(given).startswith(
+    assert rest_words(findings_of(given)).startswith(
         "Part of the gap remains: the residual (0.00946° root mean square) could change Cnr by 0."
     )
-    assert rest_words(given | {"rest": None}) == ""
+    assert rest_words(findings_of(given | {"rest": None})) == ""
 
 
 CEILINGS = [
@@ -235,7 +237,7 @@ CLOSABLE = {
 
 def test_what_could_be_closed(given: Document) -> None:
     def text(**changes: Any) -> str:
-        return closable_words(given | {"closable": CLOSABLE | changes})
+        return closable_words(findings_of(given | {"closable": CLOSABLE | changes}))
 
     first = "A moment of the angle alone could explain 85.0 ± 2.0 % of the residual gap (measured on held-out"
     assert text().startswith(first)
@@ -248,7 +250,7 @@ def test_what_could_be_closed(given: Document) -> None:
         "common to all runs is preferred if it explains four fifths of that share or more, since it can be a "
         "property of the rig."
     )
-    table = closable_table(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}})
+    table = closable_table(findings_of(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}}))
     assert "at most" not in table.title
     assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
@@ -266,10 +268,11 @@ def test_what_could_be_closed(given: Document) -> None:
     )
     with_law = given | {"causes": ["unknown"], "decided": True, "closable": CLOSABLE | {"law": law}}
     assert any(
-        step.startswith("Write the formula as an effect with --propose") for step in next_steps(with_law)
+        step.startswith("Write the formula as an effect with --propose")
+        for step in next_steps(findings_of(with_law))
     )
     without = with_law | {"closable": CLOSABLE}
-    assert not any("formula" in step for step in next_steps(without))
+    assert not any("formula" in step for step in next_steps(findings_of(without)))
     events = [{"run": "beta", "share": 0.9, "from_s": 1.0, "to_s": 2.5}] * 2
     assert text(events=events).endswith(
         "Most of it is in 2 runs, the largest part in run beta (1.00 to 2.50 s)."
@@ -284,16 +287,16 @@ def test_what_could_be_closed(given: Document) -> None:
     )
     given["decided"] = False
     assert " % of the gap (measured" in text()
-    assert closable_words(given | {"closable": None}) == ""
+    assert closable_words(findings_of(given | {"closable": None})) == ""
 
 
 def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
-    found = sentences(given)
+    found = sentences(findings_of(given))
     assert found.verdict.startswith(
         "The gap is explained by either quadratic damping (91 %) or coulomb friction"
     )
     assert found.rest in found.verdict
-    assert found.where == where_words(given)
+    assert found.where == where_words(findings_of(given))
     assert found.noise == "the campaign states no noise"
     assert [text.partition(":")[0] for text in found.cautions] == ["There are 2 runs only"]
     assert found.remarks[0].what.startswith("sampled too slowly")
@@ -303,8 +306,9 @@ def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
 
 def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None:
     changed = given | {"provenance": {"settings": {"where.interval_share": 0.75, "words.runs_listed": 1}}}
-    assert settings_of(changed).where.interval_share == 0.75
-    text = where_words(changed)
+    found = findings_of(changed)
+    assert found.settings.where.interval_share == 0.75
+    text = where_words(found)
     assert "Three quarters of the gap lie between" in text
     assert "in 2 of 3 runs;" in text
 
@@ -321,7 +325,8 @@ def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
     answer = Diagnosis(
         "c", (), GapSummary(False, 0.01, 0.01, 0.0, "", (), 1e-3, 0.5), Where(None, None),
         (Candidate("none", 1.0, 0.01, 0.0),), (), None,
-        Coefficients(value, value), Confirmation(True, 0.0, "a", 0.0, 1e-5), noise, found=found,
+        Coefficients(value, value), Confirmation(True, 0.0, "a", 0.0, 1e-5), noise,
+        decision((("none", 1.0),), Settings().answer), found=found,
     )  # fmt: skip
     once = answer.in_words()
     assert once.verdict.startswith("No gap: ")

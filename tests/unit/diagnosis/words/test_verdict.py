@@ -9,9 +9,10 @@ import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
 from diagnosis.findings.answers import candidates_table, parameters_table
+from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cards import key_figures
 from diagnosis.findings.causes import said_size
-from diagnosis.findings.closure import FITTED, GapSummary, RunGap, runs_table
+from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.found import Nearly
 from diagnosis.findings.judged import Misfit
@@ -22,11 +23,12 @@ from diagnosis.findings.verdict import headline, next_steps, rival_lines, undeci
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.settings import Settings
+from identification.estimate import Quantity
 from identification.show.blocks import typeset
-from identification.show.quantity import Quantity
-from tests.support.diagnosis_document import campaign, document
+from tests.support.diagnosis_document import campaign, document, findings_of
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
+from tests.support.rendered import runs_table
 from tunnel_lab.report.page import render_report
 from tunnel_sim.effects import effect_class, effect_from, known_effects
 
@@ -63,7 +65,7 @@ def answer_of(
 
 
 def said(*causes: str, **changes: Any) -> str:
-    return verdict(answer_of(*causes, **changes), "What remains is small.")
+    return verdict(findings_of(answer_of(*causes, **changes)), "What remains is small.")
 
 
 @pytest.mark.parametrize(
@@ -98,7 +100,9 @@ def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
     given["gap"] |= found.to_json_dict()
     given["verdict"] = said("quadratic_damping", size=found)
     words = typeset(given["verdict"])
-    before, _, closed, probability = key_figures(given | {"candidates": [{"probability": 0.9}]})
+    before, _, closed, probability = key_figures(
+        findings_of(given | {"candidates": [given["candidates"][0] | {"probability": 0.9}]})
+    )
     assert f"{before.value} root mean square, " in words
     assert before.note.split("; ")[1] in words
     assert "times the noise variance" not in words
@@ -128,13 +132,13 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     given["gap"] |= {"closed_on": found.closed_on}
     for run in given["gap"]["runs"]:
         run["held_out"] = False
-    notes = [fact.note for fact in key_figures(given)]
+    notes = [fact.note for fact in key_figures(findings_of(given))]
     assert notes.count(found.closed_on) == 1
     assert not any("on held-out runs" in note for note in notes)
-    page = render_report(given, campaign())
+    page = render_report(findings_of(given), campaign())
     assert "on held-out runs" not in page
     assert "run held out" not in page
-    table = runs_table(given).without_detail()
+    table = runs_table(findings_of(given)).without_detail()
     assert table.columns == ("run", "before", "after")
 
 
@@ -163,9 +167,9 @@ def test_what_remains_and_is_material_is_said_in_the_first_sentence():
     assert "part of the gap" not in said("coulomb_friction")
     given = document()
     given["ambiguous_with"] = []
-    assert headline(given) == ("quadratic damping", "found")
+    assert headline(findings_of(given)) == ("quadratic damping", "found")
     given["rest"]["material"] = True
-    assert headline(given) == ("quadratic damping, in part", "open")
+    assert headline(findings_of(given)) == ("quadratic damping, in part", "open")
 
 
 UNDECIDED = (
@@ -242,7 +246,7 @@ def test_an_answer_that_predicts_nothing_is_undecided(predictions, doubt):
     assert found.decided is not bool(doubt)
     assert bool(found.unpredictive) is bool(doubt)
     assert [name for name, _ in found.credible] == ["free_play", "coulomb_friction"]
-    words = undecided_words(found.to_json_dict())
+    words = undecided_words(findings_of(found.to_json_dict()))
     assert ("Free play fits best, but" in words) is bool(doubt)
     assert doubt in words
     assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, predictions).decided
@@ -253,16 +257,16 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     given["candidates"][0]["probability"] = 0.41
     answers = [(one["effect"], one["probability"]) for one in given["candidates"]]
     given |= decision(answers, Settings().answer).to_json_dict()
-    assert headline(given) == ("Undecided", "open")
+    assert headline(findings_of(given)) == ("Undecided", "open")
     given["common"]["channels"] = {"damping": 0.95}
-    assert headline(given)[0] == "Undecided: the damping, and more"
+    assert headline(findings_of(given))[0] == "Undecided: the damping, and more"
     given["common"]["effects"] = {"quadratic_damping": 0.93}
-    assert headline(given)[0] == "Undecided: quadratic damping, and more"
-    labels = [fact.label for fact in key_figures(given)]
+    assert headline(findings_of(given))[0] == "Undecided: quadratic damping, and more"
+    labels = [fact.label for fact in key_figures(findings_of(given))]
     assert "With the most probable answer added" in labels
     assert "Probability of the most probable answer" in labels
-    assert any("Do not repair" in step for step in next_steps(given))
-    assert parameters_table(given).title.startswith("Parameters of the most probable answer")
+    assert any("Do not repair" in step for step in next_steps(findings_of(given)))
+    assert parameters_table(findings_of(given)).title.startswith("Parameters of the most probable answer")
 
 
 def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is_more_probable(monkeypatch):
@@ -274,17 +278,17 @@ def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is
     given |= decision(
         [(one["effect"], one["probability"]) for one in given["candidates"]], Settings().answer
     ).to_json_dict()
-    listed = [row[:2] for row in candidates_table(given).rows[:2]]
+    listed = [row[:2] for row in candidates_table(findings_of(given)).rows[:2]]
     assert listed == [(most["effect"], "48 %"), (first["effect"], "33 %")]
-    assert [row[1] for row in candidates_table(given).rows[:2]] == ["48 %", "33 %"]
+    assert [row[1] for row in candidates_table(findings_of(given)).rows[:2]] == ["48 %", "33 %"]
     called = "most probable set of effects"
-    assert parameters_table(given).title.startswith(f"Parameters of the {called}")
+    assert parameters_table(findings_of(given)).title.startswith(f"Parameters of the {called}")
     assert {f"With the {called} added", f"Probability of the {called}"} <= {
-        fact.label for fact in key_figures(given)
+        fact.label for fact in key_figures(findings_of(given))
     }
-    page = render_report(given, campaign())
+    page = render_report(findings_of(given), campaign())
     assert f"of the {called}</h2>" in page
-    assert "most probable answer" not in page + diagnosis_brief(given)
+    assert "most probable answer" not in page + diagnosis_brief(findings_of(given))
 
 
 def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
@@ -424,27 +428,27 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         "coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than stated (58 %) "
         "or gravity stiffness (40 %)"
     )
-    assert headline(one) == (words, "open")
-    assert f"The gap is explained by {words}. The misfit" in verdict(one, "")
-    assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
+    assert headline(findings_of(one)) == (words, "open")
+    assert f"The gap is explained by {words}. The misfit" in verdict(findings_of(one), "")
+    assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(findings_of(one))
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
     springs = (
         "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by "
         "2.000 ± 0.010 %"
     )
     assert (
-        headline(one)[0]
+        headline(findings_of(one))[0]
         == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
     )
     said_once = "and either an error of one of the two springs (58 %) or gravity stiffness (40 %). The misfit"
-    assert said_once in verdict(one, "")
+    assert said_once in verdict(findings_of(one), "")
     one["candidates"][2:] = [
         {"effect": "coulomb_friction + cubic_stiffness", "probability": 0.2, "parameters": {}},
         {"effect": "coulomb_friction", "probability": 0.1, "parameters": {}},
     ]
     one["ambiguous_with"] = ["cubic_stiffness", "gravity_stiffness"]
     others = "gravity stiffness (40 %), cubic stiffness (20 %) or nothing else (10 %)"
-    assert headline(one)[0].endswith(f"and one of these: {springs} (58 %), {others}")
+    assert headline(findings_of(one))[0].endswith(f"and one of these: {springs} (58 %), {others}")
 
 
 def test_what_the_causes_change_is_said_in_per_cent():
@@ -454,22 +458,23 @@ def test_what_the_causes_change_is_said_in_per_cent():
         for name, pair in values.items():
             one["coefficients"][when][name]["value"] = pair[place]
     words = "Cnβ falls by 9 % (0.590 → 0.537) and the size of Cnr rises by 2 % (−0.200 → −0.204)."
-    assert words in verdict(one, "")
+    assert words in verdict(findings_of(one), "")
     one["found"]["immaterial"] = {"cn_beta": 0.001}
-    assert "Cnβ falls by" not in verdict(one, "")
+    assert "Cnβ falls by" not in verdict(findings_of(one), "")
 
 
 def test_effects_say_their_sizes_as_a_person_would():
-    given = {"value": 0.0039991, "std": 4.1e-6, "unit": "N m"}
-    one = {"effect": "coulomb_friction", "probability": 0.9, "parameters": {"friction_moment": given}}
-    assert said_size(document(), one, "coulomb_friction") == "dry friction of 0.00400 N m"
-    given |= {"value": 0.0123, "std": 0.0012, "unit": "rad"}
-    one = {"effect": "free_play", "probability": 0.9, "parameters": {"half_width": given}}
+    def size(effect, parameter, given, asked=""):
+        one = Candidate(effect, 0.9, 0.0, 0.0, {parameter: given})
+        return said_size(findings_of(document()), one, asked or effect)
+
+    friction = Quantity(0.0039991, 4.1e-6, "N m")
+    assert size("coulomb_friction", "friction_moment", friction) == "dry friction of 0.00400 N m"
+    play = Quantity(0.0123, 0.0012, "rad")
     assert (
-        said_size(document(), one, "free_play")
-        == "play of 0.705 ± 0.069° to each side between spring and rod"
+        size("free_play", "half_width", play) == "play of 0.705 ± 0.069° to each side between spring and rod"
     )
-    assert said_size(document(), one, "cubic_stiffness") == ""
+    assert size("free_play", "half_width", play, "cubic_stiffness") == ""
 
 
 def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str, Any]:
@@ -486,11 +491,13 @@ def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str,
 
 def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
     given = of_model(0.03, "inertia", "damping")
-    assert verdict(given, "").endswith(
+    assert verdict(findings_of(given), "").endswith(
         "arm.xml does not fit: joint armature is 0.0100 kg m² in the file and 0.03000 ± 0.00020 kg m² by the "
         "runs."
     )
-    assert next_steps(given)[0] == ("Correct these values in arm.xml; --patch FILE writes a model with them.")
+    assert next_steps(findings_of(given))[0] == (
+        "Correct these values in arm.xml; --patch FILE writes a model with them."
+    )
     for fits in (
         of_model(0.0107, "inertia"),  # less than 1 % of the inertia
         of_model(0.03, "damping"),
@@ -498,8 +505,8 @@ def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
         of_model(0.03, "inertia", std=None),
         answer_of(),
     ):
-        assert "as given" not in verdict(fits, "")
-        assert not any("Correct these" in step for step in next_steps(fits))
+        assert "as given" not in verdict(findings_of(fits), "")
+        assert not any("Correct these" in step for step in next_steps(findings_of(fits)))
 
 
 def test_what_to_do_about_runs_is_said_once() -> None:
@@ -512,7 +519,7 @@ def test_what_to_do_about_runs_is_said_once() -> None:
         "remedy": "cut it by hand if that is wrong",
     }
     given["remarks"] = [left | {"runs": ["a"]}, left | {"runs": ["b"]}, cut]
-    steps = next_steps(given)
+    steps = next_steps(findings_of(given))
     assert steps.count("a, b: record it again.") == 1
     assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut
 
@@ -530,10 +537,11 @@ def test_a_robot_gets_the_advice_of_a_robot(driven):
         one["maps"]["runs"] = [run | {"wind_speed": 0.0} for run in one["maps"]["runs"]]
         one["next_run"] = None if driven else one["next_run"]
         for changed in (one, one | {"ambiguous_with": ["free_play"]}, one | {"decided": False}):
-            said = " ".join([*next_steps(changed), *rival_lines(changed)]).lower()
+            said = " ".join([*next_steps(findings_of(changed)), *rival_lines(findings_of(changed))]).lower()
             assert not [word for word in OF_A_TUNNEL if word in said], (kind.name, said)
     said = " ".join(
-        next_steps(one | {"decided": False}) + rival_lines(one | {"ambiguous_with": ["free_play"]})
+        next_steps(findings_of(one | {"decided": False}))
+        + rival_lines(findings_of(one | {"ambiguous_with": ["free_play"]}))
     )
     assert ("another input" in said) == driven
     assert ("release at" in said) != driven

@@ -471,5 +471,5 @@ def _diagnosed(session: Session) -> None:
 NEAR = document()["next_run"] | {"separation": 0.4}
 ESTIMATE = {
     "estimator": "output_error", "cn_beta": None, "cn_r": None, "yaw_inertia": None, "mechanical_damping": None,
-    "statuses": ["ok"], "remarks": [], "runs": [],
+    "statuses": ["ok"], "remarks": [], "runs": [], "trade_off": None,
 }  # fmt: skip

@@ -17,7 +17,7 @@ from starlette.requests import Request
 
 from diagnosis.findings.verdict import next_steps, run_to_make
 from identification.show.blocks import TextTable
-from tests.support.diagnosis_document import document
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work
 from tunnel_lab.bench.parts import Frame
@@ -194,6 +194,6 @@ def test_other_runs_differ_in_what_can_be_chosen() -> None:
         ({"coefficients": NORMALISED}, "other wind speeds and release angles,"),
         ({"model": {"file": "a.xml"}}, "other wind speeds and release angles,"),
     ):
-        steps = next_steps(document() | undecided | changes)
+        steps = next_steps(findings_of(document() | undecided | changes))
         assert any(words in step for step in steps), steps
-    assert run_to_make(document() | {"next_run": None}) is None
+    assert run_to_make(findings_of(document() | {"next_run": None})) is None

@@ -8,6 +8,7 @@ from pathlib import Path
 from nicegui import Client, ui
 from starlette.requests import Request
 
+from tests.support.diagnosis_document import findings_of
 from tests.support.import_files import decay
 from tunnel_lab.bench import diagnosis, identify
 from tunnel_lab.bench.left_out import left_out_of, options, runs_left_out
@@ -49,5 +50,5 @@ def test_runs_that_are_gone_are_not_left_out(tmp_path: Path) -> None:
 
 
 def test_a_report_is_of_the_runs_that_were_diagnosed() -> None:
-    assert left_out_of({"provenance": {"left_out": ["b"]}}) == ("b",)
-    assert left_out_of({}) == ()
+    assert left_out_of(findings_of({"provenance": {"left_out": ["b"]}})) == ("b",)
+    assert left_out_of(findings_of({})) == ()

@@ -78,7 +78,7 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     session.diagnosis.write_text(
         json.dumps(document() | {"verdict": "A gap.", "provenance": {"sha256": hashes}})
     )
-    monkeypatch.setattr(diagnosis, "Answer", lambda _, document: ui.label(document["verdict"]))
+    monkeypatch.setattr(diagnosis, "ShownAnswer", lambda _, answer: ui.label(answer.verdict))
     with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
         diagnosis.DiagnosePage(session, Frame("Diagnose", session, "diagnose"))
     shown = [one.text for one in client.elements.values() if isinstance(one, ui.label)]

@@ -33,13 +33,13 @@ def after(tmp_path: Path) -> Path:
         "cn_beta": {"value": 0.4829, "std": 0.0084, "unit": "1/rad"},
         "cn_r": {"value": 3.0, "std": None, "unit": "1/rad", "determined": False},
     }
-    calm = {"excess_before": 0.0123, "excess_after": 0.0123, "closed": 0.0}
+    calm = {"detected": False, "excess_before": 0.0123, "excess_after": 0.0123, "closed": 0.0}
     return written(
         tmp_path / "after.json",
         campaign="after",
         causes=[],
         ambiguous_with=[],
-        gap=calm,
+        gap=document()["gap"] | calm | {"misfit": None},
         candidates=[document()["candidates"][4] | {"probability": 0.9876}],
         coefficients={"before": estimates, "after": estimates},
         maps=None,
@@ -120,12 +120,14 @@ def test_campaigns_of_one_name_go_by_their_files(tunnel: Tunnel, tmp_path: Path)
     ("changes", "part"),
     [
         ({"schema_version": 2}, "schema_version is 2"),
-        ({"gap": {}}, "'excess_before' is missing"),
+        ({"gap": {}}, "gap.detected"),
         ({"candidates": []}, "'candidates' is empty"),
         ({"campaign": "two\nlines"}, "line breaks"),
+        ({"candidates": [document()["candidates"][0] | {"probability": 1.5}]}, "1.5"),
+        ({"gap": document()["gap"] | {"closed": -0.5}}, "-0.5"),
         (
             {"coefficients": {"before": {}, "after": {"zeta": {"value": "1", "std": None, "unit": "1"}}}},
-            "number",
+            "coefficients.after.zeta.va",
         ),
     ],
 )

@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
-from diagnosis.findings.coefficients import consequence
 from identification.estimate import Estimate, Status
 from identification.show.quantity import Quantity
 from tests.support.command import Tunnel
+from tests.support.diagnosis_document import findings_of
+from tests.support.rendered import consequence
 from tunnel_lab.bench.workspace import open_session
 from tunnel_lab.commands.demo import (
     PLAN,
@@ -56,14 +57,14 @@ def found_document(spring: float = 21.02, friction: float = 0.01, cn_beta: float
     answer = "coulomb_friction + spring_miscalibration"
     return {
         "causes": answer.split(" + "),
-        "candidates": [{"effect": answer, "parameters": sizes}],
+        "candidates": [{"effect": answer, "probability": 0.99, "parameters": sizes}],
         "coefficients": {"after": {"cn_beta": {"value": cn_beta, "std": 0.001, "unit": "1/rad"}}},
     }
 
 
 def test_what_was_planted_is_not_missed(faulty: CampaignPlan) -> None:
-    assert missed_faults(faulty, found_document()) == []
-    assert missed_faults(faulty, found_document(friction=0.01039, cn_beta=0.4758)) == []
+    assert missed_faults(faulty, findings_of(found_document())) == []
+    assert missed_faults(faulty, findings_of(found_document(friction=0.01039, cn_beta=0.4758))) == []
 
 
 @pytest.mark.parametrize(
@@ -77,13 +78,13 @@ def test_what_was_planted_is_not_missed(faulty: CampaignPlan) -> None:
 def test_a_fault_found_elsewhere_or_too_far_off_is_missed(
     faulty: CampaignPlan, found: dict[str, Any], missed: str
 ) -> None:
-    assert missed_faults(faulty, found) == [f"{missed} misses the truth by more than 4 std"]
+    assert missed_faults(faulty, findings_of(found)) == [f"{missed} misses the truth by more than 4 std"]
 
 
 def test_other_causes_are_said(faulty: CampaignPlan) -> None:
-    (said,) = missed_faults(faulty, {**found_document(), "causes": ["unknown"]})
+    (said,) = missed_faults(faulty, findings_of({**found_document(), "causes": ["unknown"]}))
     assert said == "planted coulomb_friction and spring_miscalibration, found unknown"
-    (said,) = missed_faults(faulty, {**found_document(), "causes": []})
+    (said,) = missed_faults(faulty, findings_of({**found_document(), "causes": []}))
     assert said.endswith("found none")
 
 
@@ -95,12 +96,12 @@ def test_the_values_before_are_those_of_the_verdict(faulty: CampaignPlan) -> Non
     found = found_document()
     before = {"cn_beta": {"value": 0.4897, "std": 0.018, "unit": "1/rad"}}
     found["coefficients"]["before"] = before
-    table = found_table(faulty, found)
+    table = found_table(faulty, findings_of(found))
     assert dict(zip(table.columns, table.rows[0], strict=True)) == {
         "quantity": "Cnβ [1/rad]", "planted": "0.4719", "nominal model": "0.490 ± 0.018",
         "with the causes": "0.4719 ± 0.0010", "error": "+0.0 σ",
     }  # fmt: skip
-    assert "(0.490 → 0.472)" in consequence(found)
+    assert "(0.490 → 0.472)" in consequence(findings_of(found))
 
 
 @pytest.mark.parametrize(

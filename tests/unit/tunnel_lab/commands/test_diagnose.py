@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.verdict import next_steps
+from diagnosis.result import Diagnosis
 from tests.reference.free_decays import Setting, campaign
 from tests.support.command import Tunnel
 from tests.support.plans import planned
@@ -70,7 +71,9 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
         assert text in out
     printed = out.splitlines()
     steps = printed[printed.index("What to do next:") + 1 :]
-    assert [f"{number}. {step}" for number, step in enumerate(next_steps(document), 1)] == steps[:-1]
+    assert [
+        f"{number}. {step}" for number, step in enumerate(next_steps(Diagnosis.from_json_dict(document)), 1)
+    ] == steps[:-1]
     assert len(steps) > 2  # and where the document is
     lines = [line.split() for line in printed]
     assert any(words[:1] == [CAUSE] for words in lines)

@@ -17,7 +17,7 @@ import pytest
 
 from tests.marks import slow
 from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
-from tests.support.diagnosis_document import campaign, document
+from tests.support.diagnosis_document import campaign, document, findings_of
 from tunnel_lab.report import Byline, render_report, security_policy, write_report, write_summary
 
 pytestmark = IN_A_BROWSER
@@ -29,7 +29,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     given["where"]["words"] = "Everywhere."
     given["provenance"] = {"versions": {"numpy": "2"}, "sha256": {"runs/alpha.csv": "ab" * 32}}
     path = tmp_path_factory.mktemp("report") / "report.html"
-    return write_report(given, campaign(), path, Byline("2026-05-31", "A. Smith"))
+    return write_report(findings_of(given), campaign(), path, Byline("2026-05-31", "A. Smith"))
 
 
 class Opened:
@@ -304,7 +304,9 @@ def expected_curves(given: dict[str, Any]) -> Iterator[tuple[str, int, int, int,
 
 def test_every_curve_and_cell_is_drawn_as_in_the_document(browser: Any, tmp_path: Path) -> None:
     given = holed()
-    report = write_report(given, campaign(), tmp_path / "report.html", Byline("2026-05-31", "A. Smith"))
+    report = write_report(
+        findings_of(given), campaign(), tmp_path / "report.html", Byline("2026-05-31", "A. Smith")
+    )
     tab = Opened(browser, report, 1200, KEEP_CHARTS)
     tab.open_all()
     gaps = 0
@@ -374,7 +376,7 @@ def without_causes(given: Any) -> None:
 def summary(change: Callable[[Any], None]) -> str:
     """The summary of the document with a change, which takes some seconds to draw."""
     change(given := document())
-    return render_report(given, campaign(), summary=True)
+    return render_report(findings_of(given), campaign(), summary=True)
 
 
 @pytest.mark.parametrize("change", [slow(lambda _: None), crowded, slow(without_causes)])
@@ -402,7 +404,7 @@ def test_the_summary_is_written_as_a_file_of_one_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tunnel_lab.report.page.render_report", lambda *_, **__: summary(crowded))
-    path = write_summary(document(), campaign(), tmp_path / "summary.pdf")
+    path = write_summary(findings_of(document()), campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
     assert size_of(path.read_bytes()) == A4

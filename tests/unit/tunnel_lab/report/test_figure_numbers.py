@@ -12,12 +12,10 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from diagnosis.findings.friction_curve import friction_figure
 from diagnosis.findings.misfit import run_labels
-from diagnosis.findings.place import backbone_figure
-from diagnosis.findings.remainder import law_figure
 from identification.show.style import styled
-from tests.support.diagnosis_document import CONDITIONS, IDS, document, rms, scattering_document
+from tests.support.diagnosis_document import CONDITIONS, IDS, document, findings_of, rms, scattering_document
+from tests.support.rendered import backbone_figure, friction_figure, law_figure
 from tests.support.shown_numbers import numbers
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
@@ -36,7 +34,7 @@ def band(area: Any) -> np.ndarray:
 
 
 def test_bars_of_the_answers(given: Document) -> None:
-    fig = answer.candidates_figure(given)
+    fig = answer.candidates_figure(findings_of(given))
     assert fig is not None
     axes, shown = fig.axes[0], given["candidates"][:4]  # the others are improbable
     assert [bar.get_width() for bar in axes.patches] == [c["probability"] for c in shown]
@@ -59,18 +57,18 @@ def test_bars_of_the_answers(given: Document) -> None:
 def test_one_probable_answer_needs_no_bars(given: Document) -> None:
     for candidate in given["candidates"][1:]:
         candidate["probability"] = 0.009
-    assert answer.candidates_figure(given) is None
+    assert answer.candidates_figure(findings_of(given)) is None
 
 
 def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
-    fig = answer.candidates_figure(given)
+    fig = answer.candidates_figure(findings_of(given))
     assert fig is not None
     assert fig.axes[0].texts[0].get_text() == "> 99 %"
 
 
 def test_points_of_the_closure(given: Document) -> None:
-    fig = answer.closure_figure(given)
+    fig = answer.closure_figure(findings_of(given))
     axes, runs = fig.axes[0], given["gap"]["runs"]
     before, held_out, fitted = axes.lines
     rows = [(rms(run["before"]), row) for row, run in enumerate(runs)]
@@ -92,7 +90,7 @@ def test_closure_without_maps_and_without_causes(given: Document) -> None:
     given["maps"] = None
     for run in given["gap"]["runs"]:
         run["after"] = run["before"]
-    axes = answer.closure_figure(given).axes[0]
+    axes = answer.closure_figure(findings_of(given)).axes[0]
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
     assert noise.x1 == pytest.approx(rms(0.03))
     assert len(axes.lines) == 1
@@ -103,7 +101,7 @@ def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> No
     grid = given["maps"]["grid"]
     if speeds is None:
         grid |= {"wind_speeds": None, "time_edges_s": [0.0, 2.5, 5.0, 7.5]}
-    fig = where.place_figure(given)
+    fig = where.place_figure(findings_of(given))
     assert fig is not None
     axes, (mesh,) = fig.axes[0], fig.axes[0].collections
     shown = np.ma.filled(mesh.get_array().astype(float), np.nan)
@@ -117,11 +115,11 @@ def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> No
         assert [label.get_text() for label in axes.get_xticklabels()] == ["off", "13.5", "21.5"]
     assert mesh.get_clim() == pytest.approx((0.0, rms(9.25)))
     del given["maps"]["grid"]
-    assert where.place_figure(given) is None
+    assert where.place_figure(findings_of(given)) is None
 
 
 def test_intervals_of_the_coefficients(given: Document) -> None:
-    fig = answer.coefficients_figure(given)
+    fig = answer.coefficients_figure(findings_of(given))
     assert fig is not None
     for axes, name in zip(fig.axes, ("cn_beta", "cn_r"), strict=True):
         for row, (key, container) in enumerate(zip(("before", "after"), axes.containers, strict=True)):
@@ -134,15 +132,15 @@ def test_intervals_of_the_coefficients(given: Document) -> None:
         bottom, top = axes.get_ylim()
         assert bottom > 1 > 0 > top  # before above after
     given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
-    alone = answer.coefficients_figure(given)
+    alone = answer.coefficients_figure(findings_of(given))
     assert alone is not None
     assert len(alone.axes) == 1
     given["coefficients"]["after"] = {}
-    assert answer.coefficients_figure(given) is None
+    assert answer.coefficients_figure(findings_of(given)) is None
 
 
 def test_the_map_of_runs(given: Document) -> None:
-    grid = where.runs_figure(given).axes[0]
+    grid = where.runs_figure(findings_of(given)).axes[0]
     image = np.ma.filled(grid.images[0].get_array().astype(float), np.nan)
     wanted = np.array([[60.0, 21.0, np.nan], [9.0, np.nan, 1.5], [2.0, 0.5, np.nan]])
     assert np.array_equal(image, wanted, equal_nan=True)  # cells below three times 0.017 √3 stay empty
@@ -155,14 +153,14 @@ def test_the_map_of_runs(given: Document) -> None:
 
 def test_a_map_within_the_noise_says_so(given: Document) -> None:
     given["maps"]["time"]["by_run"] = [[0.01, -0.02, None]] * 3
-    texts = where.runs_figure(given).axes[0].texts
+    texts = where.runs_figure(findings_of(given)).axes[0].texts
     assert [text.get_text() for text in texts] == ["every cell within the noise"]
-    assert not where.runs_figure(document()).axes[0].texts
+    assert not where.runs_figure(findings_of(document())).axes[0].texts
 
 
 @pytest.mark.parametrize(("place", "key", "edges"), [(0, "time", "edges_s"), (2, "amplitude", "edges_rad")])
 def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
-    axes = where.profiles_figure(given).axes[place]
+    axes = where.profiles_figure(findings_of(given)).axes[place]
     values, interval = given["maps"][key], given["where"][key + ("_s" if key == "time" else "_rad")]
     shade, noise, mean = axes.patches
     shown = np.degrees if key == "amplitude" else np.asarray
@@ -181,7 +179,7 @@ def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
 
 
 def test_the_share_of_the_missing_moment(given: Document) -> None:
-    fig = where.profiles_figure(given)
+    fig = where.profiles_figure(findings_of(given))
     (beside,) = (axes for axes in fig.axes if "%" in axes.get_ylabel())
     drawn = beside.patches[0].get_data()
     assert drawn.values == pytest.approx([55.0, 34.0, 11.0])
@@ -193,11 +191,11 @@ def test_the_share_of_the_missing_moment(given: Document) -> None:
 
 def test_no_interval_no_shade(given: Document) -> None:
     given["where"]["time_s"] = None
-    assert len(where.profiles_figure(given).axes[0].patches) == 2
+    assert len(where.profiles_figure(findings_of(given)).axes[0].patches) == 2
 
 
 def test_the_spectrum(given: Document) -> None:
-    axes = where.spectrum_figure(given).axes[0]
+    axes = where.spectrum_figure(findings_of(given)).axes[0]
     values = given["maps"]["frequency"]
     before, after = (np.array(curve(line)) for line in axes.lines)
     centres = [np.sqrt(0.5 * 1.0), np.sqrt(1.0 * 4.0), np.sqrt(4.0 * 16.0)]
@@ -218,12 +216,12 @@ def test_the_spectrum(given: Document) -> None:
 
 def test_a_spectrum_without_causes_has_one_curve(given: Document) -> None:
     given["maps"]["frequency"]["after"] = None
-    assert len(where.spectrum_figure(given).axes[0].lines) == 1
+    assert len(where.spectrum_figure(findings_of(given)).axes[0].lines) == 1
 
 
 def test_backbones(given: Document) -> None:
     given["maps"]["backbones"][1]["time_s"] = [1.0]  # one window makes no curve
-    fig = backbone_figure(given)
+    fig = backbone_figure(findings_of(given))
     frequency, damping = fig.axes
     swings = np.degrees([0.1, 0.2, 0.3]).tolist()
     for axes, values, stds in (
@@ -247,7 +245,7 @@ def test_no_two_backbones_are_of_one_colour(given: Document) -> None:
     for name in ("backbones", "runs"):
         first = given["maps"][name][0]
         given["maps"][name] = [first | {"id": f"run-{i}"} for i in range(12)]
-    _, damping = backbone_figure(given).axes
+    _, damping = backbone_figure(findings_of(given)).axes
     curves = damping.lines[:-1]
     assert len({to_hex(line.get_color()) for line in curves}) == len(curves) == 12
 
@@ -256,14 +254,14 @@ def test_no_two_backbones_are_of_one_colour(given: Document) -> None:
 def test_the_legend_of_the_backbones_is_no_wider_than_the_figure(given: Document, size: int) -> None:
     for run, curve in zip(given["maps"]["runs"], given["maps"]["backbones"], strict=True):
         run["id"] = curve["id"] = run["id"].rjust(size, "w")
-    fig = backbone_figure(given)
+    fig = backbone_figure(findings_of(given))
     styled(fig.draw_without_rendering)()
     legend = fig.legends[0].get_window_extent()
     assert 0.0 <= legend.x0 < legend.x1 <= fig.bbox.x1
 
 
 def test_the_runs_that_carry_the_gap_are_drawn_first(given: Document) -> None:
-    labels = [line.get_label() for line in backbone_figure(given).axes[1].lines[:3]]
+    labels = [line.get_label() for line in backbone_figure(findings_of(given)).axes[1].lines[:3]]
     assert [label.split(" ")[0] for label in labels] == ["alpha", "gamma", "beta"]
 
 
@@ -272,7 +270,7 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
     plane = given["maps"]["phase_plane"]
     for name in ("moment", "std"):
         plane[name] = [[None if v is None else size * v for v in row] for row in plane[name]]
-    fig = where.phase_plane_figure(given)
+    fig = where.phase_plane_figure(findings_of(given))
     assert fig is not None
     field = fig.axes[0]
     image = np.ma.filled(field.images[0].get_array().astype(float), np.nan)
@@ -283,7 +281,7 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
     assert high == pytest.approx(factor * size * np.quantile([0.012, 0.025, 0.001], 0.98))
     assert field.images[0].get_extent() == pytest.approx(np.degrees([-0.4, 0.4, -0.4, 0.4]).tolist())
     assert any(f"[{unit}]" in axes.get_xlabel() for axes in fig.axes)
-    means = where.moment_figure(given)
+    means = where.moment_figure(findings_of(given))
     assert means is not None
     for axes, name in zip(means.axes, ("by_angle", "by_rate"), strict=True):
         assert f"[{unit}]" in axes.get_ylabel()
@@ -298,8 +296,8 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
 
 def test_no_phase_plane_no_figure(given: Document) -> None:
     given["maps"]["phase_plane"] = None
-    assert where.phase_plane_figure(given) is None
-    assert where.moment_figure(given) is None
+    assert where.phase_plane_figure(findings_of(given)) is None
+    assert where.moment_figure(findings_of(given)) is None
 
 
 def test_the_label_of_a_run_holds_its_conditions(given: Document) -> None:
@@ -322,7 +320,12 @@ def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Documen
         "values": [3.0, 1.0, -2.0],
         "std": [0.1, 0.2, 0.3],
     }
-    fig = law_figure(given | {"closable": {"curve": law | {"unit": "N m"}}})
+
+    def drawn(unit: str) -> Any:
+        closable = {"ceilings": [], "kind": "angle", "curve": law | {"unit": unit}}
+        return law_figure(findings_of(given | {"closable": closable}))
+
+    fig = drawn("N m")
     assert fig is not None
     (axes,) = fig.axes
     (line,) = axes.lines
@@ -332,19 +335,19 @@ def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Documen
     assert band(axes.collections[0]) == pytest.approx(np.array(low_high))
     assert axes.get_xlabel() == "angle [°]"
     assert axes.get_ylabel() == "missing moment [N m]"
-    (reading,) = law_figure(given | {"closable": {"curve": law | {"unit": "rad"}}}).axes
+    (reading,) = drawn("rad").axes
     np.testing.assert_allclose([y for _, y in curve(reading.lines[0])], np.degrees([3.0, 1.0, -2.0]))
     assert reading.get_ylabel() == "error of the reading [°]"
 
 
 def test_friction_is_drawn_with_its_band_and_the_points_with_their_errors(given: Document) -> None:
-    assert friction_figure(given) is None
+    assert friction_figure(findings_of(given)) is None
     found = {
         "effect": "coulomb_friction", "unit": "N m",
         "rate_rad_s": [0.1, 1.0], "moment": [3.0, 2.0], "std": [0.1, 0.2],
         "points": [{"rate_rad_s": 0.2, "moment": 2.5, "std": 0.05, "strokes": 3}],
     }  # fmt: skip
-    fig = friction_figure(given | {"maps": given["maps"] | {"friction": found}})
+    fig = friction_figure(findings_of(given | {"maps": given["maps"] | {"friction": found}}))
     assert fig is not None
     (axes,) = fig.axes
     assert curve(axes.lines[0]) == [(0.1, 3.0), (1.0, 2.0)]
@@ -356,13 +359,15 @@ def test_friction_is_drawn_with_its_band_and_the_points_with_their_errors(given:
     assert points.lines[2][0].get_segments()[0][:, 1] == pytest.approx([2.402, 2.598])
     assert axes.get_ylim()[0] == 0.0
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("rate [rad/s]", "coulomb friction [N m]")
-    (other,) = friction_figure(given | {"maps": {"friction": found | {"unit": "rad/s2", "points": []}}}).axes
+    (other,) = friction_figure(
+        findings_of(given | {"maps": {"friction": found | {"unit": "rad/s2", "points": []}}})
+    ).axes
     assert other.get_ylabel() == "coulomb friction [rad/s², over inertia]"
 
 
 def test_every_run_is_drawn_against_the_model_with_its_band() -> None:
     given = scattering_document()
-    fig = answer.repeatability_figure(given)
+    fig = answer.repeatability_figure(findings_of(given))
     assert fig is not None
     runs = given["repeatability"]["runs"]
     for axes, name in zip(fig.axes, ("frequency", "damping"), strict=True):
@@ -391,20 +396,20 @@ def test_runs_that_repeat_have_bands_of_the_noise_and_a_single_run_no_figure() -
     found |= {"spreads": [], "outlier": ""}
     for run in found["runs"]:
         run |= {"frequency_band": 0.0, "damping_band": 0.0}
-    fig = answer.repeatability_figure(given)
+    fig = answer.repeatability_figure(findings_of(given))
     assert fig is not None
     widths = [bar.get_width() for bar in fig.axes[0].patches]
     assert widths == [pytest.approx(2 * 196 * run["frequency_std"]) for run in found["runs"]]
     assert "noise (95 %)" in [text.get_text() for text in fig.legends[0].get_texts()]
     given["repeatability"]["runs"] = found["runs"][:1]
-    assert answer.repeatability_figure(given) is None
+    assert answer.repeatability_figure(findings_of(given)) is None
     given["repeatability"] = None
-    assert answer.repeatability_figure(given) is None
+    assert answer.repeatability_figure(findings_of(given)) is None
 
 
 def test_scatter_between_runs_is_one_bar_of_the_waterfall_and_of_the_answers() -> None:
     given = scattering_document()
-    for fig in (answer.waterfall_figure(given), answer.candidates_figure(given)):
+    for fig in (answer.waterfall_figure(findings_of(given)), answer.candidates_figure(findings_of(given))):
         assert fig is not None
         labels = " ".join(label.get_text() for label in fig.axes[0].get_yticklabels()).replace("\n", " ")
         assert "scatter between runs" in labels

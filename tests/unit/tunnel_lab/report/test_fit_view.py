@@ -13,6 +13,7 @@ import pytest
 from diagnosis.compose import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report.charts import fit_charts, fit_figure, fit_pages
 from tunnel_sim.effects import effect_class, effect_from
@@ -23,7 +24,7 @@ CAUSE = "quadratic_damping"
 
 
 def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:
-    fits, residuals = fit_charts(given)["fit"]
+    fits, residuals = fit_charts(findings_of(given))["fit"]
     assert [one["label"] for one in fits["series"]] == ["measured", "nominal model", "with the causes"]
     assert [one["label"] for one in residuals["series"]] == ["nominal model", "with the causes"]
     for over, below, trace in zip(fits["views"], residuals["views"], given["maps"]["traces"], strict=True):
@@ -48,7 +49,7 @@ def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(
 
 
 def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Document) -> None:
-    fig = fit_figure(given)
+    fig = fit_figure(findings_of(given))
     assert fig is not None
     for column, trace in enumerate(given["maps"]["traces"]):
         whole, near, left = (fig.axes[2 * row + column] for row in range(3))
@@ -69,30 +70,30 @@ def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Documen
 
 
 def test_any_run_can_be_chosen_and_another_is_refused(given: Document) -> None:
-    fig = fit_figure(given, ["gamma"])
+    fig = fit_figure(findings_of(given), ["gamma"])
     assert fig is not None
     assert len(fig.axes) == 3
     assert "gamma" in fig.axes[0].get_title(loc="left")
     with pytest.raises(TunnelError, match=r"no run 'delta'.*alpha, gamma"):
-        fit_figure(given, ["delta"])
+        fit_figure(findings_of(given), ["delta"])
     given["maps"]["traces"] *= 2
     for name, trace in zip("abcd", given["maps"]["traces"], strict=True):
         given["maps"]["traces"]["abcd".index(name)] = trace | {"id": name}
-    assert [len(page.axes) for page in fit_pages(given)] == [6, 6]
+    assert [len(page.axes) for page in fit_pages(findings_of(given))] == [6, 6]
 
 
 @pytest.mark.parametrize(("unit", "shown"), [("rad", "°"), ("rad/s", "°/s"), ("rad/s2", "°/s²")])
 def test_the_unit_is_that_of_the_readings(given: Document, unit: str, shown: str) -> None:
     given["maps"]["unit"] = unit
-    assert fit_charts(given)["fit"][0]["y"]["label"] == f"reading [{shown}]"
+    assert fit_charts(findings_of(given))["fit"][0]["y"]["label"] == f"reading [{shown}]"
 
 
 def test_no_maps_no_fit(given: Document) -> None:
-    assert fit_figure(given | {"maps": None}) is None
-    assert fit_charts(given | {"maps": None}) == {}
+    assert fit_figure(findings_of(given | {"maps": None})) is None
+    assert fit_charts(findings_of(given | {"maps": None})) == {}
     for trace in given["maps"]["traces"]:
         del trace["reading_rad"]  # a document of an earlier version
-    assert fit_charts(given) == {}
+    assert fit_charts(findings_of(given)) == {}
 
 
 def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ() -> None:

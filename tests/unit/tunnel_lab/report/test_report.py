@@ -10,18 +10,21 @@ import pytest
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
 from diagnosis.compose import localise
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap, waterfall_figure
+from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
 from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.decision import decision
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.remainder.closable import Closable, Curve
 from diagnosis.result import Diagnosis
+from diagnosis.settings import Settings
+from identification.estimate import Quantity
 from identification.show.drawing import THEMED, inline_svg
-from identification.show.quantity import Quantity
-from tests.support.diagnosis_document import scattering_document
+from tests.support.diagnosis_document import findings_of, scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
+from tests.support.rendered import waterfall_figure
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
 from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.page import DESCRIPTIONS
@@ -81,6 +84,7 @@ def document(data):
         ),
         confirmation=Confirmation(True, 1.2e-5, "r2", 6e-6, 4e-5),
         noise=NoiseSummary(4e-4, 4e-4, "estimated", "from the records"),
+        decision=decision([(CAUSE, 0.912), ("coulomb_friction", 0.08)], Settings().answer),
         blind_spots=("an error of the clock",),
         cautions=("There is one run only.",),
         closable=CLOSABLE,
@@ -96,7 +100,7 @@ def document(data):
 
 @pytest.fixture(scope="module")
 def page(document, data):
-    return render_report(document, data)
+    return render_report(findings_of(document), data)
 
 
 @pytest.fixture
@@ -104,7 +108,7 @@ def written(monkeypatch, data):
     """Renders a page with empty figures: they take nearly all of the time, and are in ``page``."""
     monkeypatch.setattr("tunnel_lab.report.page.diagnosis_figures", lambda _: dict.fromkeys(DESCRIPTIONS))
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
-    return lambda document, *byline: render_report(document, data, *byline)
+    return lambda document, *byline: render_report(findings_of(document), data, *byline)
 
 
 class Page(HTMLParser):
@@ -229,18 +233,18 @@ def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, documen
 
 @pytest.mark.slow
 def test_the_same_document_gives_the_same_page(page, document, data):
-    assert render_report(document, data) == page
+    assert render_report(findings_of(document), data) == page
 
 
 def test_the_same_document_gives_the_same_text_and_the_same_figure_the_same_drawing(document, written):
     assert written(document) == written(document)
-    drawings = [inline_svg(waterfall_figure(document), "steps", "The steps.") for _ in range(2)]
+    drawings = [inline_svg(waterfall_figure(findings_of(document)), "steps", "The steps.") for _ in range(2)]
     assert drawings[0] == drawings[1]
 
 
 def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
     bare = {key: value for key, value in document.items() if key != "maps"}
-    path = write_report(bare, data, tmp_path / "report.html")
+    path = write_report(findings_of(bare), data, tmp_path / "report.html")
     text = path.read_text("utf-8")
     assert document["where"]["words"] in Page(text).text
     assert text.count("<svg") == 6
@@ -253,7 +257,7 @@ def test_no_gap_is_said_so(document, written):
     }  # fmt: skip
     text = Page(written(calm)).text
     assert "No gap: all is noise." in text
-    assert list(diagnosis_figures(calm)) == [
+    assert list(diagnosis_figures(findings_of(calm))) == [
         "waterfall",
         "which",
         "repeatability",
@@ -267,13 +271,13 @@ def test_no_gap_is_said_so(document, written):
 @pytest.mark.usefixtures("written")
 def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
     with pytest.raises(TunnelError, match="cannot be written"):
-        write_report(document | {"maps": None}, data, tmp_path / "nowhere" / "report.html")
+        write_report(findings_of(document | {"maps": None}), data, tmp_path / "nowhere" / "report.html")
 
 
 def test_every_figure_is_described(document):
-    without_maps = diagnosis_figures(document | {"maps": None, "repeatability": None})
+    without_maps = diagnosis_figures(findings_of(document | {"maps": None, "repeatability": None}))
     assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
-    assert list(diagnosis_figures(document)) == list(DESCRIPTIONS)
+    assert list(diagnosis_figures(findings_of(document))) == list(DESCRIPTIONS)
 
 
 def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
@@ -313,7 +317,7 @@ def test_hashes_and_versions_are_on_the_page(document, written):
 def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monkeypatch):
     monkeypatch.setattr("tunnel_lab.report.page.shutil.which", lambda _: None)
     with pytest.raises(TunnelError, match=r"no Chromium to print with.*--report"):
-        write_summary(document, data, tmp_path / "summary.pdf")
+        write_summary(findings_of(document), data, tmp_path / "summary.pdf")
     assert not (tmp_path / "summary.pdf").exists()
 
 
@@ -321,5 +325,5 @@ def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypat
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
     with pytest.raises(TunnelError, match="Chromium could not print"):
-        write_summary(document | {"maps": None}, data, tmp_path / "summary.pdf")
+        write_summary(findings_of(document | {"maps": None}), data, tmp_path / "summary.pdf")
     assert not (tmp_path / "summary.pdf").exists()

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from matplotlib.transforms import Bbox
 
-from diagnosis.findings.closure import waterfall_figure
 from tests.marks import slow
-from tests.support.diagnosis_document import CAUSE, RIVAL, rms
+from tests.support.diagnosis_document import CAUSE, RIVAL, findings_of, rms
+from tests.support.rendered import waterfall_figure
 from tests.support.shown_numbers import assert_shows
 
 Document = dict[str, Any]
 
 
 def axes_of(given: Document) -> Any:
-    fig = waterfall_figure(given)
+    fig = waterfall_figure(findings_of(given))
     assert fig is not None
     (axes,) = fig.axes
     return axes
@@ -63,7 +63,7 @@ def test_below_the_noise_it_ends_at_zero_and_says_so(given: Document) -> None:
     axes = axes_of(given)
     assert dots(axes)[1] == (0.0, 3.0)
     assert axes.texts[-1].get_text() == "within the noise"
-    assert waterfall_figure(given | {"waterfall": given["waterfall"][:1]}) is None
+    assert waterfall_figure(findings_of(given | {"waterfall": given["waterfall"][:1]})) is None
 
 
 def test_a_document_without_misfit_is_drawn_in_the_noise(given: Document) -> None:

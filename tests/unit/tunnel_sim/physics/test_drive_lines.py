@@ -1,5 +1,3 @@
-from tunnel_sim.vocabulary.rig import Actuator
-
 """Inputs as one line for each step move a body as their samples do, between which the step ends early."""
 
 from dataclasses import replace
@@ -13,6 +11,7 @@ from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.rig import Actuator
 
 DURATION = 3.0  # s
 

@@ -193,3 +193,9 @@ def test_an_answer_of_another_kind_is_refused_where_it_is_read(key, value):
     for truth in ({}, {"effects": 1}, {"effects": ["x"], "severity": "y"}, {"effects": [], "cn_r": []}):
         with pytest.raises(ValueError, match="validation error"):
             case("c", truth, good)
+
+
+@pytest.mark.parametrize("bad", [0, "x", [], {"settings": 0}, {"settings": {"answer.decided_from": "x"}}])
+def test_a_provenance_that_is_none_is_refused(bad):
+    with pytest.raises(ValueError, match="validation error"):
+        case("c", {"effects": []}, document([]) | {"provenance": bad})
