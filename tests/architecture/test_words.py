@@ -49,8 +49,8 @@ def sentences(source: str) -> list[str]:
 def modules() -> list[Path]:
     """The modules outside the rooms that hold sentences.
 
-    Those are the findings, the settings, whose origins are a page, and the nominal models, each of which brings what
-    is said of it alone in its one file.
+    Those are the findings, the settings, whose origins are a page, and the nominal models, each of which brings
+    what is said of it alone in its one file.
     """
     rooms = {"findings", "settings", "model"}
     return [path for path in sorted(ROOT.rglob("*.py")) if rooms.isdisjoint(path.relative_to(ROOT).parts)]
