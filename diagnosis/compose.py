@@ -28,24 +28,17 @@ from diagnosis.findings.closure import GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision, Predictions, decision
 from diagnosis.findings.finding import Answered
-from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import other_hold
-from diagnosis.findings.judgements import (
-    cautions,
-    immaterial,
-    nearly,
-    outside_the_fits,
-    spring_choices,
-    zeros_apart,
-)
+from diagnosis.findings.judgements import cautions, immaterial, nearly, outside_the_fits, zeros_apart
 from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
+from diagnosis.findings.spring_choices import spring_choices
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
@@ -54,7 +47,7 @@ from diagnosis.findings.units import (
     own_repeatability,
     sized_coefficients,
 )
-from diagnosis.findings.whole import findings_of
+from diagnosis.findings.whole import Found, findings_of
 from diagnosis.likelihood.compression import in_shorter_blocks
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.fact import Fact, as_stated
