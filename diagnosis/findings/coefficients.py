@@ -20,6 +20,7 @@ from identification.show.numbers import (
     explained,
     for_people,
     listed,
+    percent_of,
     plain,
     significant,
     size_change,
@@ -198,15 +199,25 @@ _MOST = 0.5  # of a variance: more than all its other sources together
 def hidden_table(hidden: Sequence[Hidden], given: Coefficients) -> TextTable:
     """Upper limits on undetected effects, and the change of each coefficient at that size."""
     rows = []
-    names = [name for name in given.after if hidden and name in hidden[0].moves]
+    moves = next((one.moves for one in hidden if one.moves), {})
+    names = [name for name in given.after if name in moves]
     for one in hidden:
-        size = f"{significant(one.size.value, 2)}{unit_mark(beside(one.size.unit))}"
-        moves = [significant(one.moves[name].value, 2) for name in names]
-        rows.append((plain(one.effect), size, *moves))
-    heads = [f"would change {coefficient_label(name, hidden[0].moves[name].unit)} by" for name in names]
-    units = explained({one.size.unit for one in hidden})
+        cells = [significant(one.moves[name].value, 2) if one.moves else "–" for name in names]
+        rows.append((plain(one.effect), _limit(one, one.size.value), *cells))
+    heads = [f"would change {coefficient_label(name, moves[name].unit)} by" for name in names]
+    units = explained({one.size.unit for one in hidden if one.size.determined})
     title = f"Upper limits on undetected effects (95 %), which ± does not include{units}"
     return TextTable(title, ("effect", "at most", *heads), tuple(rows), ("at most", *heads))
+
+
+def _limit(one: Hidden, value: float) -> str:
+    """The largest size of an undetected effect, with its unit; relative changes in per cent."""
+    if not one.size.determined:
+        return "not determined"
+    infos = (kind.parameters()[0] for kind in known_effects() if kind.name == one.effect)
+    if one.size.unit == "1" and any(info.relative for info in infos):
+        return percent_of(value)
+    return f"{significant(value, 2)}{unit_mark(beside(one.size.unit))}"
 
 
 def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
@@ -228,7 +239,7 @@ def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
         general = template == general_form
         if not moved or (general and any(said for said, _ in clauses)):
             continue
-        size = f"{significant(abs(one.size.value), 2)}{unit_mark(beside(one.size.unit))}"
+        size = _limit(one, abs(one.size.value))
         changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
         words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
         clause = template.format(changes=changes, **words)

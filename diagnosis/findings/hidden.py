@@ -44,8 +44,9 @@ class Hidden:
     Args:
         effect: its name.
         parameter: name of its severity.
-        size: that parameter, of the sign that allows more, with its unit.
-        moves: by coefficient, the size of its change by the effect, with its unit.
+        size: that parameter, of the sign that allows more, with its unit; not determined where no refit confirms
+            a limit.
+        moves: by coefficient, the size of its change by the effect, with its unit; empty without a limit.
         significance: standard deviations by which its likeliest size differs from zero, a ratio.
     """
 
@@ -71,7 +72,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
             own; each of shape (n,).
 
     Returns:
-        In the given order, without effects that the runs cannot limit.
+        In the given order, without effects that the runs cannot show.
     """
     chosen = fit.settings.answer
     total = fit.total if left is None else sum(float(r @ r) for r in left)
@@ -88,8 +89,11 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
         sizes.sort(key=lambda one: -float(np.max(np.abs(one[0].moves))))
         tried = (_confirmed(fit, start, one, reach) for one, start in sizes)
         largest = next((one for one in tried if one is not None), None)
-        if largest is not None:
-            severity = kind.parameters()[0]
+        severity = kind.parameters()[0]
+        if largest is None and sizes:
+            unknown = Quantity(sizes[0][0].size, None, severity.unit, determined=False)
+            hidden.append(Hidden(kind.name, severity.name, unknown, {}))
+        elif largest is not None:
             size = Quantity(largest.size, None, severity.unit)
             moves = {
                 name: Quantity(float(abs(move)), None, units[name])

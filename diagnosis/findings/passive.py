@@ -65,16 +65,18 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
         The same. Where the deviation of ``zeta`` or ``mechanical_damping`` exceeds the bounds, the interval is that
         of the distribution within them, and the standard deviation its root mean square distance from the value.
         The damping is not negative. Beside named causes in free decays without wind it is at most the whole rate
-        of the fitted motion, since no such cause feeds the motion.
+        of the fitted motion, since no such cause feeds the motion. Where the runs show only the sum of the damping
+        and of another loss, its distribution within the bounds is uniform, also where the fit ends at one of them.
     """
     found, chosen = dict(given), study.settings.answer
     if not study.named:
         return found
     for name in ("zeta", "mechanical_damping"):
         estimate = given.get(name)
-        if estimate is None or estimate.bound is not None or estimate.std == 0.0:
+        shared = _shared(study.chosen)
+        if estimate is None or estimate.std == 0.0 or (estimate.bound is not None and not shared):
             continue
-        std = math.inf if estimate.std is None else estimate.std
+        std = math.inf if estimate.std is None or shared else estimate.std
         upper = _greatest(study, name)
         if upper is None:
             if estimate.std is None or estimate.value - _FAR * std >= 0.0:
@@ -86,9 +88,17 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
         own = truncated(value, min(std, 1e6 * upper), 0.0, upper, chosen.coefficient_interval)
         apart = math.hypot(own.std, own.mean - value)
         found[name] = replace(
-            estimate, value=value, std=min(std, apart), interval=own.interval, determined=True
+            estimate, value=value, std=min(std, apart), interval=own.interval, bound=None, determined=True
         )
     return found
+
+
+def _shared(fit: Fit) -> bool:
+    """Whether the runs leave open which share of a loss is the mechanical damping."""
+    if fit.left_open is None or "mechanical_damping" not in fit.problem.names:
+        return False
+    place = fit.problem.names.index("mechanical_damping")
+    return bool(fit.left_open[place, place] > fit.covariance[place, place])
 
 
 def _greatest(study: Study, name: str) -> float | None:

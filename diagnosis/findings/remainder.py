@@ -135,7 +135,7 @@ def remainder(
         stated: the coefficients of the answer's fit with their standard deviations.
         moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
         excess: on held-out readings, in noise variances of a sample.
-        hidden: the effects that could hide beside the answer.
+        hidden: the effects that could hide beside the answer; those without a limit do not count.
     """
     random, chosen = study.random, study.settings.answer
     if random is not None:  # its runs have innovations
@@ -148,6 +148,7 @@ def remainder(
     else:  # no cause changes the tests of the noise itself: those of the residuals count
         noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
         p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
+    hidden = [one for one in hidden if one.size.determined]
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
     shown = further is not None and by_effect < chosen.remains_rate <= p_value

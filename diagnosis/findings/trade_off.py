@@ -22,11 +22,16 @@ from tunnel_sim.vocabulary.dimensions import angle_power, dimension
 def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
     """The trade-off among the common parameters of a fit; None where the runs separate all of them.
 
-    A parameter at the end of its range is not free, and is excluded.
+    A parameter at the end of its range counts only beside one with which it adds up: the runs determine their sum,
+    and the bound limits the split.
     """
-    free = [place for place, name in enumerate(fit.problem.names) if fit.bound(name) is None]
-    names, of = [fit.problem.names[place] for place in free], roles(fit)
-    covariance = fit.stated_covariance[np.ix_(free, free)]
+    names, of, covariance = fit.problem.names, roles(fit), fit.stated_covariance.copy()
+    shapes = [of[name].amplitude is None for name in names]
+    for place, name in enumerate(names):
+        if fit.bound(name) is not None:
+            apart = shapes | (covariance[place] >= 0.0) if not shapes[place] else np.full(len(names), True)
+            apart[place] = False
+            covariance[place, apart] = covariance[apart, place] = 0.0
     found = trade_off(names, covariance, of, Setting.of(campaign), fit.settings.answer.trades_off_from)
     if found is None or any(of[name].amplitude is None for name in found.parameters):
         return found

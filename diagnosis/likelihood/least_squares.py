@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,6 +22,8 @@ _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than without the added effect
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
 _CORRECTIONS = 2  # of the runs' own parameters after a step
+_SINGULAR = 1e-12  # of the greatest eigenvalue: a smaller one is of a direction that the runs leave open
+_TAKES_PART = 1e-6  # of a unit vector: smaller parts are rounding
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
@@ -174,8 +177,42 @@ class Fit:
 
     @property
     def stated_covariance(self) -> Array:
-        """Covariance of the common parameters, other minima included, shape (common, common)."""
-        return self.covariance if self.spread is None else self.covariance + self.spread
+        """Covariance of the common parameters, other minima and open directions included, (common, common)."""
+        parts = (one for one in (self.spread, self.left_open) if one is not None)
+        return sum(parts, self.covariance)
+
+    @cached_property
+    def left_open(self) -> Array | None:
+        """Covariance along the directions that the runs leave open, shape (common, common); None without any.
+
+        ``covariance`` is a pseudo-inverse, with a variance of zero along them. The distribution along an open
+        direction is uniform as far as the parameters' bounds allow, such as the shares of viscous and structural
+        loss in the damping of a single spring. A parameter without any effect on the readings is not counted.
+        """
+        none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
+        matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
+        shown = np.flatnonzero(np.diag(matrix) > 0.0)
+        if not shown.size:
+            return None
+        scale = np.sqrt(np.diag(matrix)[shown])
+        values, vectors = np.linalg.eigh(matrix[np.ix_(shown, shown)] / np.outer(scale, scale))
+        least = _SINGULAR * values[-1]
+        found = np.zeros_like(matrix)
+        for vector in vectors.T[np.abs(values) <= least]:
+            along = np.zeros(len(matrix))
+            along[shown] = np.where(np.abs(vector) > _TAKES_PART, vector, 0.0) / scale
+            low, high = self._range(along)
+            far = 1.0 / math.sqrt(least)
+            low, high = max(low, -far), min(high, far)
+            square = (high * high + high * low + low * low) / 3.0  # mean, about the fit
+            found += square * np.outer(along, along)
+        return found if found.any() else None
+
+    def _range(self, along: Array) -> tuple[float, float]:
+        """The least and the greatest multiple of a direction by which the parameters may move within bounds."""
+        moves = along != 0.0
+        ends = [(limits - self.point.common)[moves] / along[moves] for limits in self.problem.bounds]
+        return float(np.minimum(*ends).max()), float(np.maximum(*ends).min())
 
     def bound(self, name: str) -> str | None:
         """``lower`` or ``upper`` where a common parameter is at that bound; None inside its range."""
@@ -323,7 +360,7 @@ class _State:
         none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
         matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
         scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-        inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=_SINGULAR, hermitian=True)
         return Fit(
             self.problem,
             self.here.point,

@@ -263,7 +263,7 @@ class WindSpeedDrift(Effect):
     )
 
     drift: float = parameter(
-        "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0
+        "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0, relative=True
     )
     settling: float = settling()
 

@@ -20,7 +20,7 @@ from tunnel_sim.vocabulary.record import Array
 
 def _spread(meaning: str, scale: float) -> Any:
     """The standard deviation between runs, relative."""
-    return parameter("σ", "1", meaning, scale=scale, lower=0.0, upper=WIDEST_SCATTER)
+    return parameter("σ", "1", meaning, scale=scale, lower=0.0, upper=WIDEST_SCATTER, relative=True)
 
 
 @dataclass(frozen=True)

@@ -269,7 +269,7 @@ class SpringMiscalibration(Effect):
     tries = 2
 
     error: float = parameter(
-        "x", "1", "true over stated stiffness, minus one", scale=0.02, lower=-0.9, upper=9.0
+        "x", "1", "true over stated stiffness, minus one", scale=0.02, lower=-0.9, upper=9.0, relative=True
     )
     spring_stiffness: float = parameter(
         "Kr", "N m/rad", "stated stiffness of the spring concerned",

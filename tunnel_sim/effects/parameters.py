@@ -43,6 +43,7 @@ class ParameterInfo:
         along_run: whether it shapes a change along the run.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
+        relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
     """
 
     name: str
@@ -64,6 +65,7 @@ class ParameterInfo:
     of_input: bool
     along_run: bool
     of_load: bool
+    relative: bool
 
     @property
     def form_start(self) -> float:
@@ -110,6 +112,7 @@ def parameter(
     of_input: bool = False,
     along_run: bool = False,
     of_load: bool = False,
+    relative: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -130,6 +133,7 @@ def parameter(
         "of_input": of_input,
         "along_run": along_run,
         "of_load": of_load,
+        "relative": relative,
     }
     return field(default=default, metadata=metadata)
 

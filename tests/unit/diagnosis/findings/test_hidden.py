@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from diagnosis import diagnose
 from diagnosis.answer.linear_theory import starts_beside
+from diagnosis.findings import hidden
 from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients, possible_answers
-from diagnosis.findings.hidden import hidden_effects
+from diagnosis.findings.hidden import Hidden, hidden_effects
 from diagnosis.findings.sections import printed
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
@@ -136,13 +138,41 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     drift = {**lag, "effect": "wind_speed_drift", "size": {"value": 2e-4, "std": None, "unit": "1"}}
     both = hidden_line(findings_of(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]}))
     assert both.endswith(
-        "Wind speed drift of up to 0.00020 is not excluded and would change Cnr by 0.0061 1/rad."
+        "Wind speed drift of up to 0.020 % is not excluded and would change Cnr by 0.0061 1/rad."
     )
+    vortex = {**drift, "effect": "vortex_shedding", "parameter": "coefficient"}
+    rows = hidden_table(findings_of(given | {"hidden": [lag, drift, vortex]})).rows
+    assert [row[1] for row in rows] == ["-0.011 l/V", "0.020 %", "0.00020"]  # a coefficient is not relative
     (row,) = hidden_table(findings_of(given)).rows
     assert row[0] == "unsteady aero lag"
     assert "0.0061" in row[-1]
     assert any(line in str(block) for block in printed(findings_of(given)))
     assert hidden_line(findings_of(given | {"hidden": []})) == ""
+
+
+def test_an_effect_without_a_confirmed_limit_is_listed_as_not_determined(monkeypatch):
+    names = ("unsteady_aero_lag", "wind_speed_drift")
+    base, limited = found_beside(campaign(), *names)
+    assert all(one.size.determined for one in limited.values())
+    held = hidden._held
+
+    def refit(fit, start, *rest):
+        return None if start.problem.effects[-1].name == names[1] else held(fit, start, *rest)
+
+    monkeypatch.setattr(hidden, "_held", refit)
+    found = {one.effect: one for one in hidden_effects(base, starts_beside(base, map(effect_class, names)))}
+    assert found[names[0]] == limited[names[0]]
+    assert not found[names[1]].size.determined
+    assert found[names[1]].moves == {}
+
+    both = [TypeAdapter(Hidden).dump_python(one, mode="json") for one in (found[names[1]], found[names[0]])]
+    given = findings_of(document() | {"hidden": both})
+    assert [one.size.determined for one in given.hidden] == [False, True]
+    drift, lag = hidden_table(given).rows
+    assert drift[:2] == ("wind speed drift", "not determined")
+    assert set(drift[2:]) == {"–"}
+    assert "–" not in lag
+    assert hidden_line(given) == hidden_line(findings_of(document() | {"hidden": both[1:]}))
 
 
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():

@@ -7,8 +7,12 @@ import pytest
 from scipy.stats import truncnorm
 
 from diagnosis.answer.held_out import one_more
+from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.findings.candidates import damping_ratio
 from diagnosis.findings.passive import truncated, within_bounds
+from diagnosis.findings.trade_off import least_separated
+from diagnosis.likelihood.least_squares import fit_at
+from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
 from identification.show.quantity import Quantity
 from tests.reference.free_decays import Setting, campaign
@@ -16,6 +20,7 @@ from tests.support.gap_campaigns import answer
 from tunnel_sim.effects import effect_class
 
 FRICTION = effect_class("coulomb_friction")
+HYSTERESIS = effect_class("structural_damping")
 
 
 @pytest.mark.parametrize(
@@ -74,3 +79,54 @@ def test_what_the_bounds_allow_is_unchanged(study):
         assert within_bounds(given, study) == given
     nothing = {"zeta": Quantity(0.0, 0.1, "1")}
     assert within_bounds(nothing, replace(study, answers=())) == nothing
+
+
+@pytest.fixture(scope="module")
+def losses():
+    """Four decays of one spring without wind, and the fit with a structural loss beside the viscous damping."""
+    data = campaign(
+        (Setting(None, 0.0),) * 4, rng=np.random.default_rng(8), noise=5e-4, duration=6.0, rate=100.0
+    )
+    found = nominal_study(data, [HYSTERESIS])
+    return data, found, one_more(found.nominal, HYSTERESIS)
+
+
+@pytest.mark.parametrize("viscous", [0.0, 0.3, 1.0])
+def test_the_split_of_a_loss_that_one_spring_leaves_open_is_within_the_intervals(losses, viscous):
+    """The runs show the whole rate alone, so every share of the viscous damping fits them equally well."""
+    data, found, best = losses
+    whole = found.nominal.problem.data.model.coefficient(
+        found.nominal.problem.names, found.nominal.point.common, "zeta"
+    )
+    common = best.point.common.copy()
+    places = [
+        best.problem.names.index(name) for name in ("mechanical_damping", "structural_damping.loss_factor")
+    ]
+    common[places[0]] *= viscous
+    common[places[1]] = 2.0 * (1.0 - viscous) * whole
+    there = fit_at(best.problem, Point(common, best.point.per_run))
+    assert there.total == pytest.approx(best.total, abs=1.0)
+    assert (there.bound("mechanical_damping") is not None) == (viscous == 0.0)
+    assert (there.bound("structural_damping.loss_factor") is not None) == (viscous == 1.0)
+
+    pair = least_separated(there, data)
+    assert pair.parameters == ("mechanical_damping", "structural_damping.loss_factor")
+    assert pair.correlation < -0.99
+    assert "softer or stiffer spring" in pair.remedy
+    together = pair.together
+    assert (together.quantity, together.factor) == ("zeta", pytest.approx(0.5, rel=1e-3))
+    assert together.value == pytest.approx(whole, rel=1e-3)
+    assert 0.5 < together.std / found.nominal.std("mechanical_damping") * 2.0 * _omega(found) < 2.0
+    assert together.of_second == pytest.approx((0.0, whole), abs=0.01 * whole)
+
+    study = replace(found, answers=(answer((HYSTERESIS.name,), 0.0, 1.0, there),))
+    given = coefficients(possible_answers(study, [HYSTERESIS]), data)
+    zeta = within_bounds(given, study)["zeta"]
+    assert zeta.value == pytest.approx(viscous * whole, abs=0.01 * whole)
+    assert zeta.interval == pytest.approx((0.025 * whole, 0.975 * whole), abs=0.01 * whole)
+    assert 0.2 * whole < zeta.std < 0.6 * whole
+    assert given["omega_n"].std < 1e-4
+
+
+def _omega(found):
+    return float(np.sqrt(found.nominal.value("stiffness")))
