@@ -17,9 +17,8 @@ from tunnel_lab.terminal.arguments import (
     output_file,
     refuse_unwritable_files,
     split_names,
-    with_format,
-    with_quiet,
 )
+from tunnel_lab.terminal.options import with_format, with_quiet
 from tunnel_lab.terminal.outputs import console, say, say_written
 from tunnel_lab.terminal.progress import bar_or_lines
 from tunnel_sim.vocabulary.errors import counted

@@ -46,7 +46,7 @@ _model = partial(Option, rich_help_panel="A model of your own")
 
 def diagnose(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
-    leave_out: LeaveOutOption = None,
+    leave_out: LeaveOutOption = (),
     json: Annotated[
         Path | None, _written("--json", ".json", help="Write the answer as JSON; - for standard output.")
     ] = None,

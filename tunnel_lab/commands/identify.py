@@ -28,7 +28,6 @@ from tunnel_lab.terminal.arguments import (
     output_file,
     own_code,
     refuse_unwritable_files,
-    split_names,
 )
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import console, say, say_written, show
@@ -52,7 +51,7 @@ WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 def run(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
-    leave_out: LeaveOutOption = None,
+    leave_out: LeaveOutOption = (),
     estimator: Annotated[
         str, estimator_option("One of the estimators listed above or of an installed package")
     ] = "output_error",
@@ -128,13 +127,13 @@ def run(
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json)
     try:
-        whole, left_out = given_campaign(campaign), split_names(leave_out)
+        whole = given_campaign(campaign)
     except HoldsTurningPoints as held:
         if leave_out or weights or budget or uncertainties or models or estimator != "output_error":
             raise
         _show_turning_points(held.points, json)
         return
-    data = whole.without(left_out)
+    data = whole.without(leave_out)
     chosen: str | Estimator = estimator
     if weights is not None:
         if estimator not in WITH_WEIGHTS:
@@ -142,7 +141,7 @@ def run(
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
     with own_code([estimator]), bar("identifying runs", len(data.runs)) as progress:
-        estimate = identify(whole, chosen, leave_out=left_out, throw=False, progress=progress)
+        estimate = identify(whole, chosen, leave_out=leave_out, throw=False, progress=progress)
     made = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
         from identification.uncertainty import budget as budgets
