@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from identification.blocks import Block, Paragraph, TextTable
 from identification.status import SYSTEMATIC, Remark, Status
-from identification.trade_off import Combination, TradeOff
 from tunnel_sim.vocabulary.errors import counted
+
+if TYPE_CHECKING:
+    from identification.trade_off import Combination, TradeOff
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -225,6 +227,8 @@ def estimate_blocks(
 
 def notes(document: Document) -> list[str]:
     """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
+    from identification.trade_off import TradeOff  # loads NumPy
+
     remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     beside = [
         *repeatability_lines(document),

@@ -27,7 +27,6 @@ from tunnel_lab.terminal.arguments import (
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
-from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
@@ -213,7 +212,7 @@ def write_proposal(path: Path, answer: Diagnosis) -> Path | None:
     """Write the proposed formula as an effects file; None without a proposal."""
     import tomli_w
 
-    from tunnel_sim.files.writing import write_whole
+    from tunnel_sim.files.writing import as_json, write_whole
 
     law = None if answer.closable is None else answer.closable.law
     if law is None:
