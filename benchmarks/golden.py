@@ -1,6 +1,6 @@
 """The golden set: all faces of the same diagnoses, so that a change of the code can be shown to change nothing.
 
-Run as ``python -m benchmarks.golden write FOLDER``, ``faces FOLDER OUT`` or ``compare A B``; see README.md beside it.
+Run as ``python -m benchmarks.golden write FOLDER``, ``faces FOLDER OUT`` or ``compare A B``; see README.md.
 """
 
 from __future__ import annotations
@@ -12,45 +12,38 @@ import io
 import json
 import multiprocessing
 import os
+import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
-
+from benchmarks.golden_rigs import SEED, simulated
 from diagnosis import diagnose, read_model
 from diagnosis.model.joint import with_law
 from diagnosis.words.sections import printed
 from identification import identify
 from identification.blocks import as_notebook, as_text
 from identification.examination.examine import examine
-from tests.reference import free_decays
-from tests.reference.robot_joints import LEVEL, robot, robot_campaign
-from tests.support.driven_runs import Planted, driven
-from tests.support.robots import RUBS, TRUE
 from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_lab.report import render_report
 from tunnel_lab.terminal.outputs import show
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Record
 
 SHARED = Path("../shared/data")
 ROOMS = ("foreign", "measured", "driven", "faults/slips")
 """Folders of campaigns in the shared data."""
 LONG = ("driven-emps", "driven-silverbox")
 """Campaigns that take more than a minute of processor time: only with ``--all``."""
-SEALED, SEED = 40, 71
+SEALED = 40
 VARYING = ("versions", "sha256")
 """What the provenance of a document has of the machine and the day."""
 MODEL, JOINT = "model.xml", "elbow"
@@ -120,65 +113,6 @@ def as_json(document: Document) -> str:
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def simulated() -> Iterator[tuple[str, Campaign, str]]:
-    """Rigs beside the usual one: name, campaign, and MJCF of a model of one's own or nothing."""
-    for name, joint, axis in (
-        ("joint", TRUE, "0 0 1"),
-        ("joint-rubs", RUBS, "0 0 1"),
-        ("hangs", TRUE, LEVEL),
-    ):
-        xml = robot(joint, axis=axis)
-        yield name, robot_campaign(xml), xml
-    for kind, planted in (
-        ("loose", Planted(friction=0.004)), ("loose, stated gain", Planted()), ("root", Planted(cubic=4.0)),
-        ("turning base", Planted()), ("rates", Planted(friction=0.01)), ("moment", Planted(delay=0.02)),
-        ("unknown gain", Planted(cubic=6.0)), ("no spring stated", Planted()), ("uneven", Planted()),
-        ("moment, then released", Planted()),
-    ):  # fmt: skip
-        yield kind.replace(",", "").replace(" ", "-"), driven(kind, planted, seed=SEED), ""
-    settings = free_decays.SIX
-    still = [replace(one, speed=0.0) for one in settings]
-    normal = [replace(one, spring=None) for one in settings if one.spring == 16.12]
-    for name, chosen in (("still-air", still), ("normalised", normal), ("no-sizes", settings)):
-        yield name, replace(decays(chosen), rig=RigProperties()), ""
-    yield "gyro", reads(decays(settings), "rate", 2e-3), ""
-    yield "accelerometer", reads(decays(settings), "acceleration", 5e-2), ""
-    yield "limit-cycle", limit_cycles(decays(settings)), ""
-
-
-def decays(settings: Any) -> Campaign:
-    """Free decays of the nominal model in closed form, with noise."""
-    rng = np.random.default_rng(SEED)
-    made: Campaign = free_decays.campaign(settings, noise=4e-4, duration=8.0, rate=500.0, rng=rng)
-    return made
-
-
-def reads(campaign: Campaign, quantity: Quantity, noise: float) -> Campaign:
-    """The same motions without their noise, read by another sensor with noise."""
-    order, rng, runs = ("rate", "acceleration").index(quantity) + 1, np.random.default_rng(SEED), []
-    for run in free_decays.campaign(free_decays.SIX, duration=8.0, rate=500.0).runs:
-        clock = run.record.time_s
-        values = CubicSpline(clock, run.record.yaw_rad).derivative(order)(clock)
-        runs.append(replace(run, record=Record(clock, values + rng.normal(0.0, noise, clock.size))))
-    sensor = replace(campaign.sensor, quantity=quantity, noise_std=noise, resolution=None)
-    return replace(campaign, sensor=sensor, runs=tuple(runs))
-
-
-def limit_cycles(campaign: Campaign) -> Campaign:
-    """Growth to a limit cycle of 0.3 rad in every run with wind: β̈ − 2a(1 − (2β/A)²)β̇ + ω²β = 0."""
-
-    def slope(_: float, state: Any, omega: float) -> list[float]:
-        angle, rate = state
-        return [rate, 0.8 * (1.0 - (2.0 * angle / 0.3) ** 2) * rate - omega**2 * angle]
-
-    runs, rng, clock = [], np.random.default_rng(SEED), np.arange(15000) / 500.0
-    for place, run in enumerate(run for run in campaign.runs if run.wind_on):
-        start = (0.01, 0.0)
-        solved = solve_ivp(slope, (0.0, 30.0), start, "DOP853", clock, args=(18.0 + place,), rtol=1e-8)
-        runs.append(replace(run, record=Record(clock, solved.y[0] + rng.normal(0.0, 2e-4, clock.size))))
-    return replace(campaign, runs=tuple(runs))
-
-
 def make_campaigns(folder: Path) -> None:
     """Write the simulated campaigns and the blind sets that are not there yet."""
     for name, campaign, xml in simulated():
@@ -199,7 +133,9 @@ def campaigns_of(made: Path, shared: Path, *, whole: bool, only: str) -> dict[st
             found[f"{room.rpartition('/')[2]}-{path.parent.name}"] = path.parent
     found |= {path.parent.name: path.parent for path in sorted(made.glob("rig-*/campaign.toml"))}
     found |= {f"sealed-{p.parent.name}": p.parent for p in sorted(made.glob("sealed/*/campaign.toml"))}
-    return {name: path for name, path in found.items() if only in name and (whole or name not in LONG)}
+    return {
+        name: path for name, path in found.items() if re.search(only, name) and (whole or name not in LONG)
+    }
 
 
 def written(out: Path, work: Callable[[str, Path], dict[str, str]], job: tuple[str, Path]) -> str:
@@ -228,11 +164,8 @@ def changes(old: list[str], new: list[str], width: int = 160) -> list[str]:
     found: list[str] = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":
-            start = (
-                max(len(os.path.commonprefix([*old[a : a + 1], *new[c : c + 1]])) - 40, 0)
-                if a < b and c < d
-                else 0
-            )
+            both = zip(*(next(iter(lines), "") for lines in (old[a:b], new[c:d])), strict=False)
+            start = max(sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], both)) - 40, 0)
             found += [f"- {line[start : start + width]}" for line in old[a:b]]
             found += [f"+ {line[start : start + width]}" for line in new[c:d]]
     return found
@@ -276,7 +209,7 @@ def main(given: list[str] | None = None) -> int:
     parser.add_argument("--campaigns", type=Path, help="the simulated ones (default: FOLDER/campaigns)")
     parser.add_argument("--shared", type=Path, default=SHARED, help=f"data (default: {SHARED})")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1)")
-    parser.add_argument("--only", default="", help="campaigns whose names contain this")
+    parser.add_argument("--only", default="", metavar="PATTERN", help="campaigns whose names match this")
     parser.add_argument("--all", action="store_true", help="also the longest: " + ", ".join(LONG))
     parser.add_argument("--lines", type=int, default=6, help="of each difference (default: 6)")
     asked = parser.parse_args(given)
