@@ -81,15 +81,20 @@ def answers(folder: Path) -> dict[str, str]:
         if diagnosis.model is not None:
             with tempfile.TemporaryDirectory() as room:
                 found["patch.xml"] = diagnosis.model.write(Path(room) / "patch.xml").read_text("utf-8")
-    except TunnelError as error:
-        found["refusal.txt"] = str(error)
+    except Exception as error:  # of any kind: a fault of one campaign does not end the set
+        found["refusal.txt"] = refused(error)
     try:
         estimate = identify(campaign)
         found["estimate.json"] = as_json(normalised(estimate.to_json_dict()))
         found["estimate.txt"], found["estimate.html"] = str(estimate), estimate._repr_html_()
-    except TunnelError as error:
-        found["estimate-refusal.txt"] = str(error)
+    except Exception as error:
+        found["estimate-refusal.txt"] = refused(error)
     return found
+
+
+def refused(error: Exception) -> str:
+    """A refusal in its words, and any other error with its type."""
+    return f"{error}\n" if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}\n"
 
 
 def faces_again(recorded: Path, folder: Path) -> dict[str, str]:

@@ -72,8 +72,8 @@ def limit_cycles(campaign: Campaign) -> Campaign:
         return [rate, 0.8 * (1.0 - (2.0 * angle / 0.3) ** 2) * rate - omega**2 * angle]
 
     runs, rng, clock = [], np.random.default_rng(SEED), np.arange(15000) / 500.0
-    for place, run in enumerate(run for run in campaign.runs if run.wind_on):
-        start = (0.01, 0.0)
-        solved = solve_ivp(slope, (0.0, 30.0), start, "DOP853", clock, args=(18.0 + place,), rtol=1e-8)
+    for run in (run for run in campaign.runs if run.wind_on):
+        omega = np.sqrt((run.spring_stiffness or 0.0) / free_decays.Truth().yaw_inertia)
+        solved = solve_ivp(slope, (0.0, 30.0), (0.01, 0.0), "DOP853", clock, args=(omega,), rtol=1e-8)
         runs.append(replace(run, record=Record(clock, solved.y[0] + rng.normal(0.0, 2e-4, clock.size))))
     return replace(campaign, runs=tuple(runs))
