@@ -26,7 +26,7 @@ PACKAGES = {
 }
 """From the highest layer to the lowest; a package imports only from those below it."""
 WAYS = {
-    "diagnosis": "the way of an answer: rooms up to patch → compose.py → findings, a file each → result.py: Diagnosis"
+    "diagnosis": "the way of an answer: rooms up to patch → compose.py → findings, a file each → result.py"
 }
 """By package, the way of its result through rooms and modules, where the order of imports does not show it."""
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 TEXT = " ".join((ROOT / "paper.md").read_text(encoding="utf-8").split())
