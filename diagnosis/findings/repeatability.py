@@ -138,9 +138,9 @@ class RunRepeatability(Pictured):
 
     def words(self, judged: Judged) -> str:
         """Repeatability of the runs, in sentences; empty where they repeat, or it is not known."""
-        return " ".join(filter(None, (self._scatter_words(judged), self._outlier_words(judged))))
+        return " ".join(filter(None, (self.scatter_words(judged), self._outlier_words(judged))))
 
-    def _scatter_words(self, judged: Judged) -> str:
+    def scatter_words(self, judged: Judged) -> str:
         """Chance differences or drifts of the runs and their meaning; empty where there are none."""
         shown = [one for one in self.spreads if one.shown]
         if not shown:

@@ -9,10 +9,13 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.dimensions import beside
-from tunnel_sim.vocabulary.quantities import Share
+
+if TYPE_CHECKING:
+    from identification.show.quantity import Quantity
+    from tunnel_sim.vocabulary.quantities import Share
 
 FIXED_DECIMALS = 9
 """A number with more decimals than this, above a million or below a ten-thousandth has a power of ten."""

@@ -37,7 +37,7 @@ def closable_table(answer: Findings) -> TextTable:
 
 
 def scatter_words(answer: Findings) -> str:
-    return answer.repeated.words(answer)
+    return answer.repeated.scatter_words(answer)
 
 
 def repeatability_line(answer: Findings) -> str:

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Option
 
-from diagnosis.result import Diagnosis
 from identification.show.blocks import TextTable
 from tunnel_lab.terminal.outputs import console, say, say_written, show
 from tunnel_lab.terminal.progress import bar, step_display
 from tunnel_sim.vocabulary.dimensions import beside
 
 if TYPE_CHECKING:
+    from diagnosis.result import Diagnosis
     from identification.estimate import Estimate
     from identification.show.quantity import Quantity
     from tunnel_sim.vocabulary.campaign import Campaign

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 _LOW = 2.1  # inches: a map on the printed summary
 
 
-#: By independent variable of a law: the label of its axis, and the factor on radians or seconds.
-
-
 def diagnosis_figures(answer: Findings) -> dict[str, Figure]:
     """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
     figures = {name: make(answer) for name, make in _makers(answer).items()}
@@ -37,10 +34,19 @@ def diagnosis_figure(answer: Findings, name: str) -> Figure | None:
 def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     """By name, in the order of the report, what draws each figure, or finds that there is none."""
     makers: dict[str, Callable[[Findings], Figure | None]] = {"fit": charts.fit_figure} if answer.maps else {}
+    makers["which"] = candidates_figure
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
-    return makers | {
-        "which": candidates_figure,
-    }
+    return dict(sorted(makers.items(), key=lambda one: _place_of(one[0])))
+
+
+def _place_of(name: str) -> int:
+    """The place of a figure in the order of the report; last for a figure that has none of its own."""
+    return next((i for i, first in enumerate(_ORDER) if name.startswith(first)), len(_ORDER))
+
+
+_ORDER = (
+    "place", "waterfall", "fit", "where", "which", "friction", "repeatability", "how-far", "law", "coefficients",
+)  # fmt: skip
 
 
 def _drawn(picture: Picture, _: Findings) -> Figure | None:

@@ -80,10 +80,10 @@ class _Gap(_Read):
 class ScoredSpread(_Read):
     """The width of a scatter between runs, relative, its 90 % interval, and whether the runs show it."""
 
-    effect: str
-    width: NotNegative
-    interval: tuple[NotNegative, NotNegative] = Field(strict=False)
-    shown: bool
+    effect: str = Field(description="name of the scatter")
+    width: NotNegative = Field(description="standard deviation between runs, relative")
+    interval: tuple[NotNegative, NotNegative] = Field(strict=False, description="its central 0.90, relative")
+    shown: bool = Field(description="whether the runs show it")
 
 
 class _Repeatability(_Read):
@@ -91,24 +91,22 @@ class _Repeatability(_Read):
 
 
 class ScoredAnswer(_Read):
-    """The scored part of an answer, which may be of another method and lack the rest of a diagnosis.
+    """The scored part of an answer, which may be of another method and lack the rest of a diagnosis."""
 
-    Args:
-        causes: None: there is no answer.
-        doubts: against its predictions.
-        wall_s: time that it took, s; None where it is not stated.
-    """
-
-    causes: list[str] | None
-    repeatability: _Repeatability | None = None
-    ambiguous_with: list[str] = []
-    candidates: list[_Candidate] = []
-    doubts: list[Any] = []
-    inclusion: dict[str, _Probability] = {}
-    coefficients: _Coefficients = _Coefficients()
-    gap: _Gap | None = None
-    wall_s: float | None = None
-    provenance: _Settings = _Settings()
+    causes: list[str] | None = Field(description="effect names; null: there is no answer")
+    repeatability: _Repeatability | None = Field(None, description="the scatter between runs")
+    ambiguous_with: list[str] = Field(
+        [], description="effects that the runs cannot distinguish from the causes"
+    )
+    candidates: list[_Candidate] = Field([], description="the answers weighed, with their probabilities")
+    doubts: list[Any] = Field([], description="against the predictions of the answer")
+    inclusion: dict[str, _Probability] = Field(
+        {}, description="by effect, the probability that it is a cause"
+    )
+    coefficients: _Coefficients = Field(_Coefficients(), description="before and after the causes are added")
+    gap: _Gap | None = Field(None, description="the share of the gap that the causes close")
+    wall_s: float | None = Field(None, description="time that the answer took, s")
+    provenance: _Settings = Field(_Settings(), description="the settings that differ from the usual ones")
 
     @property
     def closed(self) -> float | None:

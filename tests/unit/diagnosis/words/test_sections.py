@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.findings import sections
 from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
-from diagnosis.findings.sections import sections
-from diagnosis.findings.verdict import headline, next_steps, run_words, size_words, undecided_words
+from diagnosis.findings.next_run import run_words
+from diagnosis.findings.verdict import headline, next_steps, size_words, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import left_over, probability
@@ -204,7 +205,7 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         heading = cause_cards(findings_of(one))[0].blocks[0]
         assert isinstance(heading, Heading)
         texts = [heading.beside, *next_steps(findings_of(one | undecided))]
-        texts += [label for label, _ in sections.place_rows(findings_of(one))]
+        texts += [label for label, _ in tables.place_rows(findings_of(one))]
         assert ("wind" in " ".join(texts).replace(run_words(given["next_run"]), "")) == said
         assert ("Acts" in texts) == said
 
@@ -221,12 +222,12 @@ def test_a_campaign_without_wind_has_no_column_for_it(given: Document) -> None:
 
 
 def test_where_the_gap_is(given: Document) -> None:
-    rows = [value for _, value in sections.place_rows(findings_of(given)) if re.search(r"\d", value)]
+    rows = [value for _, value in tables.place_rows(findings_of(given)) if re.search(r"\d", value)]
     where = given["where"]
     ends = (where["time_s"], np.degrees(where["amplitude_rad"]), where["frequency_hz"])
     for text, values in zip(rows, ends, strict=True):
         assert_shows(text, list(values))
-    assert ", ".join(where["runs"]) in [value for _, value in sections.place_rows(findings_of(given))]
+    assert ", ".join(where["runs"]) in [value for _, value in tables.place_rows(findings_of(given))]
 
 
 def test_narrow_lines(given: Document, answer: Answer) -> None:

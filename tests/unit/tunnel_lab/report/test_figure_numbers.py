@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from diagnosis.findings import answers
 from diagnosis.findings.misfit import run_labels
 from identification.show.style import styled
+from tests.support import rendered
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, findings_of, rms, scattering_document
 from tests.support.rendered import backbone_figure, friction_figure, law_figure
 from tests.support.shown_numbers import numbers
-from tunnel_lab.report import figures as answer
-from tunnel_lab.report import where
 
 Document = dict[str, Any]
 
@@ -34,7 +34,7 @@ def band(area: Any) -> np.ndarray:
 
 
 def test_bars_of_the_answers(given: Document) -> None:
-    fig = answer.candidates_figure(findings_of(given))
+    fig = answers.candidates_figure(findings_of(given))
     assert fig is not None
     axes, shown = fig.axes[0], given["candidates"][:4]  # the others are improbable
     assert [bar.get_width() for bar in axes.patches] == [c["probability"] for c in shown]
@@ -57,18 +57,18 @@ def test_bars_of_the_answers(given: Document) -> None:
 def test_one_probable_answer_needs_no_bars(given: Document) -> None:
     for candidate in given["candidates"][1:]:
         candidate["probability"] = 0.009
-    assert answer.candidates_figure(findings_of(given)) is None
+    assert answers.candidates_figure(findings_of(given)) is None
 
 
 def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
-    fig = answer.candidates_figure(findings_of(given))
+    fig = answers.candidates_figure(findings_of(given))
     assert fig is not None
     assert fig.axes[0].texts[0].get_text() == "> 99 %"
 
 
 def test_points_of_the_closure(given: Document) -> None:
-    fig = answer.closure_figure(findings_of(given))
+    fig = rendered.closure_figure(findings_of(given))
     axes, runs = fig.axes[0], given["gap"]["runs"]
     before, held_out, fitted = axes.lines
     rows = [(rms(run["before"]), row) for row, run in enumerate(runs)]
@@ -90,7 +90,7 @@ def test_closure_without_maps_and_without_causes(given: Document) -> None:
     given["maps"] = None
     for run in given["gap"]["runs"]:
         run["after"] = run["before"]
-    axes = answer.closure_figure(findings_of(given)).axes[0]
+    axes = rendered.closure_figure(findings_of(given)).axes[0]
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
     assert noise.x1 == pytest.approx(rms(0.03))
     assert len(axes.lines) == 1
@@ -101,7 +101,7 @@ def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> No
     grid = given["maps"]["grid"]
     if speeds is None:
         grid |= {"wind_speeds": None, "time_edges_s": [0.0, 2.5, 5.0, 7.5]}
-    fig = where.place_figure(findings_of(given))
+    fig = rendered.place_figure(findings_of(given))
     assert fig is not None
     axes, (mesh,) = fig.axes[0], fig.axes[0].collections
     shown = np.ma.filled(mesh.get_array().astype(float), np.nan)
@@ -115,11 +115,11 @@ def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> No
         assert [label.get_text() for label in axes.get_xticklabels()] == ["off", "13.5", "21.5"]
     assert mesh.get_clim() == pytest.approx((0.0, rms(9.25)))
     del given["maps"]["grid"]
-    assert where.place_figure(findings_of(given)) is None
+    assert rendered.place_figure(findings_of(given)) is None
 
 
 def test_intervals_of_the_coefficients(given: Document) -> None:
-    fig = answer.coefficients_figure(findings_of(given))
+    fig = rendered.coefficients_figure(findings_of(given))
     assert fig is not None
     for axes, name in zip(fig.axes, ("cn_beta", "cn_r"), strict=True):
         for row, (key, container) in enumerate(zip(("before", "after"), axes.containers, strict=True)):
@@ -132,15 +132,15 @@ def test_intervals_of_the_coefficients(given: Document) -> None:
         bottom, top = axes.get_ylim()
         assert bottom > 1 > 0 > top  # before above after
     given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
-    alone = answer.coefficients_figure(findings_of(given))
+    alone = rendered.coefficients_figure(findings_of(given))
     assert alone is not None
     assert len(alone.axes) == 1
     given["coefficients"]["after"] = {}
-    assert answer.coefficients_figure(findings_of(given)) is None
+    assert rendered.coefficients_figure(findings_of(given)) is None
 
 
 def test_the_map_of_runs(given: Document) -> None:
-    grid = where.runs_figure(findings_of(given)).axes[0]
+    grid = rendered.runs_figure(findings_of(given)).axes[0]
     image = np.ma.filled(grid.images[0].get_array().astype(float), np.nan)
     wanted = np.array([[60.0, 21.0, np.nan], [9.0, np.nan, 1.5], [2.0, 0.5, np.nan]])
     assert np.array_equal(image, wanted, equal_nan=True)  # cells below three times 0.017 √3 stay empty
@@ -153,14 +153,14 @@ def test_the_map_of_runs(given: Document) -> None:
 
 def test_a_map_within_the_noise_says_so(given: Document) -> None:
     given["maps"]["time"]["by_run"] = [[0.01, -0.02, None]] * 3
-    texts = where.runs_figure(findings_of(given)).axes[0].texts
+    texts = rendered.runs_figure(findings_of(given)).axes[0].texts
     assert [text.get_text() for text in texts] == ["every cell within the noise"]
-    assert not where.runs_figure(findings_of(document())).axes[0].texts
+    assert not rendered.runs_figure(findings_of(document())).axes[0].texts
 
 
 @pytest.mark.parametrize(("place", "key", "edges"), [(0, "time", "edges_s"), (2, "amplitude", "edges_rad")])
 def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
-    axes = where.profiles_figure(findings_of(given)).axes[place]
+    axes = rendered.profiles_figure(findings_of(given)).axes[place]
     values, interval = given["maps"][key], given["where"][key + ("_s" if key == "time" else "_rad")]
     shade, noise, mean = axes.patches
     shown = np.degrees if key == "amplitude" else np.asarray
@@ -179,7 +179,7 @@ def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
 
 
 def test_the_share_of_the_missing_moment(given: Document) -> None:
-    fig = where.profiles_figure(findings_of(given))
+    fig = rendered.profiles_figure(findings_of(given))
     (beside,) = (axes for axes in fig.axes if "%" in axes.get_ylabel())
     drawn = beside.patches[0].get_data()
     assert drawn.values == pytest.approx([55.0, 34.0, 11.0])
@@ -191,11 +191,11 @@ def test_the_share_of_the_missing_moment(given: Document) -> None:
 
 def test_no_interval_no_shade(given: Document) -> None:
     given["where"]["time_s"] = None
-    assert len(where.profiles_figure(findings_of(given)).axes[0].patches) == 2
+    assert len(rendered.profiles_figure(findings_of(given)).axes[0].patches) == 2
 
 
 def test_the_spectrum(given: Document) -> None:
-    axes = where.spectrum_figure(findings_of(given)).axes[0]
+    axes = rendered.spectrum_figure(findings_of(given)).axes[0]
     values = given["maps"]["frequency"]
     before, after = (np.array(curve(line)) for line in axes.lines)
     centres = [np.sqrt(0.5 * 1.0), np.sqrt(1.0 * 4.0), np.sqrt(4.0 * 16.0)]
@@ -216,7 +216,7 @@ def test_the_spectrum(given: Document) -> None:
 
 def test_a_spectrum_without_causes_has_one_curve(given: Document) -> None:
     given["maps"]["frequency"]["after"] = None
-    assert len(where.spectrum_figure(findings_of(given)).axes[0].lines) == 1
+    assert len(rendered.spectrum_figure(findings_of(given)).axes[0].lines) == 1
 
 
 def test_backbones(given: Document) -> None:
@@ -270,7 +270,7 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
     plane = given["maps"]["phase_plane"]
     for name in ("moment", "std"):
         plane[name] = [[None if v is None else size * v for v in row] for row in plane[name]]
-    fig = where.phase_plane_figure(findings_of(given))
+    fig = rendered.phase_plane_figure(findings_of(given))
     assert fig is not None
     field = fig.axes[0]
     image = np.ma.filled(field.images[0].get_array().astype(float), np.nan)
@@ -281,7 +281,7 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
     assert high == pytest.approx(factor * size * np.quantile([0.012, 0.025, 0.001], 0.98))
     assert field.images[0].get_extent() == pytest.approx(np.degrees([-0.4, 0.4, -0.4, 0.4]).tolist())
     assert any(f"[{unit}]" in axes.get_xlabel() for axes in fig.axes)
-    means = where.moment_figure(findings_of(given))
+    means = rendered.moment_figure(findings_of(given))
     assert means is not None
     for axes, name in zip(means.axes, ("by_angle", "by_rate"), strict=True):
         assert f"[{unit}]" in axes.get_ylabel()
@@ -296,8 +296,8 @@ def test_the_phase_plane(given: Document, size: float, factor: float, unit: str)
 
 def test_no_phase_plane_no_figure(given: Document) -> None:
     given["maps"]["phase_plane"] = None
-    assert where.phase_plane_figure(findings_of(given)) is None
-    assert where.moment_figure(findings_of(given)) is None
+    assert rendered.phase_plane_figure(findings_of(given)) is None
+    assert rendered.moment_figure(findings_of(given)) is None
 
 
 def test_the_label_of_a_run_holds_its_conditions(given: Document) -> None:
@@ -367,7 +367,7 @@ def test_friction_is_drawn_with_its_band_and_the_points_with_their_errors(given:
 
 def test_every_run_is_drawn_against_the_model_with_its_band() -> None:
     given = scattering_document()
-    fig = answer.repeatability_figure(findings_of(given))
+    fig = rendered.repeatability_figure(findings_of(given))
     assert fig is not None
     runs = given["repeatability"]["runs"]
     for axes, name in zip(fig.axes, ("frequency", "damping"), strict=True):
@@ -396,20 +396,20 @@ def test_runs_that_repeat_have_bands_of_the_noise_and_a_single_run_no_figure() -
     found |= {"spreads": [], "outlier": ""}
     for run in found["runs"]:
         run |= {"frequency_band": 0.0, "damping_band": 0.0}
-    fig = answer.repeatability_figure(findings_of(given))
+    fig = rendered.repeatability_figure(findings_of(given))
     assert fig is not None
     widths = [bar.get_width() for bar in fig.axes[0].patches]
     assert widths == [pytest.approx(2 * 196 * run["frequency_std"]) for run in found["runs"]]
     assert "noise (95 %)" in [text.get_text() for text in fig.legends[0].get_texts()]
     given["repeatability"]["runs"] = found["runs"][:1]
-    assert answer.repeatability_figure(findings_of(given)) is None
+    assert rendered.repeatability_figure(findings_of(given)) is None
     given["repeatability"] = None
-    assert answer.repeatability_figure(findings_of(given)) is None
+    assert rendered.repeatability_figure(findings_of(given)) is None
 
 
 def test_scatter_between_runs_is_one_bar_of_the_waterfall_and_of_the_answers() -> None:
     given = scattering_document()
-    for fig in (answer.waterfall_figure(findings_of(given)), answer.candidates_figure(findings_of(given))):
+    for fig in (rendered.waterfall_figure(findings_of(given)), answers.candidates_figure(findings_of(given))):
         assert fig is not None
         labels = " ".join(label.get_text() for label in fig.axes[0].get_yticklabels()).replace("\n", " ")
         assert "scatter between runs" in labels
