@@ -25,11 +25,12 @@ from typing import Any
 
 from benchmarks.golden_rigs import SEED, simulated
 from diagnosis import diagnose, read_model
+from diagnosis.findings.sections import printed
 from diagnosis.model.joint import with_law
-from diagnosis.words.sections import printed
+from diagnosis.result import Diagnosis
 from identification import identify
-from identification.blocks import as_notebook, as_text
 from identification.examination.examine import examine
+from identification.show.blocks import as_notebook, as_text
 from tunnel_lab.experiments.blind.sets import make_blind
 from tunnel_lab.report import render_report
 from tunnel_lab.terminal.outputs import show
@@ -60,14 +61,15 @@ def normalised(document: Document) -> Document:
 
 def faces(document: Document, campaign: Campaign) -> dict[str, str]:
     """What a person is shown of a normalised document, by the name of its file."""
-    blocks, shown = printed(document), io.StringIO()
+    answer, shown = Diagnosis.from_json_dict(document), io.StringIO()
+    blocks = printed(answer)
     with contextlib.redirect_stdout(shown):
         show(blocks)
     return {
         "text.txt": as_text(blocks),
         "printed.txt": shown.getvalue(),
         "notebook.html": as_notebook(blocks),
-        "report.html": render_report(document, campaign),
+        "report.html": render_report(answer, campaign),
     }
 
 
