@@ -1,4 +1,4 @@
-"""A diagnosis in sections of blocks, from its document: the content of every face.
+"""A diagnosis in sections of blocks, from its findings: the content of every face.
 
 A terminal, ``print``, a notebook and the bench show the sections without their details (`printed`); the report
 shows all of them.
