@@ -22,7 +22,7 @@ from diagnosis.findings.averaged_coefficients import (
     in_phase,
     possible_answers,
 )
-from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion
+from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion, parameter_errors
 from diagnosis.findings.closing import Closing, confirmed
 from diagnosis.findings.closure import GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
@@ -34,7 +34,6 @@ from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import cautions, immaterial, nearly, outside_the_fits, zeros_apart
 from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
-from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
