@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.spring_choices import choices_of_spring, count_of_springs, one_of_springs
 from diagnosis.findings.terms import BETWEEN_RUNS, scattering, without_scatter
 from diagnosis.findings.whole import Findings
 from identification.show.numbers import (
@@ -73,8 +74,8 @@ def _called(answer: Findings, candidate: Candidate, name: str, sized: bool) -> s
     if kind is None or not kind.chosen_spring():
         return plain(name)
     if answer.found.choices:
-        each = f", {_choices_of_spring(answer)}" if sized else ""
-        return f"an error of one of the {_count_of_springs(answer)} springs{each}"
+        each = f", {choices_of_spring(answer.found.choices)}" if sized else ""
+        return f"an error of one of the {count_of_springs(answer.found.choices)} springs{each}"
     return said_size(answer, candidate, name).partition(" (")[0] or plain(name)
 
 
@@ -95,7 +96,7 @@ def said_size(answer: Findings, candidate: Candidate, name: str) -> str:
     if kind is None or not given:
         return ""
     if kind.chosen_spring() and answer.found.choices:
-        return f"{one_of_springs(answer)}, {_choices_of_spring(answer)}"
+        return f"{one_of_springs(answer.found.choices)}, {choices_of_spring(answer.found.choices)}"
     values = {full: one.value for full, one in given.items()}
     said = {info.unit: given[info.name].unit for info in kind.parameters() if info.name in given}
 
@@ -105,55 +106,6 @@ def said_size(answer: Findings, candidate: Candidate, name: str) -> str:
         )  # moments are per unit inertia where no inertia is stated
 
     return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
-
-
-def hold_words(answer: Findings) -> str:
-    """Sentences on a delay of the input that may be a wrong hold between samples; empty where it may not."""
-    found = answer.found.hold
-    if found is None:
-        return ""
-    held = "keeps its value between samples, as a controller's command does"
-    linear = "is linear between samples"
-    other, taken = (held, "linear") if found.taken == "linear" else (linear, "held")
-    why = "as the campaign states" if found.stated else "since drive_hold is not stated"
-    alike = "better" if found.better else "as well"
-    when = "later" if found.delay_s > 0.0 else "earlier"
-    delay = 1e3 * abs(found.delay_s)
-    return (
-        f"One cause has two interpretations. Either the input acts {delay:.3g} ms {when} than recorded, about half "
-        f"a sample ({1e3 * found.half_sample_s:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
-        f"The second interpretation explains the records {alike}, without a delay."
-    )
-
-
-def hold_step(answer: Findings) -> str:
-    """How to distinguish a delay of the input from a wrong hold, without a full stop; empty where not needed."""
-    found = answer.found.hold
-    if found is None:
-        return ""
-    other, how = ("zero", "is held") if found.taken == "linear" else ("linear", "is linear")
-    return (
-        f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
-    )
-
-
-def one_of_springs(answer: Findings) -> str:
-    """The statement that one of several indistinguishable springs is off."""
-    return f"one of the {_count_of_springs(answer)} springs is off"
-
-
-def _count_of_springs(answer: Findings) -> str:
-    count = len(answer.found.choices)
-    return "two" if count == 2 else str(count)
-
-
-def _choices_of_spring(answer: Findings) -> str:
-    """The alternative errors of springs: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
-    each = (
-        f"{one.stiffness:.4g} N m/rad by {for_people(100.0 * one.error, 100.0 * one.std, '%')}"
-        for one in answer.found.choices
-    )
-    return " or ".join(each)
 
 
 def _parameters(candidate: Candidate, name: str) -> dict[str, Quantity]:

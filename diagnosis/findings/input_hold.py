@@ -73,3 +73,31 @@ def other_hold(study: Study) -> OtherHold | None:
         stated=all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
         better=bool(fit.unlikelihood - fitted.unlikelihood > chance),
     )
+
+
+def hold_words(found: OtherHold | None) -> str:
+    """Sentences on a delay of the input that may be a wrong hold between samples; empty where it may not."""
+    if found is None:
+        return ""
+    held = "keeps its value between samples, as a controller's command does"
+    linear = "is linear between samples"
+    other, taken = (held, "linear") if found.taken == "linear" else (linear, "held")
+    why = "as the campaign states" if found.stated else "since drive_hold is not stated"
+    alike = "better" if found.better else "as well"
+    when = "later" if found.delay_s > 0.0 else "earlier"
+    delay = 1e3 * abs(found.delay_s)
+    return (
+        f"One cause has two interpretations. Either the input acts {delay:.3g} ms {when} than recorded, about half "
+        f"a sample ({1e3 * found.half_sample_s:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
+        f"The second interpretation explains the records {alike}, without a delay."
+    )
+
+
+def hold_step(found: OtherHold | None) -> str:
+    """How to distinguish a delay of the input from a wrong hold, without a full stop; empty where not needed."""
+    if found is None:
+        return ""
+    other, how = ("zero", "is held") if found.taken == "linear" else ("linear", "is linear")
+    return (
+        f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
+    )

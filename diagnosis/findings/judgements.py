@@ -3,22 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.findings.closure import Confirmation, RunGap
-from diagnosis.findings.found import Nearly
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
-from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
+
+
+@dataclass(frozen=True)
+class Nearly:
+    """Effects that explain most of a gap but are not named.
+
+    Args:
+        closes: share of the gap in the fitted runs, a fraction.
+        probability: of being the answer, a fraction.
+        noisy: whether misbehaving noise may be the whole gap.
+        rival: effects that explain as much; empty where there are none.
+        rival_probability: of those, a fraction.
+        misfit: channels with a significant misfit.
+    """
+
+    effects: tuple[str, ...]
+    closes: float
+    probability: float
+    noisy: bool = False
+    rival: tuple[str, ...] = ()
+    rival_probability: float = 0.0
+    misfit: tuple[str, ...] = ()
+
 
 Estimates = Mapping[str, Quantity]
 
@@ -138,13 +159,3 @@ def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> di
     if any(moves[name] > limit for name, limit in limits.items()):
         return {}
     return {name: moves[name] / abs(given.value) for name, given in known.items()}
-
-
-def spring_choices(study: Study) -> tuple[SpringError, ...]:
-    """The springs of which one may be off, where the runs cannot tell which."""
-    return tuple(
-        replace(
-            spring_error(one.hypothesis.fit, ONE_SPRING.name, study.similarity), probability=one.probability
-        )
-        for one in (study.answer.choices if study.answer else ())
-    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,8 @@ from diagnosis.likelihood.normal_equations import project_release
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
+from diagnosis.settings import Settings
+from identification.show.numbers import reading_shown
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
@@ -164,3 +167,36 @@ def _pointers(count: int, phases: int) -> Array:
     grid = np.array(combinations).reshape(len(combinations), count)
     pointers: Array = np.stack([np.cos(grid), np.sin(grid)], axis=2).reshape(len(grid), 2 * count)
     return pointers
+
+
+def distinguishes(run: Mapping[str, Any], settings: Settings) -> bool:
+    """Whether a planned run distinguishes its answers."""
+    return bool(run["separation"] >= settings.answer.separated_by)
+
+
+OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
+
+
+def too_close(run: Mapping[str, float]) -> str:
+    """The statement that no run distinguishes two answers."""
+    return (
+        "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
+        f"they differ by {run['separation']:.1f} standard deviations of the noise."
+    )
+
+
+def run_words(run: Mapping[str, float], *, robot: bool = False) -> str:
+    """A run to make, in words.
+
+    Args:
+        run: spring stiffness (N m/rad), wind speed (m/s), release angle from the rest (rad), duration (s) and
+            separation in standard deviations of the noise.
+        robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
+    """
+    wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
+    rig = "" if robot else f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, "
+    angle = reading_shown(run["release_angle"], 2)
+    return (
+        f"{rig}release at {angle}{' from the rest' if robot else ''}, "
+        f"duration {run['duration']:g} s (the answers differ by {run['separation']:.0f} standard deviations)"
+    )

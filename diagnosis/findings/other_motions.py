@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from diagnosis.settings import WordsSettings
 from identification.examination.self_excited import in_limit_cycle
+from identification.show.numbers import reading_shown
 from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -131,3 +132,17 @@ def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
 def recognised_limit_cycles(remarks: Sequence[Remark]) -> tuple[Remark, ...]:
     """The remarks on runs in a limit cycle."""
     return tuple(remark for remark in remarks if in_limit_cycle(remark.figures))
+
+
+def second_mode_words(found: TwoModes, unit: str) -> str:
+    """A second mode in a run, its amplitudes in a unit of readings."""
+    main, second = (
+        f"{reading_shown(mode.amplitude_rad, 2, unit)} at {mode.frequency_hz:.3g} Hz, decaying at "
+        f"{mode.decay_per_s:.2g} 1/s"
+        for mode in (found.main, found.second)
+    )
+    return (
+        f"{found.run} contains a second mode: {second}. The main mode is {main}. The second mode explains "
+        f"{100.0 * found.closes:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
+        "one mode: look for another motion, such as heave or a motion of the mount."
+    )

@@ -6,13 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.findings.candidates import CauseSize
-from diagnosis.findings.causes import advice, hold_step, hold_words, known_and_open, one_of_springs
+from diagnosis.findings.causes import advice, known_and_open
 from diagnosis.findings.coefficients import consequence
-from diagnosis.findings.found import Nearly
+from diagnosis.findings.disturbed_runs import disturbed_step, disturbed_words
+from diagnosis.findings.input_hold import hold_step, hold_words
+from diagnosis.findings.judgements import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
-from diagnosis.findings.other_motions import TwoModes
+from diagnosis.findings.next_run import OTHER_INPUT, distinguishes, run_words, too_close
+from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_step, model_words
 from diagnosis.findings.remainder import formula_step
+from diagnosis.findings.spring_choices import choice_steps, choice_words, two_springs_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -23,18 +27,13 @@ from diagnosis.findings.terms import (
     without_scatter,
 )
 from diagnosis.findings.whole import Findings
-from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.rivals.two_springs import SpringError
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import Settings
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     beside_noise,
-    for_people,
     listed,
     plain,
     probability,
-    reading_shown,
     rounded_up,
     share,
     significant,
@@ -95,10 +94,10 @@ def verdict(answer: Findings, rest: str) -> str:
         said = ". ".join(f"{remark.runs[0]}: {remark.what}" for remark in cycling)
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
-        *(_disturbed(one, no_gap=not answer.causes) for one in answer.disturbed),
+        *(disturbed_words(one, no_gap=not answer.causes) for one in answer.disturbed),
         *_with_second_modes(_answer(answer, rest), answer),
-        _choices(answer),
-        hold_words(answer),
+        choice_words(answer.found.choices),
+        hold_words(answer.found.hold),
         model_words(answer.model, answer),
         *(RIVALS[rival.kind](rival.figures) for rival in found.rivals),
     ]
@@ -262,94 +261,16 @@ def _immaterial(changes: Mapping[str, float]) -> str:
 _NO_CHANGE = 0.01  # %: smaller changes are shown as this
 
 
-def _disturbed(found: Disturbance, *, no_gap: bool) -> str:
-    """A disturbed run, and how much of it is used.
-
-    Args:
-        no_gap: whether the runs show no gap without the disturbance.
-    """
-    run, kept, at, begins = found.run, found.kept_until_s, found.at_s, found.kept_from_s
-    if at is None:
-        if begins is not None:
-            part = "Without that part there is no gap, so it" if no_gap else "That part"
-            return f"Run {run} does not move as the others do before {begins:.4g} s. {part} is not used."
-        whole = "Without it there is no gap, so it" if no_gap else "It"
-        return f"Run {run} differs from the others. {whole} is not used."
-    if found.used:
-        why = "the other runs do not determine the model"
-        return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
-    unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
-    if begins is not None:
-        unused = f"its readings before {begins:.4g} s are not used"
-    return f"Run {run} was disturbed at {at:.4g} s; {unused}."
-
-
 def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
     """The answer and the second modes of single runs; the modes come first where every run has one."""
     modes = answer.found.second_modes
-    said = [_second_mode(one, unit_of(answer)) for one in modes]
+    said = [second_mode_words(one, unit_of(answer)) for one in modes]
     of_all = {one.run for one in modes} >= {run.id for run in answer.gap.runs}
     return [*said, said_first] if of_all else [said_first, *said]
 
 
-def _second_mode(found: TwoModes, unit: str) -> str:
-    """A second mode in a run, its amplitudes in a unit of readings."""
-    main, second = (
-        f"{reading_shown(mode.amplitude_rad, 2, unit)} at {mode.frequency_hz:.3g} Hz, decaying at "
-        f"{mode.decay_per_s:.2g} 1/s"
-        for mode in (found.main, found.second)
-    )
-    return (
-        f"{found.run} contains a second mode: {second}. The main mode is {main}. The second mode explains "
-        f"{100.0 * found.closes:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
-        "one mode: look for another motion, such as heave or a motion of the mount."
-    )
-
-
-def _choices(answer: Findings) -> str:
-    """Which of the springs may be off, where the runs cannot tell; empty where they can."""
-    found = answer.found.choices
-    if not found:
-        return ""
-    springs = [f"{_spring_off(one)} ({probability(one.probability or 0.0)})" for one in found]
-    return (
-        f"{one_of_springs(answer).capitalize()}, and these runs do not show which: {', or '.join(springs)}. The "
-        f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
-    )
-
-
-def choice_steps(answer: Findings) -> list[str]:
-    """How to tell which spring is off; none where the runs tell."""
-    found = sorted(one.stiffness for one in answer.found.choices)
-    if not found:
-        return []
-    further, which = ("third", "both springs") if len(found) == 2 else ("further", "these springs")
-    springs = listed([f"{one:.4g}" for one in found])
-    return [
-        f"Add runs with a {further} spring, or measure the stiffness of {which} again ({springs} N m/rad): these "
-        "runs do not show which of them is off."
-    ]
-
-
-def _spring_off(found: SpringError) -> str:
-    """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
-    size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
-    side = "stiffer" if found.error > 0.0 else "softer"
-    return f"{found.stiffness:.4g} N m/rad is {size} {side} than stated"
-
-
-def _two_springs_off(found: Mapping[str, Any]) -> str:
-    """Springs that would explain the gap together."""
-    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
-    springs = " and ".join(_spring_off(SpringError(**one)) for one in found["springs"])
-    return (
-        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
-        f"{springs}. Measure their stiffness again."
-    )
-
-
 RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-    "two springs off": _two_springs_off,
+    "two springs off": two_springs_words,
     "stated": lambda found: str(found["words"]),
 }
 """Sentences on a rival that is not an effect of the vocabulary, by kind."""
@@ -392,32 +313,16 @@ def run_to_make(answer: Findings) -> Mapping[str, Any] | None:
     return run if run is not None and distinguishes(run, answer.settings) else None
 
 
-def distinguishes(run: Mapping[str, Any], settings: Settings) -> bool:
-    """Whether a planned run distinguishes its answers."""
-    return bool(run["separation"] >= settings.answer.separated_by)
-
-
 def unplannable(answer: Findings) -> str:
     """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
     known = answer.coefficients.before
     if answer.found.driven:
-        return f"No run is planned for driven runs: {_OTHER_INPUT}."
+        return f"No run is planned for driven runs: {OTHER_INPUT}."
     if not known:
         return "No run can be planned: the nominal model was not fitted to any run."
     if "omega_n" in known:
         return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
     return ""
-
-
-_OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
-
-
-def too_close(run: Mapping[str, float]) -> str:
-    """The statement that no run distinguishes two answers."""
-    return (
-        "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
-        f"they differ by {run['separation']:.1f} standard deviations of the noise."
-    )
 
 
 def rival_lines(answer: Findings) -> list[str]:
@@ -437,29 +342,12 @@ def rival_lines(answer: Findings) -> list[str]:
         )
         lines.append(f"{which}: {_run_words(answer, run)}.")
     elif rivals and answer.found.driven:
-        lines.append(f"To distinguish them, {_OTHER_INPUT}.")
+        lines.append(f"To distinguish them, {OTHER_INPUT}.")
     elif rivals:
         lines.append(
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
         )
     return lines
-
-
-def run_words(run: Mapping[str, float], *, robot: bool = False) -> str:
-    """A run to make, in words.
-
-    Args:
-        run: spring stiffness (N m/rad), wind speed (m/s), release angle from the rest (rad), duration (s) and
-            separation in standard deviations of the noise.
-        robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
-    """
-    wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
-    rig = "" if robot else f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, "
-    angle = reading_shown(run["release_angle"], 2)
-    return (
-        f"{rig}release at {angle}{' from the rest' if robot else ''}, "
-        f"duration {run['duration']:g} s (the answers differ by {run['separation']:.0f} standard deviations)"
-    )
 
 
 def _run_words(answer: Findings, run: Mapping[str, float]) -> str:
@@ -479,29 +367,17 @@ def _remedies(remarks: Sequence[Remark]) -> list[str]:
     return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
 
 
-def _repeat(found: Disturbance) -> str:
-    """What to do about a disturbed run."""
-    if found.at_s is not None:
-        return f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s."
-    if found.kept_from_s is not None:
-        return f"Look at the release of run {found.run}: its free motion begins at {found.kept_from_s:.4g} s."
-    return (
-        f"Repeat run {found.run}, which differs from the others, or look at its release, its unit, its gain "
-        "and its filter."
-    )
-
-
 _SUSPECT = "State the suspected effect in a file, and diagnose again with --effects-file"
 
 
 def next_steps(answer: Findings) -> list[str]:
     """What to do next, in the order in which to do it."""
     causes = answer.causes
-    steps = [_repeat(one) for one in answer.disturbed]
+    steps = [disturbed_step(one) for one in answer.disturbed]
     steps += _remedies(answer.remarks)
     steps += answer.repeated.steps(answer)
     if causes != UNKNOWN and answer.decision.decided:
-        steps += choice_steps(answer)
+        steps += choice_steps(answer.found.choices)
     if (run := run_to_make(answer)) is not None and answer.ambiguous_with:
         words = f"Make the run that distinguishes the answers: {_run_words(answer, run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
@@ -532,7 +408,7 @@ def next_steps(answer: Findings) -> list[str]:
         of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
         to_mend = [name for name in causes if name not in of_spring or not answer.found.choices]
         steps += [
-            *(f"{step}." for step in [hold_step(answer)] if step),
+            *(f"{step}." for step in [hold_step(answer.found.hold)] if step),
             *(f"{advice(answer, name)}." for name in to_mend),
             *(f"{step}." for step in [formula_step(answer.closable)] if step),
             "Measure again, and compare the two diagnoses (tunnel compare).",

@@ -16,19 +16,24 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, c
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
 from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
-from diagnosis.findings.found import Found
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
+from diagnosis.findings.input_hold import OtherHold
 from diagnosis.findings.judged import Misfit
+from diagnosis.findings.judgements import Nearly
+from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.what_it_costs import WhatItCosts
+from diagnosis.model.fact import Fact, Noted
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
 from diagnosis.search.disturbance import Disturbance
+from diagnosis.search.rivals.two_springs import SpringError
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
-from diagnosis.where.described import Where
+from diagnosis.where.described import Nowhere, PlaceFound, Where
 from identification.show.quantity import Quantity
 from identification.status import Remark
 from identification.trade_off import TradeOff
@@ -43,6 +48,45 @@ _LAST = (
     "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
     "maps", "provenance",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Found:
+    """All facts of an answer that are not numbers of it.
+
+    Args:
+        place: reasons for the place of the gap; None where there is no gap, or no place.
+        nowhere: the residuals of a campaign without a gap; else None.
+        both_winds: whether the wind is off in some runs and on in others.
+        robot: whether the body is the joint of a machine, and not a body in a tunnel.
+        driven: whether every run is driven.
+        nearly: effects that nearly explain an unexplained gap; None where there are none.
+        immaterial: by coefficient, the relative change by the causes, where they change none materially.
+        choices: springs of which one may be off, the likeliest first.
+        hold: a delay of the input that another hold between samples explains as well; None: none.
+        rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
+        second_modes: by run, where the gap is not explained.
+        limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
+        noise: reasons for the noise used.
+        cautions: caveats.
+        noted: facts about the noise.
+    """
+
+    place: PlaceFound | None = None
+    nowhere: Nowhere | None = None
+    both_winds: bool = False
+    robot: bool = False
+    driven: bool = False
+    nearly: Nearly | None = None
+    immaterial: Mapping[str, float] = field(default_factory=dict)
+    choices: tuple[SpringError, ...] = ()
+    hold: OtherHold | None = None
+    rivals: tuple[Fact, ...] = ()
+    second_modes: tuple[TwoModes, ...] = ()
+    limit_cycles: tuple[Remark, ...] = ()
+    noise: Fact | None = None
+    cautions: tuple[Fact, ...] = ()
+    noted: tuple[Noted, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,6 +150,7 @@ class Findings:
     sizes: tuple[CauseSize, ...] = ()
     found: Found = field(default_factory=Found)
     friction: FrictionCurve | None = None
+    costs: WhatItCosts | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     @property

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import tomli_w
 from nicegui import ui
 
-from diagnosis.findings.verdict import distinguishes
+from diagnosis.findings.next_run import distinguishes
 from diagnosis.result import Diagnosis
 from identification.show.blocks import Paragraph, typeset
 from identification.show.numbers import plain
@@ -386,7 +386,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.findings.verdict import too_close
+        from diagnosis.findings.next_run import too_close
 
         self._place.clear()
         with self._fault.around():

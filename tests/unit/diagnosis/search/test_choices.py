@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
-from diagnosis.findings.judgements import spring_choices
+from diagnosis.findings.spring_choices import spring_choices
 from diagnosis.findings.verdict import next_steps, verdict
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit

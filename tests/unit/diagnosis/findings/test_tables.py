@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
+from diagnosis.findings.next_run import run_words
 from diagnosis.findings.sections import printed
-from diagnosis.findings.verdict import rival_lines, run_words
+from diagnosis.findings.verdict import rival_lines
 from identification.estimate import Estimate, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs

@@ -19,7 +19,8 @@ from diagnosis.findings import sections
 from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
-from diagnosis.findings.verdict import headline, next_steps, run_words, size_words, undecided_words
+from diagnosis.findings.next_run import run_words
+from diagnosis.findings.verdict import headline, next_steps, size_words, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import left_over, probability

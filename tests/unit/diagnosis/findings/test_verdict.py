@@ -14,9 +14,8 @@ from diagnosis.findings.cards import key_figures
 from diagnosis.findings.causes import said_size
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
-from diagnosis.findings.found import Nearly
 from diagnosis.findings.judged import Misfit
-from diagnosis.findings.judgements import immaterial, nearly
+from diagnosis.findings.judgements import Nearly, immaterial, nearly
 from diagnosis.findings.reported import held_out_totals
 from diagnosis.findings.sections import diagnosis_brief
 from diagnosis.findings.verdict import headline, next_steps, rival_lines, undecided_words, verdict

@@ -1,0 +1,39 @@
+"""Disturbed runs: what is used of them, and what to do about them, in words."""
+
+from __future__ import annotations
+
+from diagnosis.search.disturbance import Disturbance
+
+
+def disturbed_words(found: Disturbance, *, no_gap: bool) -> str:
+    """A disturbed run, and how much of it is used.
+
+    Args:
+        no_gap: whether the runs show no gap without the disturbance.
+    """
+    run, kept, at, begins = found.run, found.kept_until_s, found.at_s, found.kept_from_s
+    if at is None:
+        if begins is not None:
+            part = "Without that part there is no gap, so it" if no_gap else "That part"
+            return f"Run {run} does not move as the others do before {begins:.4g} s. {part} is not used."
+        whole = "Without it there is no gap, so it" if no_gap else "It"
+        return f"Run {run} differs from the others. {whole} is not used."
+    if found.used:
+        why = "the other runs do not determine the model"
+        return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
+    unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
+    if begins is not None:
+        unused = f"its readings before {begins:.4g} s are not used"
+    return f"Run {run} was disturbed at {at:.4g} s; {unused}."
+
+
+def disturbed_step(found: Disturbance) -> str:
+    """What to do about a disturbed run."""
+    if found.at_s is not None:
+        return f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s."
+    if found.kept_from_s is not None:
+        return f"Look at the release of run {found.run}: its free motion begins at {found.kept_from_s:.4g} s."
+    return (
+        f"Repeat run {found.run}, which differs from the others, or look at its release, its unit, its gain "
+        "and its filter."
+    )
