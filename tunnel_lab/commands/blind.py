@@ -145,10 +145,8 @@ def make(
     refuse_unwritable_files(key)
     with bar_or_lines("sizing effects and writing campaigns", count) as progress:
         where = make_blind(
-            out, count=count, seed=seed, shares=shares, key=key,
-            mixture=Mixture(**vars(mixture)),
-            progress=progress,
-            show_steps=console(stderr=True).is_terminal,
+            out, count=count, seed=seed, shares=shares, mixture=Mixture(**vars(mixture)), key=key,
+            progress=progress, show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({counted(count, 'campaign')}), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")

@@ -305,7 +305,7 @@ def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
 
 def compare(
     documents: Annotated[
-        list[Path], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
+        tuple[Path, ...], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
     ],
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.

@@ -31,15 +31,21 @@ def plot(
         Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its figures.")
     ],
     names: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         Argument(metavar="[FIGURE]...", help="Figures of a diagnosis. Default: fit and repeatability."),
-    ] = None,
+    ] = (),
     out: Annotated[
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
     ] = Path("tunnel-output"),
     runs: Annotated[
-        list[str] | None, Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all.")
-    ] = None,
+        tuple[str, ...],
+        Option(
+            "--run",
+            metavar="ID",
+            help="Runs of a diagnosis to draw. Default: all.",
+            callback=split_names,
+        ),
+    ] = (),
 ) -> None:
     """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
 
@@ -70,7 +76,7 @@ def plot(
 
     failure = ""
     if campaign.suffix.lower() == ".json":
-        drawn = _of_diagnosis(campaign, names or [], split_names(runs))
+        drawn = _of_diagnosis(campaign, names, runs)
         folder = output_folder(out / campaign.stem)
     else:
         if runs:
@@ -93,7 +99,7 @@ def plot(
         raise typer.Exit(1)
 
 
-def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[str, Figure]:
+def _of_diagnosis(file: Path, names: tuple[str, ...], runs: tuple[str, ...]) -> dict[str, Figure]:
     """Figures of a diagnosis by the name of their file.
 
     Raises:

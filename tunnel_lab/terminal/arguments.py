@@ -192,7 +192,7 @@ def chosen_estimator(word: str) -> str:
     return word
 
 
-def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
+def chosen_estimators(words: Sequence[str]) -> tuple[str, ...]:
     """The names of estimators from repeated options, each perhaps a list with commas."""
     return tuple(dict.fromkeys(map(chosen_estimator, split_names(words))))
 
