@@ -76,10 +76,8 @@ def _as_list(option: Parameter) -> Parameter:
     if not _is_repeated(option):
         return option
     kind, word = _parts(option.annotation)
-    item = get_args(kind)[0]
-    if option.default is Parameter.empty:
-        return option.replace(annotation=Annotated[list[item], word])  # type: ignore[valid-type]
-    return option.replace(annotation=Annotated[list[item] | None, word], default=None)  # type: ignore[valid-type]
+    as_list: Any = list[get_args(kind)[0]]  # type: ignore[misc]  # a type that is known when it runs
+    return option.replace(annotation=Annotated[as_list, word], default=option.default or None)
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
