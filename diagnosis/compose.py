@@ -22,7 +22,7 @@ from diagnosis.findings.averaged_coefficients import (
     in_phase,
     possible_answers,
 )
-from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion
+from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion, parameter_errors
 from diagnosis.findings.closing import Closing, confirmed
 from diagnosis.findings.closure import GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
@@ -34,7 +34,6 @@ from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import cautions, immaterial, nearly, outside_the_fits, zeros_apart
 from diagnosis.findings.next_run import separating_run
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
-from diagnosis.findings.parameter_errors import parameter_errors
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
@@ -136,6 +135,11 @@ class _Named:
     immaterial: Mapping[str, float]
     limit_cycles: tuple[Remark, ...] = ()
 
+    @property
+    def unsure(self) -> bool:
+        """Whether runs of free decays leave the answer undecided, or no effect is the likeliest answer."""
+        return not self.limit_cycles and (not self.decision.decided or _unknown(self.candidates))
+
 
 def composed(
     answered: Confirmed, chosen: Chosen, asked: Question, without_outlier: AnswerWithout | None = None
@@ -161,23 +165,7 @@ def composed(
     rivals = _rivals(study)
     beside = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
     next_run = separating_run(fitted, beside[0]) if beside and fitted is not study.nominal else None
-    noise, unsure = study.prepared.noise, not named.decision.decided or _unknown(named.candidates)
-    caveats = (
-        *chosen.left_out,
-        *_of_model(study, unpatched),
-        *cautions(
-            study.campaign,
-            noise,
-            closes.gap.runs,
-            closes.confirmation,
-            named=study.named,
-            settings=study.settings,
-        ),
-        *outside_the_fits(study),
-        *of_remainder,
-        *(zeros_apart(study) if unsure and not cycling else ()),
-    )
-    runs = study.nominal.problem.data.runs
+    caveats = _caveats(study, chosen, closes, unpatched, of_remainder, named)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=named.causes,
@@ -213,28 +201,59 @@ def composed(
         model=patched,
         closable=closable,
         sizes=cause_sizes(study) if study.named else (),
-        found=Found(
-            place=named.place if isinstance(named.place, PlaceFound) else None,
-            nowhere=named.place if isinstance(named.place, Nowhere) else None,
-            both_winds=len({run.wind_on for run in runs}) > 1,
-            robot=study.model.of_robot and not any(run.wind_on for run in runs),
-            driven=all(run.drive is not None for run in runs),
-            nearly=nearly(study),
-            immaterial=named.immaterial,
-            choices=spring_choices(study),
-            hold=other_hold(study),
-            rivals=_from_outside(study) if unsure and not cycling else (),
-            second_modes=_second_modes(study, chosen) if _unknown(named.candidates) and not cycling else (),
-            limit_cycles=named.limit_cycles,
-            noise=noise.reason,
-            cautions=caveats,
-            noted=(
-                *noise_noted(noise, study.prepared.trend, study.gap.test, named=study.named),
-                *hum_noted(study.campaign, study.prepared.hum, similarity),
-            ),
-        ),
+        found=_beside(study, chosen, named, caveats),
         data=chosen.examined,
         **findings_of(Answered(chosen.examined, study, named.coefficients.before, named.coefficients.after)),
+    )
+
+
+def _caveats(
+    study: Study,
+    chosen: Chosen,
+    closes: Closing,
+    unpatched: tuple[Fact, ...],
+    of_remainder: tuple[Fact, ...],
+    named: _Named,
+) -> tuple[Fact, ...]:
+    """All caveats of an answer, in the order in which they are listed."""
+    noise, data, settings = study.prepared.noise, study.campaign, study.settings
+    of_answer = cautions(
+        data, noise, closes.gap.runs, closes.confirmation, named=study.named, settings=settings
+    )
+    zeros = zeros_apart(study) if named.unsure else ()
+    return (
+        *chosen.left_out,
+        *_of_model(study, unpatched),
+        *of_answer,
+        *outside_the_fits(study),
+        *of_remainder,
+        *zeros,
+    )
+
+
+def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ...]) -> Found:
+    """The facts of an answer that are not numbers of it."""
+    runs, noise = study.nominal.problem.data.runs, study.prepared.noise
+    unknown = named.unsure and _unknown(named.candidates)
+    return Found(
+        place=named.place if isinstance(named.place, PlaceFound) else None,
+        nowhere=named.place if isinstance(named.place, Nowhere) else None,
+        both_winds=len({run.wind_on for run in runs}) > 1,
+        robot=study.model.of_robot and not any(run.wind_on for run in runs),
+        driven=all(run.drive is not None for run in runs),
+        nearly=nearly(study),
+        immaterial=named.immaterial,
+        choices=spring_choices(study),
+        hold=other_hold(study),
+        rivals=_from_outside(study) if named.unsure else (),
+        second_modes=_second_modes(study, chosen) if unknown else (),
+        limit_cycles=named.limit_cycles,
+        noise=noise.reason,
+        cautions=caveats,
+        noted=(
+            *noise_noted(noise, study.prepared.trend, study.gap.test, named=study.named),
+            *hum_noted(study.campaign, study.prepared.hum, study.similarity),
+        ),
     )
 
 

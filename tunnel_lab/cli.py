@@ -31,8 +31,8 @@ from tunnel_lab.commands import (
     sweep,
     train,
 )
-from tunnel_lab.terminal.arguments import with_format, with_quiet
 from tunnel_lab.terminal.encoding import replace_what_cannot_be_encoded
+from tunnel_lab.terminal.options import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
 FAILED = 1

@@ -1,1 +1,1 @@
-"""From a study to the answer: held-out closure, coefficients, rivals, words."""
+"""What an answer predicts: held-out readings, and its coefficients by linear theory."""

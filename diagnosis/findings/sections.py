@@ -1,4 +1,4 @@
-"""A diagnosis in sections of blocks, from its document: the content of every face.
+"""A diagnosis in sections of blocks, from its findings: the content of every face.
 
 A terminal, ``print``, a notebook and the bench show the sections without their details (`printed`); the report
 shows all of them.
@@ -6,10 +6,9 @@ shows all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
-from diagnosis.findings.captions import captioned, pictured
 from diagnosis.findings.cards import cause_cards, effect_cards
 from diagnosis.findings.closure import model_line, noise_line, runs_table, tests_table, waterfall_table
 from diagnosis.findings.coefficients import (
@@ -31,6 +30,7 @@ from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
     Block,
     Detail,
+    Figure,
     Heading,
     Listing,
     Pairs,
@@ -298,3 +298,21 @@ def diagnosis_brief(answer: Findings) -> str:
         f"  gap {size}{closed}\n"
         "  print() shows all; .plot(), .write_report(path), .to_frame()"
     )
+
+
+CAPTIONS: Mapping[str, str] = {
+    "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "
+    "residuals. The first view shows the cycles in which the models differ most.",
+    "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
+    "and unknown.",
+}
+
+
+def captioned(name: str) -> Figure:
+    """A figure with its caption."""
+    return Figure(name, CAPTIONS[name])
+
+
+def pictured(answer: Findings, *names: str) -> tuple[Figure, ...]:
+    """The figures of findings by their names, those that the answer has."""
+    return tuple(answer.pictures[name].block for name in names if name in answer.pictures)

@@ -25,6 +25,7 @@ from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.what_it_costs import WhatItCosts
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
@@ -149,6 +150,7 @@ class Findings:
     sizes: tuple[CauseSize, ...] = ()
     found: Found = field(default_factory=Found)
     friction: FrictionCurve | None = None
+    costs: WhatItCosts | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     @property

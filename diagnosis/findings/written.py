@@ -42,11 +42,7 @@ class Sentences:
 
 
 def sentences(answer: Findings) -> Sentences:
-    """Write the sentences of a diagnosis.
-
-    Args:
-        document: the diagnosis in JSON's types; its text fields are ignored.
-    """
+    """Write the sentences of a diagnosis, whose text fields are ignored."""
     found, rest, model = (
         answer.found,
         "" if answer.rest is None else answer.rest.in_words(answer),

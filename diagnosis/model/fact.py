@@ -12,7 +12,7 @@ from tunnel_sim.files.writing import as_json
 
 @dataclass(frozen=True)
 class Fact:
-    """One finding, whose sentence is in `diagnosis.words` under its kind.
+    """One finding, whose sentence is in `diagnosis.findings` under its kind.
 
     Args:
         figures: the quantities in the sentence, by name, in JSON's types; numbers have their units in their names.

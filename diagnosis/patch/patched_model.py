@@ -221,6 +221,7 @@ Simulate = Callable[[Array, Start, float], Motion]
 """From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
 
 _RELEASE_STEPS = 2  # Gauss–Newton steps of a run's start in the engine
+_SHIFT = 1e-4  # of the start, for its derivatives
 
 
 def native_closure(
@@ -253,7 +254,7 @@ def native_closure(
         common, start = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        engine.append(_restarted(chosen, common, start, i, simulate, native)[1])
+        engine.append(_restarted(chosen.problem, common, start, i, simulate, native)[1])
     ids = [] if held else [run.id for run in runs if not run.wind_on]
     if ids:
         turns = turns_of(nominal, ids)
@@ -267,7 +268,7 @@ def native_closure(
             for i, left in enumerate(out):
                 if left.any():
                     start = point.per_run[i]
-                    seen = _restarted(chosen, point.common, start, i, simulate, native, seen=~left)[1]
+                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
                     engine.append(seen[left])
@@ -282,7 +283,7 @@ def native_closure(
 
 
 def _restarted(
-    fit: Fit,
+    problem: Problem,
     common: Array,
     own: Array,
     index: int,
@@ -290,18 +291,21 @@ def _restarted(
     native: frozenset[str],
     seen: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, Array]:
-    """A run's own parameters, its start refitted in the engine to the fitted part, and its `engine_residual`.
+    """A run's own parameters, its start refitted in the engine to the fitted part, and its `engine_residual`."""
+    seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
-    Args:
-        fit: whose derivatives by the start serve for the engine, too.
-    """
-    seen = np.ones(fit.problem.data.runs[index].reading.size, bool) if seen is None else seen
-    slopes = fit.jacobian[index][1][seen, :2]
-    best = engine_residual(fit.problem, common, own, index, simulate, native)
+    def left(per_run: Array) -> Array:
+        return engine_residual(problem, common, per_run, index, simulate, native)
+
+    best = left(own)
     for _ in range(_RELEASE_STEPS):
-        trial = own.copy()
-        trial[:2] += np.linalg.lstsq(slopes, best[seen], rcond=1e-10)[0]
-        moved = engine_residual(fit.problem, common, trial, index, simulate, native)
+        # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
+        size = max(abs(float(own[0])), 1e-3)
+        steps = _SHIFT * size * np.array([1.0, 10.0])
+        slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+        move = np.linalg.lstsq(np.array(slopes).T[seen], best[seen], rcond=1e-10)[0]
+        trial = own + np.concatenate([move, np.zeros(own.size - 2)])
+        moved = left(trial)
         if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
             break
         own, best = trial, moved
@@ -445,7 +449,7 @@ def _written_model(
     own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         common = chosen.point.common
-        own = [_restarted(chosen, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
+        own = [_restarted(chosen.problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
     spec, written = patched(model, identified.patch, starts)

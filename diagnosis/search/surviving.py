@@ -41,9 +41,9 @@ def refusal_with_moment(answer: RandomAnswer, repeating: Fit) -> Fact | None:
     Args:
         repeating: fit of the nominal model to runs that repeat.
     """
-    if explains_too_much(answer.process, repeating):
-        return Fact("explains too much", {"effects": tuple(kind.name for kind in answer.kinds)})
     beside = answer.beside
+    if explains_too_much(answer.process, repeating, alone=beside is None):
+        return Fact("explains too much", {"effects": tuple(kind.name for kind in answer.kinds)})
     noisy = None if beside is None else with_response(beside.fit, answer.process.spectrum)
     if beside is None or noisy is None:
         return None
@@ -53,10 +53,11 @@ def refusal_with_moment(answer: RandomAnswer, repeating: Fit) -> Fact | None:
         return None
 
 
-def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
+def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = False) -> bool:
     """Whether a random moment explains more than the nominal model leaves in the runs in which it acts.
 
-    The effects beside it then fit these runs worse than no effect, and the moment pays for them.
+    The effects beside it then fit these runs worse than no effect, and the moment pays for them. A moment alone has
+    no effect to pay for: only what the nominal model absorbs of a random motion is not left.
     """
     left, freedom = 0.0, 0
     for run, residual in zip(repeating.problem.data.runs, repeating.residuals, strict=True):
@@ -65,7 +66,8 @@ def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
             freedom += residual.size
     chosen = repeating.settings.moment
     margin = chosen.explains_stds * float(np.sqrt(2.0 * freedom))
-    return process.drop > chosen.explains_most * max(left, 0.0) + margin
+    most = chosen.explains_alone if alone else chosen.explains_most
+    return process.drop > most * max(left, 0.0) + margin
 
 
 def contradicted(whole: Fit) -> dict[str, str]:

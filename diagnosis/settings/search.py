@@ -349,6 +349,13 @@ class RandomMomentSettings:
         "The release of a run absorbs part of a random motion, and the nominal model all that it can; a half is "
         "allowed for both.",
     )
+    explains_alone: float = setting(
+        3.0,
+        "The same for a random moment without effects beside it.",
+        "judgement",
+        "The nominal model and the releases absorb up to two thirds of a random motion of few cycles: 1.54 and "
+        "1.61 are seen where a moment acts alone, 1.9 and more where it pays for other effects.",
+    )
     explains_stds: float = setting(
         4.0, "Margin of χ² of noise over that maximum.", "convention", "One campaign in 30,000.", unit="std"
     )

@@ -25,6 +25,10 @@ PACKAGES = {
     "tunnel_sim": "the rig, its effects, its records",
 }
 """From the highest layer to the lowest; a package imports only from those below it."""
+WAYS = {
+    "diagnosis": "the way of an answer: rooms up to patch → compose.py → findings, a file each → result.py"
+}
+"""By package, the way of its result through rooms and modules, where the order of imports does not show it."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ def draw(path: Path) -> None:
         top, colour = 98.0 - 25.0 * row, COLOURS[row]
         ax.text(0.5, top, package, weight="bold", va="top", color=colour, fontsize=11)
         ax.text(17.0, top - 0.3, summary, va="top", fontsize=9)
+        ax.text(97.6, top - 0.6, WAYS.get(package, ""), ha="right", va="top", fontsize=7)
         folders = [room for room in found if room.package == package and room.is_folder][::-1]
         others = [room.name for room in found if room.package == package and not room.is_folder]
         width = 97.0 / len(folders)
@@ -91,7 +96,8 @@ def draw(path: Path) -> None:
             ax.text(middle, top - 6.4, room.name, ha="center", va="center", fontsize=9)
             words = fill(room.summary, int(1.85 * width))
             ax.text(middle, top - 8.4, words, ha="center", va="top", fontsize=6, linespacing=1.1)
-        ax.text(1.5, top - 21.4, "at the top: " + ", ".join(others[::-1]), va="center", fontsize=7)
+        listed = "modules beside the rooms, from low to high: " + ", ".join(others[::-1])
+        ax.text(1.5, top - 21.4, listed, va="center", fontsize=7)
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "layout"}):
         fig.savefig(path, format="svg", metadata={"Date": None})
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import DTypeLike, NDArray
-from pydantic import ConfigDict
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike, NDArray
+    from pydantic import ConfigDict
 
-_FINITE = ConfigDict(allow_inf_nan=False)
+_FINITE: ConfigDict = {"allow_inf_nan": False}
 
 
 class AsNumber:
@@ -24,6 +24,8 @@ class AsNumber:
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """The value as an array without dimensions."""
+        import numpy as np  # not at the start of a command
+
         del copy  # it is always new
         return np.array(self.value, dtype=dtype)
 

@@ -28,6 +28,7 @@ from identification.statistics import eliminate, inverse
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, Run
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import Truth
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -129,11 +130,8 @@ class CampaignBound:
 
 def campaign_bound(
     campaign: Campaign,
+    truth: Truth,
     *,
-    cn_beta: float,
-    cn_r: float,
-    yaw_inertia: float,
-    mechanical_damping: float,
     noise_std: float,
     drive_gain: float = 1.0,
     initial_states: Sequence[tuple[float, float]] | None = None,
@@ -144,10 +142,6 @@ def campaign_bound(
 
     Args:
         campaign: conditions, inputs and sample times; the readings themselves are not used.
-        cn_beta: true Cnβ, 1/rad.
-        cn_r: true Cnr, 1/rad.
-        yaw_inertia: true Izz, kg m².
-        mechanical_damping: true Cr, N m s/rad.
         noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
         drive_gain: true gain of inputs that state none, unknown to the estimator, N m per unit.
         initial_states: angle [rad] and rate [rad/s] at each run's first sample; None: the runs' nominal release
@@ -175,12 +169,12 @@ def campaign_bound(
     linked = with_gains(design, runs)
     truths = []
     for run, load, damping in zip(runs, design.stiffness_loads, design.damping_loads, strict=True):
-        rate, gain = 0.5 * (mechanical_damping - damping * cn_r), 0.0
+        rate, gain = 0.5 * (truth.mechanical_damping - damping * truth.cn_r), 0.0
         if run.drive is not None and not run.drive.kind.by_inertia:  # whose gain depends on no parameter
             gain = run.drive.kind.scale * drive_gain if run.input_gain is None else run.input_gain
-        truths += [rate, (run.spring_stiffness or 0.0) - load * cn_beta, gain]
+        truths += [rate, (run.spring_stiffness or 0.0) - load * truth.cn_beta, gain]
     parameters: Array = np.linalg.lstsq(
-        np.vstack(linked.links), np.array(truths, dtype=np.float64) / yaw_inertia, rcond=None
+        np.vstack(linked.links), np.array(truths, dtype=np.float64) / truth.yaw_inertia, rcond=None
     )[0].astype(np.float64)
     states = initial_states
     if states is None:

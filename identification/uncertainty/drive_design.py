@@ -8,7 +8,7 @@ Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identificatio
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
 from math import cos, floor, hypot, inf, log, log10, pi, sqrt
 from typing import Literal
@@ -91,7 +91,7 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     try:
         bound = campaign_bound(
             campaign,
-            **asdict(plan.truth),
+            plan.truth,
             noise_std=noise,
             drive_gain=plan.conditions[0].gain,
             random_moments=moments,

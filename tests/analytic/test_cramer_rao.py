@@ -72,7 +72,7 @@ def test_campaign_bound_matches_numerical_information():
         [(model(point + step) - model(point - step)) / 2e-6 for step in 1e-6 * np.eye(point.size)]
     ).T
     expected = 1e-6 * np.linalg.inv(jacobian.T @ jacobian)[:4, :4]
-    bound = campaign_bound(data, **dict(zip(NAMES, base, strict=True)), noise_std=1e-3)
+    bound = campaign_bound(data, Truth(*base), noise_std=1e-3)
     assert bound.parameters == NAMES
     np.testing.assert_allclose(np.array(bound.covariance), expected, rtol=1e-4)
 
@@ -105,11 +105,11 @@ def test_the_bound_of_runs_that_scatter_is_that_of_their_marginal_distribution()
         columns[:, :5], columns[:, 5 + 2 * place : 7 + 2 * place] = slopes[:, :5], slopes[:, 5:7]
         information += columns.T @ np.linalg.solve(1e-6 * np.eye(time.size) + own @ own.T, columns)
     expected = np.linalg.inv(information)[:4, :4]
-    truth = dict(zip(NAMES, base, strict=True))
-    found = campaign_bound(data, **truth, noise_std=1e-3, repeatability=Repeatability(*widths))
+    truth = Truth(*base)
+    found = campaign_bound(data, truth, noise_std=1e-3, repeatability=Repeatability(*widths))
     np.testing.assert_allclose(np.array(found.covariance), expected, rtol=1e-3)
-    without = campaign_bound(data, **truth, noise_std=1e-3, repeatability=Repeatability())
-    assert without == campaign_bound(data, **truth, noise_std=1e-3)
+    without = campaign_bound(data, truth, noise_std=1e-3, repeatability=Repeatability())
+    assert without == campaign_bound(data, truth, noise_std=1e-3)
     assert found.std("cn_beta") > 3.0 * without.std("cn_beta")
 
 
@@ -120,7 +120,7 @@ def test_estimate_claims_the_bound_when_the_model_is_right():
     noise = float(np.hypot(5e-4, RESOLUTION / np.sqrt(12.0)))
     bound = campaign_bound(
         data,
-        **{name: getattr(truth, name) for name in NAMES},
+        truth,
         noise_std=noise,
         initial_states=[(setting.release, setting.rate) for setting in TWELVE],
     )
@@ -130,16 +130,16 @@ def test_estimate_claims_the_bound_when_the_model_is_right():
 
 def test_bound_refuses_what_it_lacks():
     data = campaign((Setting(None, 0.0),))
-    values = dict.fromkeys(NAMES, 0.1)
+    values = Truth(0.1, 0.1, 0.1, 0.1)
     with pytest.raises(TunnelError, match="spring_stiffness"):
-        campaign_bound(data, **values, noise_std=1e-3)
+        campaign_bound(data, values, noise_std=1e-3)
     with pytest.raises(TunnelError, match="frontal_area"):
-        campaign_bound(campaign((Setting(16.0, 10.0),), has_size=False), **values, noise_std=1e-3)
+        campaign_bound(campaign((Setting(16.0, 10.0),), has_size=False), values, noise_std=1e-3)
     with pytest.raises(ValueError, match="positive"):
         damped_sinusoid_bound(
             np.arange(9.0), amplitude=0.0, phase=0.0, frequency=1.0, zeta=0.1, noise_std=1.0
         )
-    wind_off = campaign_bound(campaign((Setting(16.0, 0.0),)), **values, noise_std=1e-3)
+    wind_off = campaign_bound(campaign((Setting(16.0, 0.0),)), values, noise_std=1e-3)
     assert wind_off.parameters == ("yaw_inertia", "mechanical_damping")
     with pytest.raises(KeyError):
         wind_off.std("cn_beta")

@@ -18,6 +18,7 @@ from tunnel_sim.envs.information import UNKNOWNS, Prior, half_log_det
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
+from tunnel_sim.vocabulary.plan import Truth
 
 RIG = load_rig()
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.004}
@@ -83,7 +84,7 @@ def test_two_runs_together_have_the_bound_of_their_campaign() -> None:
     )
     deviation = float(np.sqrt(env.config.reading_variance))
     injected = {name: TRUTH[name] for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")}
-    bound = campaign_bound(campaign, **injected, noise_std=deviation)
+    bound = campaign_bound(campaign, Truth(**injected), noise_std=deviation)
     found = np.sqrt(np.diag(np.linalg.inv(total)))
     names = ("yaw_inertia", "mechanical_damping", "sensor_zero", "cn_beta", "cn_r")
     for name, value in zip(names, found, strict=False):

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from identification import ALL_ESTIMATORS
-
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 TEXT = " ".join((ROOT / "paper.md").read_text(encoding="utf-8").split())
@@ -54,11 +52,6 @@ def test_the_figures_of_the_benchmark_are_those_of_its_page() -> None:
     causes = CAUSES[CAUSES.index("## Causes") :]
     false, named = found(r"^\| tunnel diagnose \|(?:[^|]*\|){2} (\d+)/(\d+) ", causes)
     assert f"{false} of {named} named causes false" in " ".join(TEXT.split())
-
-
-def test_the_counts_are_those_of_the_code() -> None:
-    assert len(ALL_ESTIMATORS) == 9
-    assert "nine estimators" in TEXT
 
 
 def test_references_and_pictures_exist() -> None:

@@ -107,6 +107,12 @@ def test_a_rival_is_added_in_one_class(tmp_path: Path) -> None:
     assert len(shown) == 3
 
 
+def test_a_finding_is_added_in_one_class(tmp_path: Path) -> None:
+    shown = steps(PAGES / "add-a-finding.md")
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
+    assert [bool(text) for _, text in shown] == [False, False, True, True]
+
+
 def test_an_estimator_is_added_in_one_class(tmp_path: Path) -> None:
     page = PAGES / "add-an-estimator.md"
     shown = steps(page)

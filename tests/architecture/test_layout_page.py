@@ -68,6 +68,33 @@ def test_every_question_is_answered_by_files_that_have_the_names() -> None:
             assert re.search(rf"\b{name}\b", sources), (question, name)
 
 
+def test_every_step_of_an_answer_is_where_the_page_says() -> None:
+    rows = re.findall(r"^\| \d\. \w[\w ]* \| (`diagnosis/.*?) \| (.*) \|$", TEXT, re.MULTILINE)
+    assert len(rows) == 4
+    for place, content in rows:
+        (path,) = PATH.findall(place)
+        names = re.findall(r"`(\w+)`", place) + re.findall(r"`([a-z_]+)`", content)
+        source = (layout.ROOT / path).read_text("utf-8") if path.endswith(".py") else ""
+        assert [name for name in names if not re.search(rf"\b{name}\b", source)] == []
+
+
+def test_the_findings_have_the_files_and_types_that_the_page_names() -> None:
+    findings = layout.ROOT / "diagnosis" / "findings"
+    rows = re.findall(r"^\| (`[a-z_]+\.py`(?:, `[a-z_]+\.py`)*) \| (.*) \|$", TEXT, re.MULTILINE)
+    assert len(rows) >= 5
+    for files, content in rows:
+        sources = "".join((findings / name).read_text("utf-8") for name in re.findall(r"`(\w+\.py)`", files))
+        for name in re.findall(r"`([A-Z]\w+)`", content):
+            assert re.search(rf"^class {name}\b", sources, re.MULTILINE), name
+
+
+def test_the_way_of_a_result_leads_through_modules_that_exist() -> None:
+    for package, way in layout.WAYS.items():
+        named = re.findall(r"(\w+\.py)", way)
+        assert named
+        assert [name for name in named if not (layout.ROOT / package / name).is_file()] == []
+
+
 def test_the_effect_is_registered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_registered", {})
     kind = run("effect")["ExtraStiffness"]

@@ -40,6 +40,7 @@ from tests.support.driven_runs import (
 )
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import Truth
 from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.usefixtures("causes_alone")
@@ -118,8 +119,8 @@ def test_what_an_estimator_does_not_take_is_refused_in_one_line(name: str, estim
 
 
 def bound(given: Campaign) -> CampaignBound:
-    rest = {"cn_beta": 0.0, "cn_r": 0.0, "noise_std": NOISE["angle"], "drive_gain": GAIN}
-    return campaign_bound(given, **TRUTH, **rest)
+    truth = Truth(0.0, 0.0, **TRUTH)
+    return campaign_bound(given, truth, noise_std=NOISE["angle"], drive_gain=GAIN)
 
 
 BOUNDED = [name for name, kind in KINDS.items() if kind.stated and kind.reads == "angle"]

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 def bound():
     found = campaign_bound(
         campaign(SETTINGS, **SHAPE),
-        **{name: getattr(Truth(), name) for name in NAMES},
+        Truth(),
         noise_std=float(np.hypot(NOISE, RESOLUTION / np.sqrt(12.0))),
     )
     return np.array([found.std(name) for name in NAMES])

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import shlex
-from enum import StrEnum
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from typer import Argument, Option
@@ -17,9 +18,8 @@ from tunnel_lab.terminal.arguments import (
     output_file,
     refuse_unwritable_files,
     split_names,
-    with_format,
-    with_quiet,
 )
+from tunnel_lab.terminal.options import with_format, with_quiet
 from tunnel_lab.terminal.outputs import console, say, say_written
 from tunnel_lab.terminal.progress import bar_or_lines
 from tunnel_sim.vocabulary.errors import counted
@@ -37,26 +37,67 @@ to a separate key, and its salted SHA-256 is published with the data.
 """
 
 
-class ScatterLevel(StrEnum):
-    """Width of the scatter between runs."""
-
-    MIXED = "mixed"
-    SMALL = "small"
-    USUAL = "usual"
-    LARGE = "large"
-
-
 app = typer.Typer(help=HELP, rich_markup_mode="rich", no_args_is_help=True)
 
 Folder = Annotated[Path, Argument(help="Folder of the set.")]
 Excluded = Annotated[
-    list[str] | None,
-    Option("--exclude", metavar="EFFECT", help="Leave effects out of the vocabulary; their campaigns "
-                 "then count as unknown."),
-]  # fmt: skip
+    tuple[str, ...],
+    Option(
+        "--exclude",
+        metavar="EFFECT",
+        help="Leave effects out of the vocabulary; their campaigns then count as unknown.",
+        callback=split_names,
+    ),
+]
 KeyFile = Annotated[
     Path | None, Option("--key", metavar="FILE", help="The key. Default: key.json in the set.")
 ]
+
+
+_share = partial(Option, min=0, max=1)
+
+
+@dataclass(frozen=True)
+class MixtureOptions:
+    """The options of a `Mixture`, which has fields of these names."""
+
+    textbook: Annotated[float, _share("--textbook", help="Share of textbook forms.")] = 0.5
+    rare: Annotated[float, _share("--rare", help="Share of rare forms in the rest.")] = 0.5
+    variety: Annotated[
+        float,
+        _share(
+            "--variety",
+            help="Share with another scale, and the same share each with few runs, coloured noise and uneven "
+            "time stamps.",
+        ),
+    ] = 0.25
+    small: Annotated[float, _share("--small", help="Share with an additional small effect.")] = 0.25
+    departures: Annotated[
+        float,
+        _share(
+            "--departures",
+            help="Share, each, with other sample rates, durations, clocks, release sides, starts, air, springs, "
+            "noise and zeros than the standard rig's.",
+        ),
+    ] = 0.0
+    scatter: Annotated[
+        float, _share("--scatter", help="Share whose runs differ by chance; 0: as earlier versions drew.")
+    ] = 0.5
+    level: Annotated[
+        Literal["mixed", "small", "usual", "large"],
+        Option("--scatter-level", help="Widths: small or large (mixed), or the usual ones throughout."),
+    ] = "mixed"
+    normal: Annotated[
+        float,
+        _share(
+            "--scatter-normal",
+            help="Share of these that are normal; the rest has tails, zeros of the runs, a walk or a drift.",
+        ),
+    ] = 0.5
+    stated: Annotated[float, _share("--stated", help="Share of these that state a [repeatability].")] = 0.5
+    driven: Annotated[
+        bool, Option("--driven", help="Drive the runs, all or some, by known moments or other inputs.")
+    ] = False
 
 
 @app.command("make")
@@ -73,56 +114,8 @@ def make(
             help="single, pair, three, four, none, outside, law, with weights.",
         ),
     ] = None,
-    textbook: Annotated[float, Option("--textbook", min=0, max=1, help="Share of textbook forms.")] = 0.5,
-    rare: Annotated[float, Option("--rare", min=0, max=1, help="Share of rare forms in the rest.")] = 0.5,
-    variety: Annotated[
-        float,
-        Option(
-            "--variety",
-            min=0,
-            max=1,
-            help="Share with another scale, and the same share each with few runs, coloured noise and uneven "
-            "time stamps.",
-        ),
-    ] = 0.25,
-    small: Annotated[
-        float, Option("--small", min=0, max=1, help="Share with an additional small effect.")
-    ] = 0.25,
-    departures: Annotated[
-        float,
-        Option(
-            "--departures",
-            min=0,
-            max=1,
-            help="Share, each, with other sample rates, durations, clocks, release sides, starts, air, springs, "
-            "noise and zeros than the standard rig's.",
-        ),
-    ] = 0.0,
-    scatter: Annotated[
-        float,
-        Option(
-            "--scatter", min=0, max=1, help="Share whose runs differ by chance; 0: as earlier versions drew."
-        ),
-    ] = 0.5,
-    scatter_level: Annotated[
-        ScatterLevel,
-        Option("--scatter-level", help="Widths: small or large (mixed), or the usual ones throughout."),
-    ] = ScatterLevel.MIXED,
-    scatter_normal: Annotated[
-        float,
-        Option(
-            "--scatter-normal",
-            min=0,
-            max=1,
-            help="Share of these that are normal; the rest has tails, zeros of the runs, a walk or a drift.",
-        ),
-    ] = 0.5,
-    stated: Annotated[
-        float, Option("--stated", min=0, max=1, help="Share of these that state a [repeatability].")
-    ] = 0.5,
-    driven: Annotated[
-        bool, typer.Option("--driven", help="Drive the runs, all or some, by known moments or other inputs.")
-    ] = False,
+    *,
+    mixture: MixtureOptions,
     key: KeyFile = None,
 ) -> None:
     """Make a set: campaigns without truth, the sealed key, and its published hash.
@@ -152,13 +145,8 @@ def make(
     refuse_unwritable_files(key)
     with bar_or_lines("sizing effects and writing campaigns", count) as progress:
         where = make_blind(
-            out, count=count, seed=seed, shares=shares, key=key,
-            mixture=Mixture(
-                textbook, rare, variety, small, driven=driven, departures=departures,
-                scatter=scatter, level=scatter_level.value, stated=stated, normal=scatter_normal,
-            ),
-            progress=progress,
-            show_steps=console(stderr=True).is_terminal,
+            out, count=count, seed=seed, shares=shares, mixture=Mixture(**vars(mixture)), key=key,
+            progress=progress, show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({counted(count, 'campaign')}), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")
@@ -174,7 +162,7 @@ def make(
 @with_quiet
 def diagnose(
     folder: Folder,
-    exclude: Excluded = None,
+    exclude: Excluded = (),
     jobs: Annotated[
         int | None,
         Option("--jobs", min=0, help="Number of processes. Default: 0, which uses this one."),
@@ -195,12 +183,12 @@ def diagnose(
     from tunnel_lab.experiments.blind import answer_set, answers_folder
     from tunnel_lab.experiments.runner import crew
 
-    names, workers = split_names(exclude), crew(jobs, scheduler, usual=0)
+    workers = crew(jobs, scheduler, usual=0)
     with bar_or_lines("diagnosing") as progress:
         sealed = answer_set(
-            folder, excluded=names, workers=workers, progress=progress, effects_file=effects_file
+            folder, excluded=exclude, workers=workers, progress=progress, effects_file=effects_file
         )
-    say(f"Answers: {answers_folder(folder, names, effects_file)}")
+    say(f"Answers: {answers_folder(folder, exclude, effects_file)}")
     say(f"Answers sha256 {sealed}")
 
 
@@ -208,7 +196,7 @@ def diagnose(
 @with_format
 def score(
     folder: Folder,
-    exclude: Excluded = None,
+    exclude: Excluded = (),
     key: KeyFile = None,
     markdown: Annotated[
         Path | None, output_file("--markdown", ".md", help="Also write the score as a page.")
@@ -243,10 +231,9 @@ def score(
     from tunnel_lab.experiments.blind import score_set
     from tunnel_sim.files.writing import write_json, write_whole
 
-    names = split_names(exclude)
-    vocabulary(exclude=names)
+    vocabulary(exclude=exclude)
     refuse_unwritable_files(markdown, json, figure)
-    result = score_set(folder, excluded=names, key=key, effects_file=effects_file)
+    result = score_set(folder, excluded=exclude, key=key, effects_file=effects_file)
     drawn: tuple[Path, ...] = ()
     if figure is not None:
         beside = figure.with_name(f"{figure.stem}-confusion.png")

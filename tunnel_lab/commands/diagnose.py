@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -42,53 +43,105 @@ _output = partial(Option, rich_help_panel="Output")
 _written = partial(output_file, panel="Output")
 _causes = partial(Option, rich_help_panel="Effects")
 _model = partial(Option, rich_help_panel="A model of your own")
+_model_file = partial(output_file, panel="A model of your own")
 
 
-def diagnose(
-    campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
-    leave_out: LeaveOutOption = None,
+@dataclass(frozen=True)
+class AnswerFiles:
+    """The files in which the answer is written; None: none."""
+
     json: Annotated[
         Path | None, _written("--json", ".json", help="Write the answer as JSON; - for standard output.")
-    ] = None,
+    ] = None
     report: Annotated[
         Path | None, _written("--report", ".html", ".htm", help="Write a report, one HTML page.")
-    ] = None,
+    ] = None
     summary: Annotated[
         Path | None,
         _written("--summary", ".pdf", help="Write the report's summary, one printed page; needs Chromium."),
-    ] = None,
+    ] = None
     author: Annotated[
         str, _output("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
-    ] = "",
-    notes: Annotated[str, _output("--notes", metavar="TEXT", help="Notes for the head of the report.")] = "",
+    ] = ""
+    notes: Annotated[str, _output("--notes", metavar="TEXT", help="Notes for the head of the report.")] = ""
+    propose: Annotated[
+        Path | None,
+        output_file("--propose", ".toml", help="Write the formula proposed for the residual gap."),
+    ] = None
+
+    @property
+    def to_stdout(self) -> bool:
+        """Whether the JSON goes to standard output."""
+        return self.json is not None and str(self.json) == "-"
+
+    def refuse_unwritable(self, patch: Path | None) -> None:
+        """Refuse a file that cannot be written, or a summary without a browser, before the work is done."""
+        json = None if self.to_stdout else self.json
+        refuse_unwritable_files(json, self.report, self.summary, patch, self.propose)
+        if self.summary is not None:
+            from tunnel_lab.report import find_browser
+
+            find_browser()
+
+    def write_pages(self, answer: Diagnosis, patch: Path | None) -> None:
+        """Write the report and its summary, where they are asked for."""
+        if answer.data is None or not (self.report or self.summary):
+            return
+        from tunnel_lab.report import Byline, write_report, write_summary
+
+        today = datetime.now().astimezone().date().isoformat()
+        byline = Byline(today, self.author, self.notes, "" if patch is None else patch.name)
+        if self.report is not None:
+            write_report(answer, answer.data, self.report, byline)
+        if self.summary is not None:
+            write_summary(answer, answer.data, self.summary, byline)
+
+
+@dataclass(frozen=True)
+class Considered:
+    """The effects that are considered."""
+
     effects: Annotated[
-        list[str] | None, _causes("--effects", metavar="A,B", help="Consider only these effects.")
-    ] = None,
+        tuple[str, ...],
+        _causes("--effects", metavar="A,B", help="Consider only these effects.", callback=split_names),
+    ] = ()
     exclude: Annotated[
-        list[str] | None,
-        _causes("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
-    ] = None,
-    effects_file: EffectsFileOption = None,
+        tuple[str, ...],
+        _causes(
+            "--exclude",
+            metavar="C",
+            help="Leave these effects out; tunnel effects lists all.",
+            callback=split_names,
+        ),
+    ] = ()
+    effects_file: EffectsFileOption = None  # its effects are known when the command runs
+
+
+@dataclass(frozen=True)
+class OwnModel:
+    """A model of the user's own as the nominal model, and how its patch is written."""
+
     model: Annotated[
         Path | None,
         _model(
             "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
         ),
-    ] = None,
+    ] = None
     joint: Annotated[
         str | None,
         _model("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
-    ] = None,
+    ] = None
     free: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         _model(
             "--free",
             metavar="A,B",
             help="Parameters of the model to fit: inertia, damping, stiffness, rest (a constant moment where "
             "nothing holds the joint), gain (the kp of a position servo). Default: those that the runs can "
             "determine.",
+            callback=split_names,
         ),
-    ] = None,
+    ] = ()
     actuator: Annotated[
         str | None,
         _model(
@@ -96,7 +149,7 @@ def diagnose(
             metavar="NAME",
             help="Actuator whose control the column drive is, where the joint has several.",
         ),
-    ] = None,
+    ] = None
     asset_dir: Annotated[
         Path | None,
         _model(
@@ -104,28 +157,50 @@ def diagnose(
             metavar="DIR",
             help="Folder of the model's includes and meshes, where they are not in or below its own.",
         ),
-    ] = None,
+    ] = None
     patch: Annotated[
         Path | None,
-        _written(
-            "--patch",
-            ".xml",
-            help="Write the model with the causes in it; for --model.",
-            panel="A model of your own",
-        ),
-    ] = None,
+        _model_file("--patch", ".xml", help="Write the model with the causes in it; for --model."),
+    ] = None
     native: Annotated[
         bool,
-        Option(
-            "--native",
-            help="Write --patch in MuJoCo's own elements alone, as near as they come.",
-            rich_help_panel="A model of your own",
-        ),
-    ] = False,
-    propose: Annotated[
-        Path | None,
-        output_file("--propose", ".toml", help="Write the formula proposed for the residual gap."),
-    ] = None,
+        _model("--native", help="Write --patch in MuJoCo's own elements alone, as near as they come."),
+    ] = False
+
+    def refuse_partial(self) -> None:
+        """Refuse options without those that they belong to."""
+        partly = self.model is None and (self.free or self.patch or self.asset_dir or self.actuator)
+        if (self.model is None) != (self.joint is None) or partly:
+            what = (
+                "--model and --joint belong together, and --free, --actuator, --patch and --asset-dir to them"
+            )
+            raise TunnelError(what, remedy="give both")
+        if self.native and self.patch is None:
+            raise TunnelError(
+                "--native says how --patch is written", remedy="give --patch too, or leave it out"
+            )
+
+    def read(self, data: Campaign) -> JointModel | None:
+        """The model, if there is one; its patch must be possible."""
+        from diagnosis import read_model
+
+        if self.model is None or self.joint is None:
+            return None
+        found = read_model(self.model, self.joint, data, self.free or None, self.asset_dir, self.actuator)
+        if self.patch is not None:
+            from diagnosis.patch.patched_model import refuse_unpatchable
+
+            refuse_unpatchable(found, data, self.patch)
+        return found
+
+
+def diagnose(
+    campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
+    leave_out: LeaveOutOption = (),
+    *,
+    files: AnswerFiles,
+    considered: Considered,
+    own: OwnModel,
 ) -> None:
     """Find out why the nominal model does not fit the runs of a campaign.
 
@@ -155,58 +230,33 @@ def diagnose(
       0 diagnosed, whatever the answer; 2 bad input; 130 interrupted. Files are
       written completely or not at all.
     """
-    from diagnosis import read_model, vocabulary
+    from diagnosis import vocabulary
     from diagnosis.findings.sections import printed
     from tunnel_sim.files.writing import json_text, write_json
 
-    del effects_file  # its effects are known already
-    kinds = vocabulary(split_names(effects), split_names(exclude))
-    to_stdout = json is not None and str(json) == "-"
-    refuse_unwritable_files(None if to_stdout else json, report, summary, patch, propose)
-    if summary is not None:
-        from tunnel_lab.report import find_browser
-
-        find_browser()
-    if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir or actuator)):
-        what = "--model and --joint belong together, and --free, --actuator, --patch and --asset-dir to them"
-        raise TunnelError(what, remedy="give both")
-    if native and patch is None:
-        raise TunnelError("--native says how --patch is written", remedy="give --patch too, or leave it out")
-    whole, left_out = given_campaign(campaign), split_names(leave_out)
-    data = whole.without(left_out)
+    kinds = vocabulary(considered.effects, considered.exclude)
+    files.refuse_unwritable(own.patch)
+    own.refuse_partial()
+    whole = given_campaign(campaign)
+    data = whole.without(leave_out)
     hashes = file_hashes(campaign)
-    own_model = None
-    if model is not None and joint is not None:
-        own_model = read_model(model, joint, data, split_names(free) or None, asset_dir, actuator)
-    if own_model is not None and patch is not None:
-        from diagnosis.patch.patched_model import refuse_unpatchable
-
-        refuse_unpatchable(own_model, data, patch)
-    answer = diagnose_with_progress(whole, kinds, own_model, left_out).with_hashes(hashes)
+    answer = diagnose_with_progress(whole, kinds, own.read(data), leave_out).with_hashes(hashes)
     document = answer.to_json_dict()
     # Files first: the reader of a pipe may close it early.
-    if json is not None and not to_stdout:
-        write_json(json, document)
-    if patch is not None:
-        write_patch(answer, patch, native=native)
-    if (report or summary) and answer.data is not None:
-        from tunnel_lab.report import Byline, write_report, write_summary
-
-        today = datetime.now().astimezone().date().isoformat()
-        byline = Byline(today, author, notes, "" if patch is None else patch.name)
-        if report is not None:
-            write_report(answer, answer.data, report, byline)
-        if summary is not None:
-            write_summary(answer, answer.data, summary, byline)
-    proposed = None if propose is None else write_proposal(propose, answer)
-    if to_stdout:
+    if files.json is not None and not files.to_stdout:
+        write_json(files.json, document)
+    if own.patch is not None:
+        write_patch(answer, own.patch, native=own.native)
+    files.write_pages(answer, own.patch)
+    proposed = None if files.propose is None else write_proposal(files.propose, answer)
+    if files.to_stdout:
         typer.echo(printable_json(json_text(document)), nl=False)
         return
     show(printed(answer))
-    if propose is not None and proposed is None:
+    if files.propose is not None and proposed is None:
         nothing = "no residual gap is significant, a random moment is a cause, or the body has no spring"
         say(f"No formula is proposed: {'none is supported' if answer.closable else nothing}")
-    say_written(json, report, summary, patch, proposed)
+    say_written(files.json, files.report, files.summary, own.patch, proposed)
 
 
 def write_proposal(path: Path, answer: Diagnosis) -> Path | None:
@@ -255,7 +305,7 @@ def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
 
 def compare(
     documents: Annotated[
-        list[Path], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
+        tuple[Path, ...], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
     ],
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
 from tunnel_lab.report.import_table import parts_table
-from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, split_names
+from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
+
+if TYPE_CHECKING:
+    from tunnel_sim.files.importing.choices import ImportChoices
 
 _column = partial(Option, rich_help_panel="Columns")
 _unit = partial(Option, rich_help_panel="Units")
@@ -24,47 +28,40 @@ _condition = partial(Option, rich_help_panel="Conditions")
 _output = partial(Option, rich_help_panel="Output")
 
 
-def import_files(
-    files: Annotated[list[Path], Argument(metavar="FILE...", help="Files of a data logger, of any format.")],
-    out: Annotated[
-        Path | None, _output("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")
-    ] = None,
+@dataclass(frozen=True)
+class StatedChoices:
+    """How files are read, as options; `ImportChoices` has fields of these names and checks the values."""
+
     angle: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         _column(
             "--angle",
             metavar="NAME",
             help="Column of the angle, by name or its number in the file. May be repeated.",
         ),
-    ] = None,
+    ] = ()
     unit: Annotated[
         str | None, _unit("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
-    ] = None,
-    drive: Annotated[
+    ] = None
+    input: Annotated[
         str | None, _column("--input", metavar="NAME", help="Column of a driven run's input, or none.")
-    ] = None,
+    ] = None
     input_as: Annotated[
         str | None,
-        _column(
-            "--input-as",
-            metavar="COLUMN",
-            help=f"What the input is: {one_of(INPUT_COLUMNS)}.",
-        ),
-    ] = None,
+        _column("--input-as", metavar="COLUMN", help=f"What the input is: {one_of(INPUT_COLUMNS)}."),
+    ] = None
     input_hold: Annotated[
         str | None,
         _column("--input-hold", metavar="HOLD", help="The input between its samples: zero (held) or linear."),
-    ] = None,
+    ] = None
     time: Annotated[
         str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
-    ] = None,
-    time_unit: Annotated[
-        str | None, _unit("--time-unit", help="Unit of the times: s, ms, us, min, …")
-    ] = None,
-    rate: Annotated[float | None, _unit("--rate", help="Sample rate, Hz, where there are no times.")] = None,
+    ] = None
+    time_unit: Annotated[str | None, _unit("--time-unit", help="Unit of the times: s, ms, us, min, …")] = None
+    rate: Annotated[float | None, _unit("--rate", help="Sample rate, Hz, where there are no times.")] = None
     counts_per_turn: Annotated[
         float | None, _unit("--counts-per-turn", help="Counts of an encoder per turn.")
-    ] = None,
+    ] = None
     calibration: Annotated[
         str | None,
         _unit(
@@ -72,51 +69,80 @@ def import_files(
             metavar="'a + b*V'",
             help="Volts to angle: a formula, also 'b*(V - c)', or a file of two columns.",
         ),
-    ] = None,
-    conditions: Annotated[
+    ] = None
+    table: Annotated[
         Path | None,
         _condition(
             "--conditions", metavar="RUNS.csv", help="Table of conditions: file or run, wind_speed, …"
         ),
-    ] = None,
+    ] = None
     name: Annotated[
         str | None,
         _condition(
             "--name", metavar="PATTERN", help="Conditions in the file names: S{spring}_V{wind_speed}_*"
         ),
-    ] = None,
+    ] = None
     settings: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         _condition(
             "--set",
             metavar="KEY=NUMBER",
             help="A condition of all runs, or a size, also with a unit. KEY=NAME names the column or variable that "
             "states it. May be repeated.",
         ),
-    ] = None,
+    ] = ()
     start: Annotated[
         float | None, _runs("--start", help="Leave out samples before this time of the file, s.")
-    ] = None,
-    end: Annotated[
-        float | None, _runs("--end", help="Leave out samples after this time of the file, s.")
-    ] = None,
+    ] = None
+    end: Annotated[float | None, _runs("--end", help="Leave out samples after this time of the file, s.")] = (
+        None
+    )
     rest: Annotated[
         float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
-    ] = None,
-    leave_out: LeaveOutOption = None,
+    ] = None
+    leave_out: LeaveOutOption = ()
     cut: Annotated[
         bool | None, _runs("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
-    ] = None,
+    ] = None
     delimiter: Annotated[
         str | None,
         _column("--delimiter", metavar="SIGN", help="Delimiter of a text file: tab, blank, ';', ',' or '|'."),
-    ] = None,
+    ] = None
     decimal: Annotated[
         str | None, _column("--decimal", metavar="SIGN", help="Decimal sign of a text file: ',' or '.'.")
-    ] = None,
+    ] = None
     recipe: Annotated[
         Path | None, _column("--recipe", metavar="import.toml", help="Choices of an earlier import.")
+    ] = None
+
+    def choices(self) -> ImportChoices:
+        """The choices of the recipe, replaced where an option states another."""
+        from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, read_recipe
+        from tunnel_sim.files.toml_input import validate
+
+        numbers: dict[str, float] = {}
+        names: dict[str, str] = {}
+        for word in self.settings:
+            conditions, columns = parse_setting(word, "--set")
+            numbers |= conditions.model_dump(exclude_none=True)
+            names |= columns.model_dump(exclude_none=True)
+        kept = {} if self.recipe is None else read_recipe(self.recipe).model_dump(exclude_defaults=True)
+        others = {"table", "settings", "recipe"}
+        stated = {name: value for name, value in vars(self).items() if name not in others}
+        stated |= {"conditions": numbers or None, "stated_by": names or None}
+        given = {name: value for name, value in stated.items() if value not in (None, ())}
+        return validate(ImportChoices, kept | given, Path("options"))
+
+
+def import_files(
+    files: Annotated[
+        tuple[Path, ...], Argument(metavar="FILE...", help="Files of a data logger, of any format.")
+    ],
+    *,
+    out: Annotated[
+        Path | None, _output("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")
     ] = None,
+    stated: StatedChoices,
     preview: Annotated[
         Path | None,
         output_file("--preview", ".png", help="Draw the records; write no campaign.", panel="Output"),
@@ -147,56 +173,23 @@ def import_files(
       0 imported, 1 declined, 2 bad input; nothing is left half written.
     """
     from tunnel_lab.plotting.runs import import_picture
-    from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, read_recipe
     from tunnel_sim.files.importing.records import read_records
     from tunnel_sim.files.importing.writing import write_imported
-    from tunnel_sim.files.toml_input import validate
-    from tunnel_sim.files.writing import refuse_unwritable, write_whole
+    from tunnel_sim.files.writing import write_whole
 
     if (out is None) == (preview is None):
         raise TunnelError("give one of them", where="--out, --preview", remedy="name a folder or a picture")
-    if preview is not None:
-        refuse_unwritable(preview)
-    words: dict[str, float] = {}
-    names: dict[str, str] = {}
-    for word in settings or ():
-        numbers, columns = parse_setting(word, "--set")
-        words |= numbers.model_dump(exclude_none=True)
-        names |= columns.model_dump(exclude_none=True)
-    stated = {
-        "angle": tuple(angle or ()) or None,
-        "unit": unit,
-        "input": drive,
-        "input_as": input_as,
-        "input_hold": input_hold,
-        "time": time,
-        "time_unit": time_unit,
-        "rate": rate,
-        "counts_per_turn": counts_per_turn,
-        "calibration": calibration,
-        "name": name,
-        "start": start,
-        "end": end,
-        "rest": rest,
-        "leave_out": split_names(leave_out) or None,
-        "cut": cut,
-        "delimiter": delimiter,
-        "decimal": decimal,
-        "conditions": words or None,
-        "stated_by": names or None,
-    }
-    kept = {} if recipe is None else read_recipe(recipe).model_dump(exclude_defaults=True)
-    given = kept | {key: value for key, value in stated.items() if value is not None}
-    choices = validate(ImportChoices, given, Path("options"))
-    imported = read_records(files, choices, conditions=conditions, name=out.resolve().name if out else "")
+    refuse_unwritable_files(preview)
+    name = out.resolve().name if out else ""
+    imported = read_records(files, stated.choices(), conditions=stated.table, name=name)
     show([parts_table(imported)])
     for line in imported.remarks():
         say(f"Note: {line}")
-    if preview is not None:
+    if out is None:
+        assert preview is not None
         write_whole(preview, import_picture(imported))
         say(f"Written: {preview}")
         return
-    assert out is not None
     if not yes and not sys.stdin.isatty():
         raise TunnelError("cannot be confirmed without a terminal", where=str(out), remedy="add --yes")
     if not yes and not typer.confirm(f"Write {out}?", default=True):

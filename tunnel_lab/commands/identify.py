@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import shlex
 import textwrap
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -28,7 +28,6 @@ from tunnel_lab.terminal.arguments import (
     output_file,
     own_code,
     refuse_unwritable_files,
-    split_names,
 )
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import console, say, say_written, show
@@ -36,7 +35,9 @@ from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
+    from identification.estimate import Estimate
     from identification.estimators import Estimator
+    from identification.uncertainty.budget import Budget
     from tunnel_sim.vocabulary.campaign import Campaign
     from tunnel_sim.vocabulary.turning_points import TurningPoints
 
@@ -50,9 +51,64 @@ _HELP_WIDTH = 78
 WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 
+@dataclass(frozen=True)
+class BudgetOptions:
+    """The options of an uncertainty budget."""
+
+    budget: Annotated[bool, Option("--budget", help="Add the choice of model; show the dominant source.")] = (
+        False
+    )
+    uncertainties: Annotated[
+        Path | None,
+        Option(
+            "--uncertainties",
+            metavar="FILE",
+            help="Uncertainties of Kr, V, ρ, A and l (TOML); implies --budget.",
+        ),
+    ] = None
+    models: Annotated[
+        tuple[str, ...],
+        Option(
+            "--model",
+            metavar="NAME",
+            help="Another estimator for the choice of model; with --budget. May be repeated.",
+        ),
+    ] = ()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a budget is made."""
+        return self.budget or self.uncertainties is not None
+
+    def make(
+        self, data: Campaign, estimate: Estimate, chosen: str | Estimator, others: Iterable[str]
+    ) -> Budget:
+        """The budget of an estimate, from the estimator that made it and from others."""
+        from identification import identify
+        from identification.uncertainty import budget as budgets
+
+        inputs = budgets.InputUncertainties()  # exact
+        if self.uncertainties is not None:
+            inputs = budgets.load_uncertainties(self.uncertainties)
+        with console(stderr=True).status("uncertainty budget") as status:
+            return budgets.make_budget(
+                data,
+                estimate,
+                partial(identify, estimator=chosen, throw=False),
+                inputs,
+                others={
+                    name: partial(identify, estimator=name, throw=False)
+                    for name in others
+                    if name != estimate.estimator
+                },
+                progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
+            )
+
+
 def run(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
-    leave_out: LeaveOutOption = None,
+    leave_out: LeaveOutOption = (),
+    *,
     estimator: Annotated[
         str, estimator_option("One of the estimators listed above or of an installed package")
     ] = "output_error",
@@ -71,25 +127,7 @@ def run(
             show_default=False,
         ),
     ] = None,
-    budget: Annotated[
-        bool, Option("--budget", help="Add the choice of model; show the dominant source.")
-    ] = False,
-    uncertainties: Annotated[
-        Path | None,
-        Option(
-            "--uncertainties",
-            metavar="FILE",
-            help="Uncertainties of Kr, V, ρ, A and l (TOML); implies --budget.",
-        ),
-    ] = None,
-    models: Annotated[
-        list[str] | None,
-        Option(
-            "--model",
-            metavar="NAME",
-            help="Another estimator for the choice of model; with --budget. May be repeated.",
-        ),
-    ] = None,
+    budgeted: BudgetOptions,
 ) -> None:
     """Identify Cnβ, Cnr, Izz and Cr of a campaign, measured or simulated.
 
@@ -122,19 +160,19 @@ def run(
     from tunnel_sim.files.writing import json_text, write_json
     from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
-    estimator, models = chosen_estimator(estimator), list(chosen_estimators(models))
-    if models and not budget and uncertainties is None:
+    estimator, models = chosen_estimator(estimator), chosen_estimators(budgeted.models)
+    if models and not budgeted.wanted:
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json)
     try:
-        whole, left_out = given_campaign(campaign), split_names(leave_out)
+        whole = given_campaign(campaign)
     except HoldsTurningPoints as held:
-        if leave_out or weights or budget or uncertainties or models or estimator != "output_error":
+        if leave_out or weights or budgeted != BudgetOptions() or estimator != "output_error":
             raise
         _show_turning_points(held.points, json)
         return
-    data = whole.without(left_out)
+    data = whole.without(leave_out)
     chosen: str | Estimator = estimator
     if weights is not None:
         if estimator not in WITH_WEIGHTS:
@@ -142,28 +180,14 @@ def run(
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
     with own_code([estimator]), bar("identifying runs", len(data.runs)) as progress:
-        estimate = identify(whole, chosen, leave_out=left_out, throw=False, progress=progress)
+        estimate = identify(whole, chosen, leave_out=leave_out, throw=False, progress=progress)
     made = None
-    if (budget or uncertainties is not None) and not estimate.status.failed:
-        from identification.uncertainty import budget as budgets
+    if budgeted.wanted and not estimate.status.failed:
+        from identification.uncertainty.budget import with_budget
 
-        inputs = budgets.InputUncertainties()  # exact
-        if uncertainties is not None:
-            inputs = budgets.load_uncertainties(uncertainties)
-        with own_code([estimator, *models]), console(stderr=True).status("uncertainty budget") as status:
-            made = budgets.make_budget(
-                data,
-                estimate,
-                partial(identify, estimator=chosen, throw=False),
-                inputs,
-                others={
-                    name: partial(identify, estimator=name, throw=False)
-                    for name in models or ()
-                    if name != estimate.estimator
-                },
-                progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
-            )
-        estimate = budgets.with_budget(estimate, made)
+        with own_code([estimator, *models]):
+            made = budgeted.make(data, estimate, chosen, models)
+        estimate = with_budget(estimate, made)
     document = estimate.to_json_dict() | ({} if made is None else {"budget": made.to_json_dict()})
     if to_stdout:
         typer.echo(printable_json(json_text(document)), nl=False)

@@ -164,9 +164,9 @@ def paper(
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the page and its figures go.")
     ] = Path("tunnel-output/paper"),
     only: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         Option("--only", metavar="PART", help="Only this part, such as table-2. May be repeated."),
-    ] = None,
+    ] = (),
 ) -> None:
     """Reproduce the paper's tables and figures, ours beside theirs.
 
@@ -198,7 +198,7 @@ def paper(
         "table-4": networks.table_4,
         "figures-4-to-6": networks.figures_4_to_6,
     }
-    for name in only or ():
+    for name in only:
         if name not in known:
             raise TunnelError(f"no part '{name}'", where="--only", remedy=did_you_mean(name, tuple(known)))
     with bar("paper") as progress:

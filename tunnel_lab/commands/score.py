@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tunnel_lab.experiments.estimate_rows import Failed
     from tunnel_lab.experiments.runner import Workers
     from tunnel_lab.experiments.score import Results
+    from tunnel_lab.experiments.score_grid import Grid
     from tunnel_lab.experiments.view import ExperimentView
 
 PACKAGED = "packaged"
@@ -36,27 +37,64 @@ _JOBS = 2
 _RESULTS = ("trials.", "score", "breakdown", "index.")  # beginnings of the file names in --out
 
 
-def score(
+@dataclass(frozen=True)
+class ScoredRecords:
+    """The records on which estimators are scored."""
+
     grid: Annotated[
         Path | None,
         Argument(help="Grid of conditions, TOML. Default: the packaged one, or the baseline's own."),
-    ] = None,
+    ] = None
+    trials: Annotated[
+        int | None, Option("--trials", min=2, help="Records in each cell; overrides the grid's.")
+    ] = None
+    seed: Annotated[
+        int | None, Option("--seed", min=0, help="Seed of the records; overrides the grid's.")
+    ] = None
+
+    def of(self, usual: Grid) -> Grid:
+        """The grid, or the usual one, with these trials and this seed."""
+        from tunnel_lab.experiments.score_grid import load_grid
+
+        wanted = usual if self.grid is None else load_grid(self.grid)
+        trials = wanted.trials if self.trials is None else self.trials
+        return replace(wanted, trials=trials, seed=wanted.seed if self.seed is None else self.seed)
+
+
+@dataclass(frozen=True)
+class ScoreView:
+    """What is shown of the score, and its baselines."""
+
+    cells: Annotated[bool, Option("--cells", help="Also show every cell.")] = False
+    check: Annotated[
+        str | None,
+        Option(
+            "--check",
+            metavar="BASELINE",
+            help="Exit with 1 if an estimator is worse than this file, or 'packaged'.",
+        ),
+    ] = None
+    write_baseline: Annotated[
+        Path | None, output_file("--write-baseline", ".parquet", help="Write the trials as a baseline.")
+    ] = None
+    breakdown: Annotated[
+        bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")
+    ] = False
+
+
+def score(
+    *,
     estimators: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         estimator_option("Score only this one", "May be repeated. Default: all packaged ones."),
-    ] = None,
+    ] = (),
     out: Annotated[
         Path | None,
         Option(
             "--out", metavar="FOLDER", help="Keep trials and scores (Parquet) and a figure (PNG, PDF) here."
         ),
     ] = None,
-    trials: Annotated[
-        int | None, Option("--trials", min=2, help="Records in each cell; overrides the grid's.")
-    ] = None,
-    seed: Annotated[
-        int | None, Option("--seed", min=0, help="Seed of the records; overrides the grid's.")
-    ] = None,
+    records: ScoredRecords,
     jobs: Annotated[
         int | None,
         Option(
@@ -66,21 +104,7 @@ def score(
         ),
     ] = None,
     scheduler: SchedulerOption = None,
-    cells: Annotated[bool, Option("--cells", help="Also show every cell.")] = False,
-    check: Annotated[
-        str | None,
-        Option(
-            "--check",
-            metavar="BASELINE",
-            help="Exit with 1 if an estimator is worse than this file, or 'packaged'.",
-        ),
-    ] = None,
-    write_baseline: Annotated[
-        Path | None, output_file("--write-baseline", ".parquet", help="Write the trials as a baseline.")
-    ] = None,
-    breakdown: Annotated[
-        bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")
-    ] = False,
+    shown: ScoreView,
     overwrite: Annotated[bool, Option("--overwrite", help="Replace a finished score in the folder.")] = False,
 ) -> None:
     """Score estimators: bias, RMSE over the Cramér–Rao bound, coverage, failures, time.
@@ -117,42 +141,40 @@ def score(
     from identification.estimators import ALL_ESTIMATORS
     from tunnel_lab.experiments.runner import crew
     from tunnel_lab.experiments.score import score_grid, write_trials
-    from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
-    from tunnel_lab.experiments.score_view import check as checked
-    from tunnel_lab.experiments.score_view import score_view, verdict_blocks
+    from tunnel_lab.experiments.score_grid import packaged_grid
+    from tunnel_lab.experiments.score_view import check, score_view, verdict_blocks
 
     names = chosen_estimators(estimators) or ALL_ESTIMATORS
     workers = crew(jobs, scheduler, usual=_JOBS)
-    if breakdown:  # with its own conditions
-        for name, value in {"GRID": grid, "--check": check, "--write-baseline": write_baseline}.items():
+    if shown.breakdown:  # with its own conditions
+        others = {
+            "GRID": records.grid,
+            "--check": shown.check,
+            "--write-baseline": shown.write_baseline,
+        }
+        for name, value in others.items():
             if value is not None:
                 raise TunnelError(
                     "cannot be combined with --breakdown", where=name, remedy="leave one of them out"
                 )
         parts = _parts(out, overwrite)
-        _breakdown(names, out, parts, workers, 1 if seed is None else seed, trials)
+        _breakdown(names, out, parts, workers, 1 if records.seed is None else records.seed, records.trials)
         return
-    baseline = None if check is None else _baseline(check, names, everything=not estimators)
-    wanted = baseline.grid if baseline is not None else packaged_grid()
-    if grid is not None:
-        wanted = load_grid(grid)
-    if trials is not None:
-        wanted = replace(wanted, trials=trials)
-    if seed is not None:
-        wanted = replace(wanted, seed=seed)
+    baseline = None if shown.check is None else _baseline(shown.check, names, everything=not estimators)
+    wanted = records.of(packaged_grid() if baseline is None else baseline.grid)
     parts = _parts(out, overwrite)
-    refuse_unwritable_files(write_baseline)
+    refuse_unwritable_files(shown.write_baseline)
     with bar("scoring") as progress:
         results, failed = score_grid(wanted, names, workers, parts=parts, progress=progress)
-    view = score_view(results, cells=cells)
+    view = score_view(results, cells=shown.cells)
     if out is not None:
         write_trials(out / "trials.parquet", results)
-    if write_baseline is not None:
-        write_trials(write_baseline, results)
+    if shown.write_baseline is not None:
+        write_trials(shown.write_baseline, results)
     _present(view, out, failed)
-    say_written(write_baseline)
+    say_written(shown.write_baseline)
     if baseline is not None:
-        verdict = checked(baseline, results)
+        verdict = check(baseline, results)
         say("")
         show(verdict_blocks(verdict))
         if failed or not verdict.passed:

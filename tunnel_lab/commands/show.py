@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
+from tunnel_lab.show.request import Request
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import given_campaign, split_names
 from tunnel_lab.terminal.outputs import say, say_written
@@ -23,22 +24,6 @@ if TYPE_CHECKING:
 
 
 _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
-PlanArgument = Annotated[
-    Path | None,
-    Argument(help="Plan of a campaign (TOML). Default: the rig with its default spring at 10 m/s."),
-]
-RunOption = Annotated[str | None, Option("--run", metavar="ID", help="Run of the plan. Default: its first.")]
-SpringOption = Annotated[int | None, Option("--spring", help="Number of the spring in Table II.")]
-WindOption = Annotated[float | None, Option("--wind", help="Wind speed, m/s.")]
-AngleOption = Annotated[float | None, Option("--angle", help="Release angle, degrees.")]
-EffectOption = Annotated[
-    list[str] | None,
-    Option(
-        "--effect",
-        metavar="NAME:PARAMETER=VALUE",
-        help="Add an effect to the nominal model. May be repeated; tunnel effects lists them.",
-    ),
-]
 
 
 def plot(
@@ -46,15 +31,21 @@ def plot(
         Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its figures.")
     ],
     names: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         Argument(metavar="[FIGURE]...", help="Figures of a diagnosis. Default: fit and repeatability."),
-    ] = None,
+    ] = (),
     out: Annotated[
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
     ] = Path("tunnel-output"),
     runs: Annotated[
-        list[str] | None, Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all.")
-    ] = None,
+        tuple[str, ...],
+        Option(
+            "--run",
+            metavar="ID",
+            help="Runs of a diagnosis to draw. Default: all.",
+            callback=split_names,
+        ),
+    ] = (),
 ) -> None:
     """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
 
@@ -85,7 +76,7 @@ def plot(
 
     failure = ""
     if campaign.suffix.lower() == ".json":
-        drawn = _of_diagnosis(campaign, names or [], split_names(runs))
+        drawn = _of_diagnosis(campaign, names, runs)
         folder = output_folder(out / campaign.stem)
     else:
         if runs:
@@ -108,7 +99,7 @@ def plot(
         raise typer.Exit(1)
 
 
-def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[str, Figure]:
+def _of_diagnosis(file: Path, names: tuple[str, ...], runs: tuple[str, ...]) -> dict[str, Figure]:
     """Figures of a diagnosis by the name of their file.
 
     Raises:
@@ -149,14 +140,10 @@ def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
 
 
 def view(
-    plan: PlanArgument = None,
-    run_id: RunOption = None,
-    spring: SpringOption = None,
-    wind: WindOption = None,
-    angle: AngleOption = None,
-    effect: EffectOption = None,
-    duration: Annotated[float | None, Option("--duration", help="Time until the next release, s.")] = None,
-    seed: Annotated[int | None, Option("--seed", min=0, help="Seed of random effects.")] = None,
+    *,
+    request: Annotated[
+        Request, {"duration": "Time until the next release, s.", "seed": "Seed of random effects."}
+    ],
     speed: Annotated[float, Option("--speed", min=0.01, max=100.0, help="Factor on real time.")] = 1.0,
     camera: Annotated[
         str, Option("--camera", help="overview, above or side: where the view begins.")
@@ -175,10 +162,8 @@ def view(
     [bold]Exit status[/bold]
       0 closed, 2 bad input or no display, 130 interrupted.
     """
-    from tunnel_lab.show.film import Request, checked_camera, shown_run
+    from tunnel_lab.show.film import checked_camera, shown_run
 
-    file, effects = None if plan is None else str(plan), tuple(effect or ())
-    request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
     name = checked_camera(camera)
     run = shown_run(request)
     from tunnel_lab.show.live import view_in_window  # refusals need no engine
@@ -187,18 +172,12 @@ def view(
 
 
 def render(
-    plan: PlanArgument = None,
+    *,
     out: Annotated[
-        list[Path] | None,
+        tuple[Path, ...],
         Option("--out", "-o", metavar="FILE", help="An .mp4 or .png file. May be repeated."),
-    ] = None,
-    run_id: RunOption = None,
-    spring: SpringOption = None,
-    wind: WindOption = None,
-    angle: AngleOption = None,
-    duration: Annotated[float | None, Option("--duration", help="Duration of the run, s.")] = None,
-    effect: EffectOption = None,
-    seed: Annotated[int | None, Option("--seed", min=0, help="Seed of the noise.")] = None,
+    ] = (),
+    request: Request,
     at: Annotated[float, Option("--at", help="Time of the picture, s from the release.")] = 2.0,
     fps: Annotated[int, Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,
     speed: Annotated[
@@ -222,10 +201,10 @@ def render(
     [bold]Exit status[/bold]
       0 written, 2 bad input or no way to render here; nothing is written then.
     """
-    from tunnel_lab.show.film import Look, Request, checked_camera, shown_run, write_film
+    from tunnel_lab.show.film import Look, checked_camera, shown_run, write_film
     from tunnel_sim.files.writing import output_folder
 
-    targets = out or list(_DEFAULT)
+    targets = out or _DEFAULT
     for path in targets:
         where = f"--out {path}"  # unwritable files are refused before the work is done
         if path.suffix.lower() not in (".mp4", ".png"):
@@ -247,12 +226,10 @@ def render(
         remedy = "give two even numbers from 160 to 3840, such as 1280x720"
         raise TunnelError(f"{size!r} is not a size", where="--size", remedy=remedy)
     look = Look(pixels[0], pixels[1], fps=fps, speed=speed, camera=checked_camera(camera))
-    file, effects = None if plan is None else str(plan), tuple(effect or ())
-    request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
     length = shown_run(request).settings.duration  # refuses bad input before anything is drawn
     for path in targets:
         if path.suffix.lower() == ".png":
-            write_film(request, look, path, at=min(at, length) if out is None else at)
+            write_film(request, look, path, at=at if out else min(at, length))
         else:
             with bar("drawing frames") as progress:
                 write_film(request, look, path, progress)

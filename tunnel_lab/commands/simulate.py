@@ -52,15 +52,15 @@ def simulate(
     seed: Annotated[
         int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
-    effect: Annotated[
-        list[str] | None,
+    effects: Annotated[
+        tuple[str, ...],
         Option(
             "--effect",
             metavar="NAME:PARAMETER=VALUE",
             help="Add an effect to the nominal model; separate further parameters by commas. May be repeated; "
             "tunnel effects lists the effects.",
         ),
-    ] = None,
+    ] = (),
     overwrite: Annotated[
         bool, Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
@@ -127,7 +127,7 @@ def simulate(
     from tunnel_sim.files.plan_file import load_plan
 
     del effects_file  # its effects are known already
-    added = tuple(parse_effect(text) for text in effect or ())
+    added = tuple(parse_effect(text) for text in effects)
     loaded = load_plan(plan)
     if seed is not None:
         loaded = replace(loaded, seed=seed)

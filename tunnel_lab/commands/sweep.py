@@ -25,7 +25,7 @@ def sweep(
         Option("--jobs", min=1, help="Processes on this machine. Default: one for each processor."),
     ] = None,
     scheduler: SchedulerOption = None,
-    estimators: Annotated[list[str] | None, estimator_option("Estimate with this one too")] = None,
+    estimators: Annotated[tuple[str, ...], estimator_option("Estimate with this one too")] = (),
     summary: Annotated[
         Path | None,
         Option("--summary", metavar="FOLDER", help="Draw and tabulate the finished part of a sweep."),

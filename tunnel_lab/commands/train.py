@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,21 +17,60 @@ from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
+    from identification.neural.train import TrainingSpec
     from tunnel_lab.experiments.runner import Workers
 
 CHECKPOINT_EVERY_S = 5.0
 
 
-def train(
-    out: Annotated[Path, Argument(help="File to write (.safetensors), with a record (.json) beside it.")],
-    seed: Annotated[int, Option("--seed", min=0, help="Seed of the initial weights and the test set.")] = 1,
+@dataclass(frozen=True)
+class PaperTraining:
+    """The training of the paper's networks."""
+
     zeta: Annotated[
         tuple[float, float], Option("--zeta", help="Range of damping ratios.", metavar="LOW HIGH")
-    ] = (0.001, 0.35),
+    ] = (0.001, 0.35)
     omega: Annotated[
         tuple[float, float], Option("--omega", help="Range of ωn, rad/s.", metavar="LOW HIGH")
-    ] = (0.4, 26.0),
-    starts: Annotated[int, Option("--starts", min=1, help="Number of training runs of each network.")] = 3,
+    ] = (0.4, 26.0)
+    starts: Annotated[int, Option("--starts", min=1, help="Number of training runs of each network.")] = 3
+
+    def spec(self, seed: int, steps: int | None) -> TrainingSpec:
+        """The specification; refuses what is not a range.
+
+        Args:
+            steps: largest number for each network; None: the usual ones.
+        """
+        from identification.neural.networks import DataSpec
+        from identification.neural.train import TrainingSpec
+
+        for option, (low, high), most in (("--zeta", self.zeta, 0.95), ("--omega", self.omega, 1e4)):
+            if not 0.0 < low < high < most:
+                remedy = f"give LOW HIGH between 0 and {most:g}"
+                raise TunnelError(f"{low:g} {high:g} is not a range", where=option, remedy=remedy)
+        data = DataSpec(zeta_range=self.zeta, omega_range=self.omega)
+        return TrainingSpec(seed, data, self.starts, steps or 400, steps or 3000)
+
+
+@dataclass(frozen=True)
+class PosteriorTraining:
+    """The training of the networks of ``neural_posterior``."""
+
+    shards: Annotated[
+        int, Option("--shards", min=1, help="For neural_posterior: training campaigns, in units of 200.")
+    ] = 15
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", min=0, help="For neural_posterior: processes that simulate. Default: 2."),
+    ] = None
+    scheduler: SchedulerOption = None
+
+
+def train(
+    out: Annotated[Path, Argument(help="File to write (.safetensors), with a record (.json) beside it.")],
+    *,
+    seed: Annotated[int, Option("--seed", min=0, help="Seed of the initial weights and the test set.")] = 1,
+    paper: PaperTraining,
     steps: Annotated[
         int | None,
         Option(
@@ -44,14 +84,7 @@ def train(
         Literal["neural_network", "neural_posterior"],
         Option("--estimator", "-e", help="Whose networks to train."),
     ] = "neural_network",
-    shards: Annotated[
-        int, Option("--shards", min=1, help="For neural_posterior: training campaigns, in units of 200.")
-    ] = 15,
-    jobs: Annotated[
-        int | None,
-        Option("--jobs", min=0, help="For neural_posterior: processes that simulate. Default: 2."),
-    ] = None,
-    scheduler: SchedulerOption = None,
+    posterior: PosteriorTraining,
     restart: Annotated[
         bool, Option("--restart", help="Start again instead of continuing an interrupted training.")
     ] = False,
@@ -83,8 +116,7 @@ def train(
     [bold]Exit status[/bold]
       0 trained, 2 bad input, 130 interrupted (finished work is kept).
     """
-    from identification.neural.networks import DataSpec
-    from identification.neural.train import Checkpoint, TrainingSpec, read_checkpoint
+    from identification.neural.train import Checkpoint, read_checkpoint
     from identification.neural.train import train as train_networks
     from tunnel_sim.files.writing import write_json, write_whole
 
@@ -93,14 +125,10 @@ def train(
     if estimator == "neural_posterior":
         from tunnel_lab.experiments.runner import crew
 
-        _train_posterior(out, seed, shards, steps or 2000, crew(jobs, scheduler, usual=2), restart)
+        workers = crew(posterior.jobs, posterior.scheduler, usual=2)
+        _train_posterior(out, seed, posterior.shards, steps or 2000, workers, restart)
         return
-    for option, (low, high), most in (("--zeta", zeta, 0.95), ("--omega", omega, 1e4)):
-        if not 0.0 < low < high < most:
-            remedy = f"give LOW HIGH between 0 and {most:g}"
-            raise TunnelError(f"{low:g} {high:g} is not a range", where=option, remedy=remedy)
-    data = DataSpec(zeta_range=zeta, omega_range=omega)
-    spec = TrainingSpec(seed, data, starts, steps or 400, steps or 3000)
+    spec = paper.spec(seed, steps)
     partial = out.with_suffix(".part.safetensors")
     refuse_unwritable_files(out, out.with_suffix(".json"), partial)
     resume = None if restart else read_checkpoint(partial, spec.to_json_dict())

@@ -81,9 +81,7 @@ def coefficients_bound(
     if noise <= 0.0:
         return {}
     states = [(release, 0.0) for release in releases]
-    bound = campaign_bound(
-        campaign, **vars(truth), noise_std=noise, initial_states=states, repeatability=scatter
-    )
+    bound = campaign_bound(campaign, truth, noise_std=noise, initial_states=states, repeatability=scatter)
     return {name: bound.std(name) for name in bound.parameters}
 
 

@@ -33,6 +33,7 @@ from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.vocabulary.plan import Truth
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +47,7 @@ SEVERITIES = (1.0, 10.0)
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
 REALISATIONS = 3
-TRUTH = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
+TRUTH = Truth(cn_beta=0.49, cn_r=-0.11, yaw_inertia=0.1014, mechanical_damping=0.012)
 NOISE = 5e-4  # rad
 
 _CASE_COLUMNS: Mapping[str, Any] = {
@@ -107,8 +108,7 @@ def conditions_of(seed: int, *, duration: float = 10.0) -> TrueConditions:
     return TrueConditions(
         spring_stiffness=springs, wind_speed=speeds, release_angle=release, start_angle=start,
         air_density=_DENSITY, duration=duration, noise_std=NOISE, zero=radians(0.2),
-        yaw_inertia=TRUTH["yaw_inertia"], mechanical_damping=TRUTH["mechanical_damping"],
-        cn_beta=TRUTH["cn_beta"], cn_r=TRUTH["cn_r"],
+        **vars(TRUTH),
     )  # fmt: skip
 
 
@@ -152,9 +152,7 @@ def make_cases(
         campaign = as_campaign(simulated, "breakdown")
         starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
         noise = float(np.sqrt(draw.conditions.noise_power))
-        bound = campaign_bound(
-            campaign, noise_std=noise, initial_states=starts, random_moments=None, repeatability=None, **TRUTH
-        )
+        bound = campaign_bound(campaign, TRUTH, noise_std=noise, initial_states=starts)
         cases.append(
             BiasCase(
                 effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
@@ -163,7 +161,7 @@ def make_cases(
                 realisation=i % realisations,
                 campaign=campaign,
                 bound={name: bound.std(name) for name in QUANTITIES},
-                truth=TRUTH | (in_phase(draw) or {}),
+                truth=vars(TRUTH) | (in_phase(draw) or {}),
             )
         )
     return cases

@@ -169,7 +169,8 @@ def equations(_: Path) -> PaperSection:
 
 def figure_1(folder: Path) -> PaperSection:
     """The rig."""
-    from tunnel_lab.show.film import Look, Request, write_film
+    from tunnel_lab.show.film import Look, write_film
+    from tunnel_lab.show.request import Request
 
     words = "The paper shows a photograph. This is the virtual rig of the same sizes."
     pictures: tuple[PaperPicture, ...] = ()

@@ -15,9 +15,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.findings.captions import captioned
 from diagnosis.findings.cards import key_figures
-from diagnosis.findings.sections import sections
+from diagnosis.findings.sections import captioned, sections
 from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import Block, Detail, Figure, Paragraph, as_html, typeset

@@ -12,7 +12,6 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import degrees, isfinite, radians
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.show.style import with_breaks
+from tunnel_lab.show.request import Request
 from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
@@ -56,36 +56,6 @@ _VERMILION = (213, 94, 0)
 
 PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
 """Coefficients of a run that no plan describes, 1/rad: the paper's Table IV, neural network."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options; None takes the value of the plan or the rig.
-
-    Args:
-        plan: a campaign's description.
-        run: id of a run of the plan; None takes its first.
-        spring: number in the rig's table.
-        wind_speed: m/s.
-        release_angle_deg: degrees.
-        duration: s.
-        effects: ``NAME:PARAMETER=VALUE``, in addition to the plan's.
-        seed: of the sensor's noise and of random effects; None takes the plan's, or 1.
-    """
-
-    plan: str | None = None
-    run: str | None = None
-    spring: int | None = None
-    wind_speed: float | None = None
-    release_angle_deg: float | None = None
-    duration: float | None = None
-    effects: tuple[str, ...] = ()
-    seed: int | None = None
-
-    @classmethod
-    def from_json_dict(cls, data: Mapping[str, Any]) -> Request:
-        """From the fields by name."""
-        return cls(**{**data, "effects": tuple(data["effects"])})
 
 
 @dataclass(frozen=True)
@@ -136,7 +106,7 @@ def shown_run(request: Request) -> ShownRun:
         )
         plan = CampaignPlan("run", 1, truth, (condition,))
     else:
-        plan = load_plan(Path(request.plan))
+        plan = load_plan(request.plan)
     if request.seed is not None:
         plan = replace(plan, seed=request.seed)
     added = tuple(parse_effect(text) for text in request.effects)
@@ -149,7 +119,9 @@ def shown_run(request: Request) -> ShownRun:
         by_id = {condition.id: condition for condition in plan.conditions}
         if request.run not in by_id:
             raise TunnelError(
-                f"has no run {request.run!r}", where=request.plan, remedy=did_you_mean(request.run, by_id)
+                f"has no run {request.run!r}",
+                where=str(request.plan),
+                remedy=did_you_mean(request.run, by_id),
             )
         condition = by_id[request.run]
     speed = _number("--wind", request.wind_speed, condition.wind_speed, 0.0, 60.0, "m/s")
@@ -272,7 +244,7 @@ def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, i
         sys.executable,
         "-m",
         "tunnel_lab.show.film",
-        json.dumps(order),
+        json.dumps(order, default=str),  # paths
     ]  # a module of this package, without a shell
     silent = threading.Event()
     with (

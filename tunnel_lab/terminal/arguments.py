@@ -7,16 +7,12 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from contextvars import ContextVar
-from functools import wraps
-from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Option
 
-from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet
 from tunnel_sim.vocabulary.errors import (
     TunnelError,
     did_you_mean,
@@ -116,10 +112,6 @@ def parse_effect(text: str) -> EffectSetting:
     return EffectSetting(name.strip(), values)
 
 
-EVERY = "As for every command"
-"""The part of the help that lists the options common to all commands."""
-
-
 def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
     """Make the effects of a file known until the command ends."""
     if path is not None:
@@ -139,12 +131,6 @@ EffectsFileOption = Annotated[
         help="Add the effects that this file states as expressions to those that are tried.",
         callback=_know_effects,
     ),
-]
-
-
-LeaveOutOption = Annotated[
-    list[str] | None,
-    Option("--leave-out", metavar="RUN", help="Leave out the run of this id. May be repeated."),
 ]
 
 
@@ -174,6 +160,17 @@ def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
 
 
+LeaveOutOption = Annotated[
+    tuple[str, ...],
+    Option(
+        "--leave-out",
+        metavar="RUN",
+        help="Leave out the run of this id. May be repeated.",
+        callback=split_names,
+    ),
+]
+
+
 def chosen_estimator(word: str) -> str:
     """The name of an estimator from the value of ``--estimator``: its name, or ``module:Class`` of the user's.
 
@@ -195,7 +192,7 @@ def chosen_estimator(word: str) -> str:
     return word
 
 
-def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
+def chosen_estimators(words: Sequence[str]) -> tuple[str, ...]:
     """The names of estimators from repeated options, each perhaps a list with commas."""
     return tuple(dict.fromkeys(map(chosen_estimator, split_names(words))))
 
@@ -259,43 +256,3 @@ def output_file(flag: str, *endings: str, help: str, panel: str | None = None) -
     """An option for a file to write, with one of these endings, such as ``.html``."""
     path = f"FILE{endings[0]}"
     return Option(flag, callback=ending(*endings), metavar=path, help=help, rich_help_panel=panel)
-
-
-def with_format(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
-    option = Option(
-        "--format",
-        metavar="FORMAT",
-        rich_help_panel=EVERY,
-        help="Format of the tables: text, csv, md or json (one object per line). "
-        "Other lines then go to standard error.",
-    )
-    return _with_option(with_quiet(run), "table_format", Annotated[TableFormat, option], chosen)
-
-
-def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with the option ``--quiet``."""
-    text = "Print errors only; files and --json - are still written."
-    option = Option("--quiet", "-q", rich_help_panel=EVERY, help=text)
-    return _with_option(run, "quiet", Annotated[bool, option], quiet)
-
-
-def _with_option(
-    run: Callable[..., None], name: str, kind: Any, variable: ContextVar[Any]
-) -> Callable[..., None]:
-    """A command with one more option, whose value is in a variable while the command runs."""
-    default = variable.get()
-
-    @wraps(run)
-    def wider(*args: Any, **named: Any) -> None:
-        token = variable.set(named.pop(name, default))
-        try:
-            run(*args, **named)
-        finally:
-            variable.reset(token)
-
-    option = Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-    given = signature(run, eval_str=True)  # Typer finds its annotations only where they are not strings
-    vars(wider)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
-    wider.__annotations__ = {**run.__annotations__, name: kind}
-    return wider

@@ -5,11 +5,10 @@ Drifts of several effects share one form: linear, or exponential towards a final
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass, field
 from math import inf
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 
@@ -21,6 +20,10 @@ SWING = 0.3
 
 LEAST_EXPONENT = 0.25
 """Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
+
+DESCRIPTION = "parameter"
+"""Key of a field's metadata with its `ParameterInfo`."""
+InfoT = ParamSpec("InfoT")
 
 
 @dataclass(frozen=True)
@@ -44,28 +47,35 @@ class ParameterInfo:
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
         relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
+        name: of the field in the effect's class, from which it is taken.
     """
 
-    name: str
     symbol: str
     unit: str
     meaning: str
+    _: KW_ONLY
     scale: float
-    lower: float
-    upper: float
-    default: float
-    form: bool
-    fit_lower: float
-    fit_upper: float
-    rate_exponent: str
-    beside_spring: bool
-    chosen_spring: bool
-    per_pressure: bool
-    inside: bool
-    of_input: bool
-    along_run: bool
-    of_load: bool
-    relative: bool
+    lower: float = -inf
+    upper: float = inf
+    default: float = 0.0
+    form: bool = False
+    fit_lower: float = -inf
+    fit_upper: float = inf
+    rate_exponent: str = ""
+    beside_spring: bool = False
+    chosen_spring: bool = False
+    per_pressure: bool = False
+    inside: bool = False
+    of_input: bool = False
+    along_run: bool = False
+    of_load: bool = False
+    relative: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """A fit stays within the values allowed."""
+        object.__setattr__(self, "fit_lower", max(self.lower, self.fit_lower))
+        object.__setattr__(self, "fit_upper", min(self.upper, self.fit_upper))
 
     @property
     def form_start(self) -> float:
@@ -81,7 +91,6 @@ class ParameterInfo:
 
         Returns:
             Both, in the unit.
-            Both, in the unit.
         """
         if "rad" not in self.unit or not 0.0 < swing < SWING:
             return self.fit_lower, self.fit_upper
@@ -92,58 +101,24 @@ class ParameterInfo:
         return max(self.lower, least), self.fit_upper
 
 
-def parameter(
-    symbol: str,
-    unit: str,
-    meaning: str,
-    *,
-    scale: float,
-    lower: float = -math.inf,
-    upper: float = math.inf,
-    default: float = 0.0,
-    form: bool = False,
-    fit_lower: float | None = None,
-    fit_upper: float | None = None,
-    rate_exponent: str = "",
-    beside_spring: bool = False,
-    chosen_spring: bool = False,
-    per_pressure: bool = False,
-    inside: bool = False,
-    of_input: bool = False,
-    along_run: bool = False,
-    of_load: bool = False,
-    relative: bool = False,
-) -> Any:
-    """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
-    metadata = {
-        "symbol": symbol,
-        "unit": unit,
-        "meaning": meaning,
-        "scale": scale,
-        "lower": lower,
-        "upper": upper,
-        "form": form,
-        "fit_lower": lower if fit_lower is None else fit_lower,
-        "fit_upper": upper if fit_upper is None else fit_upper,
-        "rate_exponent": rate_exponent,
-        "beside_spring": beside_spring,
-        "chosen_spring": chosen_spring,
-        "per_pressure": per_pressure,
-        "inside": inside,
-        "of_input": of_input,
-        "along_run": along_run,
-        "of_load": of_load,
-        "relative": relative,
-    }
-    return field(default=default, metadata=metadata)
+def _as_field(described: Callable[InfoT, ParameterInfo]) -> Callable[InfoT, Any]:
+    def declared(*args: InfoT.args, **named: InfoT.kwargs) -> Any:
+        info = described(*args, **named)
+        return field(default=info.default, metadata={DESCRIPTION: info})
+
+    return declared
 
 
-def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float | None = None) -> Any:
+parameter = _as_field(ParameterInfo)
+"""A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
+
+
+def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float = -inf) -> Any:
     """A form parameter that is the exponent of a term; its default is the textbook's.
 
     Args:
         textbook: exponent of the textbook form, dimensionless.
-        fit_lower: least value a fit may take, dimensionless; None: the least that is allowed.
+        fit_lower: least value a fit may take, dimensionless.
     """
     return parameter(
         symbol, "1", meaning, scale=1.0, lower=LEAST_EXPONENT, upper=9.0, default=textbook, form=True,

@@ -52,7 +52,7 @@ def check_described(kind: object) -> None:
     try:
         severity = kind.parameters()[0]
         has_null = severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
-    except (TypeError, IndexError):  # parameters without a description, or none at all
+    except (TypeError, LookupError):  # parameters without a description, or none at all
         has_null = False
     if not has_null:
         what = "the first parameter is its severity, whose default must be 0 within its bounds"

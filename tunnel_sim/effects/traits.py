@@ -7,10 +7,17 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, TypeAlias, cast
+from typing import ClassVar, Literal, TypeAlias
 
 from tunnel_sim.effects.evidence import Residuals, Sought
-from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
+from tunnel_sim.effects.parameters import (
+    DESCRIPTION,
+    Circumstances,
+    ParameterInfo,
+    Trial,
+    WindOnRun,
+    moment_scale,
+)
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -119,8 +126,7 @@ class Traits:
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
         return tuple(
-            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-            for own in dataclasses.fields(cls)
+            dataclasses.replace(own.metadata[DESCRIPTION], name=own.name) for own in dataclasses.fields(cls)
         )
 
     @classmethod

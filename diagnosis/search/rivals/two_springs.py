@@ -9,7 +9,7 @@ that of an unknown cause.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -83,7 +83,7 @@ class TwoSprings(Rival):
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact:
         """The two springs with their errors, and the effects that act with them."""
         both = (ONE_SPRING.name, AnotherSpring.name)
-        springs = [spring_error(best.fit, name, similarity) for name in both]
+        springs = [asdict(spring_error(best.fit, name, similarity)) for name in both]
         beside = [name for name in best.names if name not in both]
         return Fact("two springs off", {"springs": springs, "beside": beside})
 

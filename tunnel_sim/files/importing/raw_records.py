@@ -102,7 +102,8 @@ def raw_records(
             file = stem_of(source.path) if several or not (table.part or run) else ""
             name = one_line("-".join(part for part in (file, table.part, run) if part))
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
-            found += _records(name, source.path, table, columns, kept, stated, choices, said, where)
+            run_rows = _RunRows(name, source.path, table, columns, kept, stated, said, where)
+            found += _records(run_rows, choices)
     return found
 
 
@@ -119,21 +120,31 @@ def _from_start_to_end(time: Rows, choices: ImportChoices, said: list[str]) -> N
     return kept
 
 
-def _records(
-    name: str,
-    path: Path,
-    table: Table,
-    columns: RunColumns,
-    kept: NDArray[np.bool_],
-    stated: Stated,
-    choices: ImportChoices,
-    remarks: list[str],
-    where: str,
-) -> list[RawRecord]:
+@dataclass(frozen=True, eq=False)
+class _RunRows:
+    """The rows of a run in a table.
+
+    Args:
+        kept: which rows of the table are used.
+        where: file and table, for errors.
+    """
+
+    name: str
+    path: Path
+    table: Table
+    columns: RunColumns
+    kept: NDArray[np.bool_]
+    stated: Stated
+    said: Sequence[str]
+    where: str
+
+
+def _records(run: _RunRows, choices: ImportChoices) -> list[RawRecord]:
     """The cleaned records of the columns of a run: one, or one from each start of the clock."""
     records = []
+    table, columns, where, remarks = run.table, run.columns, run.where, [*run.said]
     driven = columns.input
-    time, readings = columns.time[kept], columns.reading[kept]
+    time, readings = columns.time[run.kept], columns.reading[run.kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
     starts = [0, *restarts(time), time.size]
     if len(starts) > 2:
@@ -143,11 +154,9 @@ def _records(
             clean = cleaned(time[a:b], readings[a:b])
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from None
-        rows = np.flatnonzero(kept)[a:b]
+        rows = np.flatnonzero(run.kept)[a:b]
         if columns.quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
-            raise HoldsTurningPoints(
-                _turning_points(name, table, columns, rows, clean, remarks, choices), where
-            )
+            raise HoldsTurningPoints(_turning_points(run, rows, clean, remarks, choices), where)
         if clean.time_s.size < 2:
             raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
         given = None
@@ -163,13 +172,13 @@ def _records(
             given = driven.column, values
         records.append(
             RawRecord(
-                id=name if len(starts) == 2 else f"{name}-{place}",
-                source=path,
+                id=run.name if len(starts) == 2 else f"{run.name}-{place}",
+                source=run.path,
                 column=columns.pair.reading.name,
                 cleaned=clean,
                 quantity=columns.quantity,
                 unit=columns.unit,
-                stated=stated.of_rows(slice(a, b)),
+                stated=run.stated.of_rows(slice(a, b)),
                 said=(*remarks, *clean.said),
                 clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                 whole=table.named and len(starts) == 2,
@@ -181,17 +190,11 @@ def _records(
 
 
 def _turning_points(
-    name: str,
-    table: Table,
-    columns: RunColumns,
-    rows: NDArray[np.intp],
-    clean: Cleaned,
-    remarks: Sequence[str],
-    choices: ImportChoices,
+    run: _RunRows, rows: NDArray[np.intp], clean: Cleaned, remarks: Sequence[str], choices: ImportChoices
 ) -> TurningPoints:
     """The turning points in some rows of a table, with the standard deviations in its columns."""
-    pair, unit = columns.pair, columns.unit  # the unit also of uncertainties without a known one
-    time, remarks = clean.time_s, [*table.said, *remarks]
+    pair, unit = run.columns.pair, run.columns.unit  # the unit also of uncertainties without a known one
+    time, remarks = clean.time_s, [*run.table.said, *remarks]
     if pair.time is not None and not pair.time.unit and choices.time_unit is None:
         # The step of a clock is short, and half a period of a swing is not.
         size = float(np.median(np.diff(np.sort(pair.time.values[rows]))))
@@ -200,7 +203,7 @@ def _turning_points(
         remarks = [line for line in remarks if "no unit of the times" not in line]
         remarks.append(f"the file states no unit of the times: half periods of {size:.4g} are taken as {own}")
     found: dict[str, PerSample] = {}
-    for channel in table.channels:
+    for channel in run.table.channels:
         mark = _STD.match(channel.name)
         values = channel.values[rows]
         if mark is None or values.shape != time.shape or not (values > 0.0).all():
@@ -209,4 +212,4 @@ def _turning_points(
         if kind in ("time", "angle"):
             factor = UNITS[kind].get(channel.unit) or (1.0 if kind == "time" else UNITS[kind].get(unit, 1.0))
             found.setdefault(kind, values * factor)
-    return TurningPoints(name, time, clean.reading, found.get("time"), found.get("angle"), tuple(remarks))
+    return TurningPoints(run.name, time, clean.reading, found.get("time"), found.get("angle"), tuple(remarks))

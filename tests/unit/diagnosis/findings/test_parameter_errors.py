@@ -13,9 +13,8 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base, one_more
 from diagnosis.answer.linear_theory import coefficient_move, move_of_halves, parameter_shift
-from diagnosis.findings.candidates import candidates
+from diagnosis.findings.candidates import candidates, parameter_errors
 from diagnosis.findings.closing import closing
-from diagnosis.findings.parameter_errors import parameter_errors
 from tests.support.gap_campaigns import answer, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

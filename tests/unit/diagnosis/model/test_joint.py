@@ -141,8 +141,7 @@ def test_friction_is_found_and_the_patched_model_closes_the_gap_by_itself(tmp_pa
     answer = diagnose(data, kinds=vocabulary(["coulomb_friction", "quadratic_damping"]), model=model)
     assert answer.causes == ("coulomb_friction",)
     assert answer.model is not None
-    closure = answer.model.closure
-    assert closure.native_closed > 0.9 * closure.fit_closed > 0.89
+    assert answer.model.closed > 0.9 * answer.model.closed_by_fit > 0.89
     law = read_model(answer.model.write(tmp_path / "out.xml"), "hinge", data).law
     assert law.friction == pytest.approx(0.004, rel=0.01)
     assert law.inertia == pytest.approx(0.97 * INERTIA, rel=0.002)

@@ -228,7 +228,7 @@ def test_dry_friction_is_named_and_the_model_with_it_closes_the_gap_by_itself(
     assert near(answer, "yaw_inertia", inertia(truth), 2e-3)
     assert near(answer, "mechanical_damping", damping, 2e-3)
     assert answer.model is not None
-    assert answer.model.closure.native_closed > 0.99
+    assert answer.model.closed > 0.99
     xml = answer.model.write(tmp_path / "out.xml").read_text()
     before = left_by_plain_mujoco(given, data, key=False)
     assert left_by_plain_mujoco(xml, data, key=True) < 0.02 * before > 2.0 * NOISE
@@ -290,11 +290,11 @@ def test_gear_play_before_a_spring_is_written_for_the_plugin(tmp_path: Path) -> 
     assert answer.causes == ("free_play",)
     assert near(answer, "half_width", 0.02)
     assert answer.model is not None
-    assert answer.model.closure.native_closed > 0.99
+    assert answer.model.closed > 0.99
     assert any("vwt.yaw_moment adds it" in note for note in answer.model.notes)
     nearest = answer.model.native
     assert nearest is not None
-    assert nearest.closure.native_closed < answer.model.closure.native_closed
+    assert nearest.closed < answer.model.closed
     mujoco.MjModel.from_xml_string(nearest.write(tmp_path / "native.xml").read_text())  # without the plugin
     assert "yaw_moment" not in (tmp_path / "native.xml").read_text()
 
@@ -306,7 +306,7 @@ def test_a_delay_of_the_input_is_named_and_written_into_the_actuator(tmp_path: P
     assert answer.causes == ("input_delay",)
     assert near(answer, "delay", 2.0 / RATE)
     assert answer.model is not None
-    assert answer.model.closure.native_closed > 0.999
+    assert answer.model.closed > 0.999
     assert not any("delay of the input" in note for note in answer.model.notes)
     xml = answer.model.write(tmp_path / "out.xml").read_text()
     assert mujoco.MjModel.from_xml_string(xml).actuator_delay[0] == pytest.approx(2.0 / RATE, rel=0.02)
@@ -321,7 +321,7 @@ def test_a_lag_of_the_actuator_is_named_and_written_as_its_filter(tmp_path: Path
     assert answer.causes == ("actuator_lag",)
     assert near(answer, "lag", 0.03, 0.02)
     assert answer.model is not None
-    assert answer.model.closure.native_closed > 0.998
+    assert answer.model.closed > 0.998
     written = mujoco.MjModel.from_xml_string(answer.model.write(tmp_path / "out.xml").read_text())
     assert written.actuator_dynprm[0, 0] == pytest.approx(0.03, rel=0.02)
     assert written.key_act[:, 0] == pytest.approx(

@@ -16,7 +16,6 @@ from tests.reference import free_decays
 from tests.reference.free_decays import SIX, Setting, angle_of, with_records
 from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.files.writing import as_json
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -112,7 +111,7 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     assert found.prepared.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.prepared.hum.std)
     assert not found.gap.test.detected
     noted = hum_noted(found.campaign, found.prepared.hum, found.similarity)
-    said = [remark(as_json(one)).what for one in noted]
+    said = [remark(one).what for one in noted]
     assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
     assert any("times the mains' frequency" in one for one in said) == (multiple > 1)
     assert nominal_study(clean, ALL_EFFECTS).prepared.hum is None
@@ -167,7 +166,7 @@ def test_what_the_sample_rate_cannot_tell_apart_is_said(rate, multiple):
     assert found.prepared.hum is not None
     own = found.similarity.own(found.prepared.hum.frequency, "Hz")
     noted = hum_noted(found.campaign, found.prepared.hum, found.similarity)
-    said = [remark(as_json(one)).what for one in noted]
+    said = [remark(one).what for one in noted]
     assert own == pytest.approx(50.0, abs=3e-3)
     assert any(one.startswith(f"mains of {110.0 - own:.5g} Hz would show the same line") for one in said)
     assert not found.gap.test.detected

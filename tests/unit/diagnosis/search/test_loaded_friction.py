@@ -126,7 +126,7 @@ def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, dr
     assert answer.model is not None
     left_out = "friction against load" in {fact.kind for fact in answer.model.differences}
     assert left_out == driven
-    assert left_out or answer.model.closure.native_closed > 0.99
+    assert left_out or answer.model.closed > 0.99
     assert answer.decision.decided  # though MuJoCo cannot confirm the driven joint
 
 

@@ -95,6 +95,9 @@ def test_a_random_moment_explains_no_more_than_is_missing() -> None:
     left = base.total - base.count
     assert not explains_too_much(moment(1.2 * left), base)
     assert explains_too_much(moment(3.0 * left), base)
+    # a motion of few cycles is absorbed in part, and a moment alone pays for nothing else
+    assert not explains_too_much(moment(1.7 * left), base, alone=True)
+    assert explains_too_much(moment(4.0 * left), base, alone=True)
     # where nothing is missing, chance alone is allowed
     none = nominal(campaign(duration=6.0))
     assert not explains_too_much(moment(100.0), none)

@@ -66,8 +66,8 @@ KNOWN_IN_SEVERAL = {
     "steady_line_rate": "the sentence states the rate",
 }
 
-#: Where usual settings may be made: what people call, what has no campaign, and an answer that states its changes.
-VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py", "whole.py"}
+#: Where usual settings may be made: what people call, what has no campaign, and answers that state their changes.
+VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py", "whole.py", "cases.py"}
 
 
 @cache

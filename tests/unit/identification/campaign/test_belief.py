@@ -53,7 +53,7 @@ def test_with_hardly_a_prior_it_is_the_maximum_likelihood_estimate_and_its_bound
     truth = Truth()
     bound = campaign_bound(
         found,
-        **{name: getattr(truth, name) for name in PARAMETERS},
+        truth,
         noise_std=NOISE,
         initial_states=[(setting.release, setting.rate) for setting in SETTINGS],
     )

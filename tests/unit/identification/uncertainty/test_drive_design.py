@@ -28,7 +28,7 @@ from tunnel_sim.files.plan_drive import DriveTable
 from tunnel_sim.files.plan_file import EffectTable, PlanDocument, plan_from, read_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan
+from tunnel_sim.vocabulary.plan import CampaignPlan, Truth
 
 PLAN = """
 name = "free"
@@ -111,9 +111,9 @@ def test_estimates_scatter_as_the_bound_says(free: PlanDocument) -> None:
 
 def test_a_random_moment_costs_information_and_none_costs_nothing() -> None:
     given = campaign()
-    truth = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
+    truth = Truth(0.49, -0.11, 0.1014, 0.012)
     plain, none, some = (
-        campaign_bound(given, **truth, noise_std=1e-3, random_moments=q)
+        campaign_bound(given, truth, noise_std=1e-3, random_moments=q)
         for q in (None, [0.0] * len(given.runs), [1e-2] * len(given.runs))
     )
     assert np.array(none.covariance) == pytest.approx(np.array(plain.covariance), rel=1e-6)
@@ -129,8 +129,8 @@ def test_without_sensor_noise_the_bound_is_that_of_a_regression(free: PlanDocume
     time = run.record.time_s
     decay = 0.5 * damping / inertia, RIG.spring(5) / inertia
     rate = np.gradient(driven_rows(time, run.drive.values / inertia, *decay, held=False)[0], time)
-    truth = {"cn_beta": 0.0, "cn_r": 0.0, "yaw_inertia": inertia, "mechanical_damping": damping}
-    found = campaign_bound(replace(given, runs=(run,)), **truth, noise_std=1e-7, random_moments=[q])
+    truth = Truth(0.0, 0.0, inertia, damping)
+    found = campaign_bound(replace(given, runs=(run,)), truth, noise_std=1e-7, random_moments=[q])
     expected = inertia * np.sqrt(q / np.trapezoid(rate**2, time))
     assert found.std("mechanical_damping") == pytest.approx(expected, rel=0.05)
 

@@ -144,7 +144,7 @@ def test_another_version_of_mujoco_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "other_version.c"
     parts = "".join(
         f'#include "{PLUGIN_SOURCE / name}.c"\n'
-        for name in ("plugin", "instance", "find_ids", "binding", "moment", "expression")
+        for name in ("plugin", "instance", "find_ids", "binding", "parameters", "lag", "moment", "expression")
     )
     source.write_text(
         f"#include <mujoco/mujoco.h>\n#undef mjVERSION_HEADER\n#define mjVERSION_HEADER 1\n{parts}",

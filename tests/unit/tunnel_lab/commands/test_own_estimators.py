@@ -247,7 +247,7 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Mine", "Broken")]
     given = campaign(TWELVE[:4], noise=5e-4, duration=4.0, rate=200.0, rng=np.random.default_rng(1))
     case = breakdown.BiasCase(
-        "no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3), breakdown.TRUTH
+        "no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3), vars(breakdown.TRUTH)
     )
     rows, outcome = results_of(breakdown.breakdown_of([case], tuple(names), 1), None, processes(1))
     mine, broken = (rows.filter(pl.col("estimator") == name) for name in names)

@@ -17,6 +17,7 @@ from tunnel_lab.experiments.score import TrialBatch, read_trials, write_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, effects_of, load_grid, packaged_grid
 from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import Truth
 
 HEAD = 'schema_version = 1\nname = "g"\nseed = 1\ntrials = 4\n'
 DECAYS = "[[decays]]\nzeta = [0.01, 0.05]\nfrequency = [2.0]\nnoise = [0.01]\nduration = [4.0]\n"
@@ -93,7 +94,7 @@ def test_the_bound_is_that_of_the_start_actually_released():
 
     cell = Cell("campaign", 0.0015, 4.0, 0.35, 500.0, 0.0, wind_speed=25.0, springs=(16.12, 44.84))
     trial = draw_trial(cell, 1, 0)
-    nominal = campaign_bound(trial.campaign, **trial.truth, noise_std=0.0015 * 0.35)
+    nominal = campaign_bound(trial.campaign, Truth(**trial.truth), noise_std=0.0015 * 0.35)
     for name, bound in trial.bound.items():
         assert bound != nominal.std(name)
         assert bound == pytest.approx(nominal.std(name), rel=0.12)  # releases scatter by 3 %

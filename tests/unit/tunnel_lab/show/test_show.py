@@ -13,8 +13,9 @@ import pytest
 
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
-from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
+from tunnel_lab.show.film import Look, backends, draw_trace, shown_run, write_film
 from tunnel_lab.show.live import Controls, History, LiveRun, missing_display, window_loop
+from tunnel_lab.show.request import Request
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
@@ -138,15 +139,15 @@ def test_the_trace_grows_to_where_the_run_is() -> None:
 
 
 def test_what_is_shown_is_the_plans_run() -> None:
-    run = shown_run(Request(plan=str(PLAN)))
+    run = shown_run(Request(plan=PLAN))
     assert run.record().yaw_rad.tobytes() == run.record().yaw_rad.tobytes()
-    changed = shown_run(Request(plan=str(PLAN), wind_speed=20.0, spring=8, release_angle_deg=-5.0))
+    changed = shown_run(Request(plan=PLAN, wind_speed=20.0, spring=8, release_angle_deg=-5.0))
     assert (changed.settings.wind_speed, changed.settings.spring_stiffness) == (20.0, 44.84)
     assert changed.settings.release_angle == pytest.approx(np.radians(-5.0))
     with_effect = shown_run(Request(effects=("coulomb_friction:friction_moment=0.01",)))
     assert with_effect.settings.parameters["friction_moment"] == 0.01
     assert "coulomb friction" in with_effect.title
-    request = Request(plan="p", effects=("a:b=1",), seed=3)
+    request = Request(plan=Path("p"), effects=("a:b=1",), seed=3)
     assert Request.from_json_dict(as_json(request)) == request
 
 

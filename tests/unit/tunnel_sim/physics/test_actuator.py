@@ -368,5 +368,5 @@ def test_mujocos_own_actuators_are_named_and_the_patched_joint_moves_as_they_do(
     assert own.std is not None
     assert abs(own.value - truth) < step + 3.0 * own.std
     assert found.model is not None
-    assert found.model.closure.native_closed > 0.999
+    assert found.model.closed > 0.999
     assert any("The actuator is not part of the model" in note for note in found.model.notes)

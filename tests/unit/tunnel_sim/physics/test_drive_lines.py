@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.actuator import ActuatorLimits
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
-from tunnel_sim.vocabulary.rig import Actuator
 
 DURATION = 3.0  # s
 
@@ -104,7 +104,7 @@ def test_the_response_to_even_samples_is_that_to_the_same_input_in_uneven_ones(h
     there = values[100] if held else 0.5 * (values[100] + values[101])
     ends, root = np.arange(0.0, 2.9, 0.03), complex(-0.7, 40.0)
     even, uneven = (
-        DriveMoment(t, v, delay=delay, held=held, actuator=Actuator(lag=lag)).mode(root, ends)
+        DriveMoment(t, v, delay=delay, held=held, actuator=ActuatorLimits(lag=lag)).mode(root, ends)
         for t, v in ((time, values), (np.insert(time, 101, among), np.insert(values, 101, there)))
     )
     within = 1e-4 if lag else 1e-9  # a response with a lag is a line in each interval, however short
@@ -112,7 +112,7 @@ def test_the_response_to_even_samples_is_that_to_the_same_input_in_uneven_ones(h
 
 
 def test_the_samples_behind_an_actuator_are_computed_once_for_equal_inputs():
-    drive = DriveMoment(np.arange(50) * 0.1, np.sin(np.arange(50.0)), actuator=Actuator(lag=0.3))
+    drive = DriveMoment(np.arange(50) * 0.1, np.sin(np.arange(50.0)), actuator=ActuatorLimits(lag=0.3))
     later = replace(drive, delay=0.05, offset=1.0)
     assert later.exerted.values is drive.exerted.values
     assert later.exerted.time_s is drive.exerted.time_s

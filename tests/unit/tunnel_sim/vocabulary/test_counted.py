@@ -35,10 +35,11 @@ TWO_OR_MORE = {
     "diagnosis/model/joint.py",  # springs that differ
     "identification/examination/self_excited.py",  # cycles of a steady oscillation
     "diagnosis/findings/causes.py",  # springs of which one is off
+    "diagnosis/findings/spring_choices.py",  # the same
     "tunnel_sim/files/importing/inputs.py",  # columns of which one has to be chosen
-    "diagnosis/words/remainder.py",  # one run has words of its own
+    "diagnosis/findings/remainder.py",  # one run has words of its own
     "diagnosis/findings/cautions.py",  # one run has words of its own
-    "diagnosis/words/where.py",  # one run has words of its own
+    "diagnosis/findings/place.py",  # one run has words of its own
 }
 """Files whose counts are never one, and why."""
 

@@ -1,0 +1,147 @@
+"""What the gap costs: the moments of the air without the causes and with them, at the campaign's top wind speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from diagnosis.findings.finding import Answered, Finding, Picture
+from diagnosis.findings.judged import Judged
+from identification.show.blocks import Paragraph, Section, TextTable
+from identification.show.drawing import AFTER, BEFORE, NARROW
+from identification.show.numbers import estimated, listed, significant
+from identification.show.quantity import Quantity
+from identification.show.style import INTERVAL, figure, grid, styled
+from tunnel_sim.vocabulary.campaign import RigProperties, Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class AirMoment:
+    """A moment of the air on the body, by the nominal model and by the model with the causes.
+
+    Args:
+        motion: that it opposes or follows: ``1° of yaw``, or ``1 °/s of yaw rate``.
+        before: by the nominal model, N m.
+        after: with the causes, N m.
+    """
+
+    motion: str
+    before: Quantity
+    after: Quantity
+
+
+@dataclass(frozen=True)
+class WhatItCosts(Finding):
+    """The moments of the air at the top wind speed of a campaign, and their error without the causes.
+
+    A positive moment turns the body further in the direction of the yaw or of the yaw rate.
+
+    Args:
+        wind_speed: the top speed, m/s.
+        moments: of the coefficients that the runs determine.
+    """
+
+    after: ClassVar[str] = "coefficients-section"
+
+    wind_speed: float
+    moments: tuple[AirMoment, ...]
+
+    @classmethod
+    def find(cls, answered: Answered) -> WhatItCosts | None:
+        """The moments; None without named causes, without wind, and where no coefficient is determined."""
+        top = max(answered.campaign.runs, key=lambda run: run.wind_speed)
+        if not answered.study.named or not top.wind_on or top.air_density is None:
+            return None
+        moments = []
+        for name, before in answered.before.items():
+            after, factor = answered.after.get(name), _moment_per(name, top, answered.campaign.rig)
+            if after is not None and factor is not None and before.determined and after.determined:
+                motion = "1° of yaw" if name.startswith("cn_beta") else "1 °/s of yaw rate"
+                moments.append(AirMoment(motion, _times(before, factor), _times(after, factor)))
+        return cls(top.wind_speed, tuple(moments)) if moments else None
+
+    def section(self, judged: Judged) -> Section:
+        """The moments in a sentence, a table and a figure."""
+        rows = tuple((one.motion, *map(_shown, (one.before, one.after)), _error(one)) for one in self.moments)
+        heads = ("moment of the air at", "nominal model [N m]", "with the causes [N m]", "error without them")
+        title = f"Moments of the air at {self.wind_speed:g} m/s, with 95 % intervals"
+        said = (
+            f"{_shown(one.after)} N m at {one.motion} ({_error(one)} without the causes)"
+            for one in self.moments
+        )
+        words = f"At {self.wind_speed:g} m/s the moment of the air is {listed(list(said))}."
+        table = TextTable(title, heads, rows, right=heads[1:])
+        drawn = (one.block for one in self.pictures(judged))
+        return Section("costs", "What the gap costs", (Paragraph(words, "What it costs"), table, *drawn))
+
+    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+        """The moments before and after, a panel each."""
+        del judged
+        caption = f"Moments of the air at {self.wind_speed:g} m/s, with 95 % intervals."
+        description = "Moments of the air at the top wind speed, by the nominal model and with the causes."
+        return (Picture("costs", caption, description, partial(costs_figure, self)),)
+
+
+def _moment_per(name: str, run: Run, rig: RigProperties) -> float | None:
+    """Moment in N m at one degree, or one degree per second, per unit of a coefficient.
+
+    Args:
+        name: of the coefficient, times the sizes in its name, which the rig does not state.
+    """
+    rate = name.startswith("cn_r")
+    if not (rate or name.startswith("cn_beta")) or run.air_density is None:
+        return None
+    area = 1.0 if "_area" in name else rig.frontal_area
+    length = 1.0 if "_length" in name else rig.reference_length
+    if area is None or length is None:
+        return None
+    pressure = 0.5 * run.air_density * run.wind_speed ** (1 if rate else 2)
+    return math.radians(1.0) * pressure * area * length ** (2 if rate else 1)
+
+
+def _times(given: Quantity, factor: float) -> Quantity:
+    std = None if given.std is None else abs(factor) * given.std
+    ends = None if given.interval is None else (factor * given.interval[0], factor * given.interval[1])
+    return Quantity(factor * given.value, std, "N m", ends, given.bound)
+
+
+def _ends(given: Quantity) -> tuple[float, float] | None:
+    """Ends of the 95 % interval, N m; None where it is not known."""
+    if given.interval is not None or given.std is None:
+        return given.interval
+    return given.value - INTERVAL * given.std, given.value + INTERVAL * given.std
+
+
+def _shown(given: Quantity) -> str:
+    """A moment with its 95 % interval, N m, such as ``0.0683 ± 0.0004``."""
+    if given.std is None:
+        return significant(given.value)
+    reach = INTERVAL * given.std
+    return estimated(Quantity(given.value, reach, given.unit, given.interval))
+
+
+def _error(one: AirMoment) -> str:
+    """The error of the nominal model as a share of the moment with the causes."""
+    return "–" if not one.after.value else f"{100.0 * (one.before.value / one.after.value - 1.0):+.2g} %"
+
+
+@styled
+def costs_figure(costs: WhatItCosts) -> Figure:
+    """The moments of the air before and after the causes are added, with 95 % intervals."""
+    fig = figure(NARROW, 0.3 + 1.3 * len(costs.moments))
+    for place, one in enumerate(costs.moments, 1):
+        axes = fig.add_subplot(len(costs.moments), 1, place)
+        for row, (given, colour, marker) in enumerate(((one.before, BEFORE, "s"), (one.after, AFTER, "o"))):
+            ends = _ends(given) or (given.value, given.value)
+            reach = [[given.value - ends[0]], [ends[1] - given.value]]
+            axes.errorbar(given.value, row, xerr=reach, color=colour, marker=marker, ms=6, capsize=4)
+        axes.set_yticks([0, 1], ["before", "after"])
+        axes.set(ylim=(1.6, -0.6), xlabel=f"moment at {one.motion} [N m]")
+        axes.locator_params(axis="x", nbins=5)
+        grid(axes)
+    return fig

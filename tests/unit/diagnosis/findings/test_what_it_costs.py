@@ -1,0 +1,78 @@
+"""What the gap costs: moments of the air, by their definition ½ρV²Al Cnβ β and ½ρVAl² Cnr r."""
+
+from __future__ import annotations
+
+import json
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import jsonschema
+import pytest
+
+from diagnosis.findings.finding import Answered
+from diagnosis.findings.sections import sections
+from diagnosis.findings.what_it_costs import WhatItCosts
+from diagnosis.result import Diagnosis
+from identification.show.quantity import Quantity
+from tests.support.diagnosis_document import campaign, document, findings_of
+from tunnel_lab.commands.about import schema_of
+
+AREA, LENGTH, DENSITY, TOP = 0.036, 0.625, 1.2, 21.5
+BEFORE = {"cn_beta": Quantity(0.5, 0.01, "1/rad"), "cn_r": Quantity(-0.2, None, "1/rad", bound="lower")}
+AFTER = {
+    "cn_beta": Quantity(0.4, 0.002, "1/rad", interval=(0.397, 0.405)),
+    "cn_r": Quantity(-0.1, 0.001, "1/rad"),
+}
+
+
+def found(
+    before: Any = BEFORE, after: Any = AFTER, *, named: bool = True, data: Any = None
+) -> WhatItCosts | None:
+    study: Any = SimpleNamespace(named=named)
+    return WhatItCosts.find(Answered(data or campaign(), study, before, after))
+
+
+def test_moments_are_those_of_the_definition_at_the_top_speed() -> None:
+    costs = found()
+    assert costs is not None
+    assert costs.wind_speed == TOP
+    at_angle, at_rate = costs.moments
+    angle = 0.5 * DENSITY * TOP**2 * AREA * LENGTH * math.radians(1.0)
+    rate = 0.5 * DENSITY * TOP * AREA * LENGTH**2 * math.radians(1.0)
+    assert at_angle.after.value == pytest.approx(0.4 * angle)
+    assert at_angle.after.std == pytest.approx(0.002 * angle)
+    assert at_angle.after.interval == pytest.approx((0.397 * angle, 0.405 * angle))
+    assert at_rate.before.value == pytest.approx(-0.2 * rate)
+    assert at_rate.before.bound == "lower"
+
+
+def test_sizes_that_are_not_stated_are_in_the_coefficient() -> None:
+    whole = found()
+    product = {"cn_beta_area_length": Quantity(0.4 * AREA * LENGTH, 0.001, "m3/rad")}
+    costs = found(product, product)
+    assert whole is not None
+    assert costs is not None
+    assert costs.moments[0].after.value == pytest.approx(whole.moments[0].after.value)
+
+
+def test_nothing_is_said_without_causes_wind_or_coefficients() -> None:
+    still = campaign()
+    assert found(named=False) is None
+    assert found({}, {}) is None
+    assert found({"zeta": Quantity(0.01, 0.001, "1")}, {"zeta": Quantity(0.01, 0.001, "1")}) is None
+    assert found(data=type(still)(still.name, still.rig, still.sensor, still.runs[:1])) is None
+
+
+def test_every_face_and_the_document_have_it() -> None:
+    costs = found()
+    given = findings_of(document())
+    answer = Diagnosis(**{**vars(given), "costs": costs})
+    written = json.loads(json.dumps(answer.to_json_dict()))
+    jsonschema.Draft202012Validator(schema_of("diagnosis")).validate(written)
+    assert Diagnosis.from_json_dict(written).costs == costs
+    keys = [section.key for section in sections(answer)]
+    assert keys.index("costs") == keys.index("coefficients-section") + 1
+    assert "At 21.5 m/s the moment of the air is" in str(answer)
+    assert answer.plot("costs").axes
+    assert "costs" not in [section.key for section in sections(given)]
