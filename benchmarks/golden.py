@@ -222,6 +222,10 @@ def main(given: list[str] | None = None) -> int:
     asked = parser.parse_args(given)
     if asked.what != "write" and asked.out is None:
         parser.error(f"{asked.what} needs two folders")
+    if asked.what != "write" and not any(asked.folder.glob("*/*.*")):
+        parser.error(f"{asked.folder}: no campaign is recorded here; write it first")
+    if asked.what == "compare" and not asked.out.is_dir():
+        parser.error(f"{asked.out}: no such folder; write it first")
     if asked.what == "compare":
         return int(compare(asked.folder, asked.out, asked.lines) > 0)
     os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from benchmarks.golden import changes, main, normalised
 
 
@@ -36,6 +38,17 @@ def test_a_comparison_finds_changed_and_missing_files(tmp_path, capsys):
     assert main(["compare", base, folder(tmp_path / "d")]) == 1
     (tmp_path / "e").mkdir()
     assert main(["compare", base, str(tmp_path / "e")]) == 1
+
+
+@pytest.mark.parametrize(("what", "missing"), [("compare", 0), ("compare", 1), ("faces", 0)])
+def test_a_folder_that_is_not_there_is_refused_and_not_made(what, missing, tmp_path, capsys):
+    places = [folder(tmp_path / "a"), str(tmp_path / "b")]
+    places[missing] = str(tmp_path / "none")
+    with pytest.raises(SystemExit) as stopped:
+        main([what, *places])
+    assert stopped.value.code == 2
+    assert "none: no " in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_change_in_a_long_line_is_shown_from_shortly_before_it():
