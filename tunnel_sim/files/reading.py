@@ -299,8 +299,17 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
         by_polars = type(error).__module__.startswith("polars.")  # known by name: Polars is slow to load
         if not (by_polars or isinstance(error, _FAULTS)):
             raise
-        reason = f"{type(error).__name__}: {one_line(error, 60)}"
-        raise TunnelError(f"{what} ({reason})", where=where, remedy=remedy) from None
+        raise TunnelError(f"{what} ({_reason(error)})", where=where, remedy=remedy) from None
+
+
+def _reason(error: Exception) -> str:
+    """What a parser says of its input; of a value against its type, the key and what it should be."""
+    from pydantic import ValidationError  # slow to load; needed for faults only
+
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {one_line(first['msg'], 60)}"
+    return f"{type(error).__name__}: {one_line(error, 60)}"
 
 
 def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:
