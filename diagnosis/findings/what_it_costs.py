@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,7 +11,7 @@ from diagnosis.findings.finding import Answered, Finding, Picture
 from diagnosis.findings.judged import Judged
 from identification.show.blocks import Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
-from identification.show.numbers import estimated, listed, significant
+from identification.show.numbers import estimated, listed
 from identification.show.quantity import Quantity
 from identification.show.style import INTERVAL, figure, grid, styled
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -67,14 +67,13 @@ class WhatItCosts(Finding):
 
     def section(self, judged: Judged) -> Section:
         """The moments in a sentence, a table and a figure."""
-        rows = tuple((one.motion, *map(_shown, (one.before, one.after)), _error(one)) for one in self.moments)
+        rows = tuple(
+            (one.motion, *map(_shown, (one.before, one.after)), _error(one) or "–") for one in self.moments
+        )
         heads = ("moment of the air at", "nominal model [N m]", "with the causes [N m]", "error without them")
         title = f"Moments of the air at {self.wind_speed:g} m/s, with 95 % intervals"
-        said = (
-            f"{_shown(one.after)} N m at {one.motion} ({_error(one)} without the causes)"
-            for one in self.moments
-        )
-        words = f"At {self.wind_speed:g} m/s the moment of the air is {listed(list(said))}."
+        said = listed([_said(one) for one in self.moments])
+        words = f"At {self.wind_speed:g} m/s the moment of the air is {said}. Here ± spans the 95 % interval."
         table = TextTable(title, heads, rows, right=heads[1:])
         drawn = (one.block for one in self.pictures(judged))
         return Section("costs", "What the gap costs", (Paragraph(words, "What it costs"), table, *drawn))
@@ -119,15 +118,20 @@ def _ends(given: Quantity) -> tuple[float, float] | None:
 
 def _shown(given: Quantity) -> str:
     """A moment with its 95 % interval, N m, such as ``0.0683 ± 0.0004``."""
-    if given.std is None:
-        return significant(given.value)
-    reach = INTERVAL * given.std
-    return estimated(Quantity(given.value, reach, given.unit, given.interval))
+    return estimated(given if given.std is None else replace(given, std=INTERVAL * given.std))
+
+
+def _said(one: AirMoment) -> str:
+    """The moment with the causes as a part of a sentence."""
+    error = _error(one)
+    return f"{_shown(one.after)} N m at {one.motion}" + (f" ({error} without the causes)" if error else "")
 
 
 def _error(one: AirMoment) -> str:
-    """The error of the nominal model as a share of the moment with the causes."""
-    return "–" if not one.after.value else f"{100.0 * (one.before.value / one.after.value - 1.0):+.2g} %"
+    """The error of the nominal model as a share of the moment with the causes; empty where one is at a bound."""
+    if one.before.bound or one.after.bound or not one.after.value:
+        return ""
+    return f"{100.0 * (one.before.value / one.after.value - 1.0):+.2g} %"
 
 
 @styled

@@ -14,6 +14,7 @@ from diagnosis.findings.finding import Answered
 from diagnosis.findings.sections import sections
 from diagnosis.findings.what_it_costs import WhatItCosts
 from diagnosis.result import Diagnosis
+from identification.show.blocks import Paragraph, TextTable
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import campaign, document, findings_of
 from tunnel_lab.commands.about import schema_of
@@ -62,6 +63,19 @@ def test_nothing_is_said_without_causes_wind_or_coefficients() -> None:
     assert found({}, {}) is None
     assert found({"zeta": Quantity(0.01, 0.001, "1")}, {"zeta": Quantity(0.01, 0.001, "1")}) is None
     assert found(data=type(still)(still.name, still.rig, still.sensor, still.runs[:1])) is None
+
+
+def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_error() -> None:
+    costs = found()
+    assert costs is not None
+    section = costs.section(findings_of(document()))
+    words, table = section.blocks[0], section.blocks[1]
+    assert isinstance(words, Paragraph)
+    assert isinstance(table, TextTable)
+    assert "yaw rate. Here ± spans the 95 % interval." in words.text
+    assert table.rows[0][-1] == "+25 %"
+    assert table.rows[1][-1] == "–"
+    assert "(at its lower bound)" in table.rows[1][1]
 
 
 def test_every_face_and_the_document_have_it() -> None:
