@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.likelihood.starting_points import nominal_start, starting_points
 from diagnosis.model.blocks import prepare
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
@@ -26,7 +26,7 @@ from diagnosis.search.prepared import COARSE_STEP, HUM, Prepared, fit_nominal
 from diagnosis.search.study import Answer, Gap, Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.settings import Settings
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -136,6 +136,14 @@ def nominal(data: Campaign) -> Fit:
     """The nominal model fitted."""
     prepared = prepare(data, campaign_noise(data, Settings().noise).variance)
     return fit(Problem(prepared), nominal_start(prepared))
+
+
+def added(base: Fit, *names: str) -> Fit:
+    """The fit with these effects added one after another."""
+    for name in names:
+        start = starting_points(base, effect_class(name))[0]
+        base = fit(start.problem, start.point, base=base)
+    return base
 
 
 def with_settings(fitted: Fit, values: dict[str, float]) -> Fit:

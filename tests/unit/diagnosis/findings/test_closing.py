@@ -10,23 +10,13 @@ import pytest
 
 from diagnosis.answer.held_out import Step, Waterfall, one_more, predict_held_out, share_ahead
 from diagnosis.findings.closing import confirmed
-from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.investigate import nominal_study
 from tests.support.driven_runs import NOTHING, Planted, driven
-from tests.support.gap_campaigns import answer, studied
+from tests.support.gap_campaigns import added, answer, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
 
 CAUSE, IDLE = "quadratic_damping", "cubic_stiffness"
-
-
-def added(base, *names):
-    """The fit with these effects added one after another."""
-    for name in names:
-        start = starting_points(base, effect_class(name))[0]
-        base = fit(start.problem, start.point, base=base)
-    return base
 
 
 @pytest.fixture(scope="module")

@@ -17,10 +17,8 @@ from diagnosis.answer.held_out import (
     waterfall,
 )
 from diagnosis.findings.candidates import Candidate, inclusion
-from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import FOLDS
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise
@@ -29,19 +27,11 @@ from diagnosis.search.random_spectra import SpectrumPart
 from diagnosis.search.study import Answer
 from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import Settings
-from tests.support.gap_campaigns import NOISE, answer, nominal, studied
+from tests.support.gap_campaigns import NOISE, added, answer, nominal, studied
 from tunnel_sim.effects import effect_class
 
 CAUSE, IDLE, HUM = "quadratic_damping", "cubic_stiffness", "mains_hum"
 NO_BASE = Base(NOISE**2, 0.0, 0.0)
-
-
-def added(base, *names):
-    """The fit with these effects added one after another."""
-    for name in names:
-        start = starting_points(base, effect_class(name))[0]
-        base = fit(start.problem, start.point, base=base)
-    return base
 
 
 @pytest.fixture(scope="module")
