@@ -353,8 +353,8 @@ class RandomMomentSettings:
         3.0,
         "The same for a random moment without effects beside it.",
         "judgement",
-        "The nominal model and the releases absorb up to two thirds of a random motion of few cycles: 1.54 and "
-        "1.61 are seen where a moment acts alone, 1.9 and more where it pays for other effects.",
+        "The nominal model and the releases may absorb two thirds of a random motion of few cycles. In two "
+        "campaigns where a moment acts alone the drop is 1.54 and 1.61; no campaign shows where the limit fails.",
     )
     explains_stds: float = setting(
         4.0, "Margin of χ² of noise over that maximum.", "convention", "One campaign in 30,000.", unit="std"
