@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from diagnosis.findings import answers, closure, coefficients, patch, place, remainder
+from diagnosis.findings import answers, closure, coefficients, place, remainder
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
 
@@ -106,22 +106,6 @@ def consequence(answer: Findings) -> str:
 
 def coefficient_note(answer: Findings) -> str:
     return coefficients.coefficient_note(answer.coefficients, answer)
-
-
-def patch_line(answer: Findings) -> str:
-    return patch.patch_line(answer.model, answer)
-
-
-def patch_table(answer: Findings) -> TextTable:
-    return patch.patch_table(answer.model)
-
-
-def model_words(answer: Findings) -> str:
-    return patch.model_words(answer.model, answer)
-
-
-def model_step(answer: Findings) -> str:
-    return patch.model_step(answer.model, answer)
 
 
 def drawn(name: str) -> Callable[[Findings], Figure | None]:
