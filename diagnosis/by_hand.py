@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from diagnosis.answer.held_out import (
 )
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.findings.candidates import candidates
-from diagnosis.findings.next_run import separating_run
-from diagnosis.findings.units import own_next_run
+from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
@@ -104,7 +102,7 @@ class ByHand:
         before, after = (step.excess for step in ends.steps)
         return Closure(tuple(sorted(names)), before, after, ends.held_out, parameters)
 
-    def next_run(self, first: Collection[str], second: Collection[str]) -> dict[str, Any] | None:
+    def next_run(self, first: Collection[str], second: Collection[str]) -> NextRun | None:
         """The run that would distinguish two sets of effects.
 
         Args:
@@ -112,14 +110,13 @@ class ByHand:
             second: names of its rivals.
 
         Returns:
-            Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and expected separation
-            in standard deviations of the noise; None in normalised form.
+            None in normalised form.
 
         Raises:
             TunnelError: when an effect cannot be fitted to these runs.
         """
-        found = separating_run(self._fit(frozenset(first)), self._fit(frozenset(second)))
-        return None if found is None else own_next_run(found, self._study.similarity)
+        found = NextRun.between(self._fit(frozenset(first)), self._fit(frozenset(second)))
+        return None if found is None else found.own(self._study.similarity)
 
     def _fit(self, names: frozenset[str]) -> Fit:
         """Started from the smallest fitted set with more effects, or from the largest with fewer."""

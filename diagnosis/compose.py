@@ -32,7 +32,7 @@ from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import cautions, immaterial, nearly, outside_the_fits, zeros_apart
-from diagnosis.findings.next_run import separating_run
+from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
@@ -42,7 +42,6 @@ from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
     own_hidden,
-    own_next_run,
     own_repeatability,
     sized_coefficients,
 )
@@ -164,7 +163,7 @@ def composed(
     withheld = any(remark.withholds for remark in remarks)
     rivals = _rivals(study)
     beside = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
-    next_run = separating_run(fitted, beside[0]) if beside and fitted is not study.nominal else None
+    next_run = NextRun.between(fitted, beside[0]) if beside and fitted is not study.nominal else None
     caveats = _caveats(study, chosen, closes, unpatched, of_remainder, named)
     return Diagnosis(
         campaign=study.campaign.name,
@@ -176,7 +175,7 @@ def composed(
         ambiguous_with=tuple(
             sorted({name for answer in rivals for name in answer.effects} - set(study.causes))
         ),
-        next_run=None if next_run is None else own_next_run(next_run, similarity),
+        next_run=None if next_run is None else next_run.own(similarity),
         coefficients=Coefficients({}, {}) if withheld else named.coefficients,
         confirmation=closes.confirmation.scaled(similarity.own(1.0, similarity.reading)),
         noise=_noise(study),

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +13,8 @@ from diagnosis.likelihood.normal_equations import project_release
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
-from diagnosis.settings import Settings
+from diagnosis.model.similarity import Similarity
+from diagnosis.settings import AnswerSettings
 from identification.show.numbers import reading_shown
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
@@ -28,34 +27,95 @@ _PHASES = 8  # of the true model's periodic effect, to average over
 _PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, one or two), to fit
 
 
-def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
-    """The run for which two models, fitted to the same runs, predict the most different readings.
+@dataclass(frozen=True)
+class NextRun:
+    """The run for which the predictions of two models differ most.
 
-    The rig can make it: springs, wind speeds and angles are those of its runs.
-
-    Returns:
-        Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected separation
-        (see `separation`) in standard deviations of the noise. None where no stiffness is known, and where a free
-        decay does not show the question: every run is driven, or the models differ in an effect of the input.
+    Args:
+        spring_stiffness: Kr, N m/rad.
+        wind_speed: V, m/s.
+        release_angle: from the rest, rad.
+        duration: of the record, s.
+        separation: expected difference of the predictions (see `separation`), in standard deviations of the noise.
     """
-    data = first.problem.data
-    differ = set(first.problem.effects) ^ set(second.problem.effects)
-    if all(run.drive is not None for run in data.runs) or any(kind.driven for kind in differ):
-        return None
-    density = max((run.air_density for run in data.runs), default=0.0) or 1.2
-    found = []
-    for spring, speed, duration in itertools.product(
-        data.model.planned_springs(data), _speeds(data), _DURATIONS
-    ):
-        run = planned_run(
-            first, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
+
+    spring_stiffness: float
+    wind_speed: float
+    release_angle: float
+    duration: float
+    separation: float
+
+    @classmethod
+    def between(cls, first: Fit, second: Fit) -> NextRun | None:
+        """The run that separates two models, fitted to the same runs.
+
+        The rig can make it: springs, wind speeds and angles are those of its runs.
+
+        Returns:
+            None where no stiffness is known, and where a free decay does not show the question: every run is
+            driven, or the models differ in an effect of the input.
+        """
+        data = first.problem.data
+        differ = set(first.problem.effects) ^ set(second.problem.effects)
+        if all(run.drive is not None for run in data.runs) or any(kind.driven for kind in differ):
+            return None
+        density = max((run.air_density for run in data.runs), default=0.0) or 1.2
+        found = []
+        for spring, speed, duration in itertools.product(
+            data.model.planned_springs(data), _speeds(data), _DURATIONS
+        ):
+            run = planned_run(
+                first, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
+            )
+            for angle in (share * data.swing for share in _ANGLES):
+                apart = separation(first, second, run, angle)
+                if apart is not None:
+                    found.append(cls(spring, speed, angle, duration, apart))
+        return max(found, key=lambda one: one.separation, default=None)
+
+    def own(self, similarity: Similarity) -> NextRun:
+        """The run in the measured campaign's units, rounded to adjustable values."""
+        return NextRun(
+            _adjustable(similarity.own(self.spring_stiffness, "N m/rad"), 0.01),
+            _adjustable(self.wind_speed, 0.1),
+            _adjustable(self.release_angle, 0.01),
+            _adjustable(similarity.own(self.duration, "s"), 1.0),
+            self.separation,
         )
-        for angle in (share * data.swing for share in _ANGLES):
-            apart = separation(first, second, run, angle)
-            if apart is not None:
-                design = {"spring_stiffness": spring, "wind_speed": speed, "release_angle": angle}
-                found.append(design | {"duration": duration, "separation": apart})
-    return max(found, key=lambda one: one["separation"], default=None)
+
+    def distinguishes(self, chosen: AnswerSettings) -> bool:
+        """Whether the run distinguishes its answers."""
+        return self.separation >= chosen.separated_by
+
+    def too_close(self) -> str:
+        """The statement that no run distinguishes two answers."""
+        return (
+            "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
+            f"they differ by {self.separation:.1f} standard deviations of the noise."
+        )
+
+    def words(self, *, robot: bool = False) -> str:
+        """The run to make, in words.
+
+        Args:
+            robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
+        """
+        wind = "wind off" if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s"
+        rig = "" if robot else f"spring of {self.spring_stiffness:g} N m/rad, {wind}, "
+        angle = reading_shown(self.release_angle, 2)
+        return (
+            f"{rig}release at {angle}{' from the rest' if robot else ''}, "
+            f"duration {self.duration:g} s (the answers differ by {self.separation:.0f} standard deviations)"
+        )
+
+
+OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
+
+
+def _adjustable(value: float, step: float) -> float:
+    """A whole number of steps, or two digits where it is only a few steps."""
+    few = abs(value) < 10.0 * step
+    return float(f"{value:.2g}") if few else round(round(value / step) * step, 6)
 
 
 def _speeds(data: Data) -> list[float]:
@@ -167,36 +227,3 @@ def _pointers(count: int, phases: int) -> Array:
     grid = np.array(combinations).reshape(len(combinations), count)
     pointers: Array = np.stack([np.cos(grid), np.sin(grid)], axis=2).reshape(len(grid), 2 * count)
     return pointers
-
-
-def distinguishes(run: Mapping[str, Any], settings: Settings) -> bool:
-    """Whether a planned run distinguishes its answers."""
-    return bool(run["separation"] >= settings.answer.separated_by)
-
-
-OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
-
-
-def too_close(run: Mapping[str, float]) -> str:
-    """The statement that no run distinguishes two answers."""
-    return (
-        "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
-        f"they differ by {run['separation']:.1f} standard deviations of the noise."
-    )
-
-
-def run_words(run: Mapping[str, float], *, robot: bool = False) -> str:
-    """A run to make, in words.
-
-    Args:
-        run: spring stiffness (N m/rad), wind speed (m/s), release angle from the rest (rad), duration (s) and
-            separation in standard deviations of the noise.
-        robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
-    """
-    wind = "wind off" if run["wind_speed"] == 0.0 else f"wind at {run['wind_speed']:g} m/s"
-    rig = "" if robot else f"spring of {run['spring_stiffness']:g} N m/rad, {wind}, "
-    angle = reading_shown(run["release_angle"], 2)
-    return (
-        f"{rig}release at {angle}{' from the rest' if robot else ''}, "
-        f"duration {run['duration']:g} s (the answers differ by {run['separation']:.0f} standard deviations)"
-    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.repeatability import RunRepeatability
@@ -67,15 +66,6 @@ def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dic
         identified, unit = products.get(name, (name, value.unit))
         sized[identified] = replace(value, unit=unit)
     return sized
-
-
-_NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
-_STEPS = {
-    "spring_stiffness": 0.01,
-    "wind_speed": 0.1,
-    "release_angle": 0.01,
-    "duration": 1.0,
-}  # N m/rad, m/s, rad, s
 
 
 def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dict[str, Quantity]:
@@ -157,13 +147,3 @@ def own_estimate(estimate: Quantity, similarity: Similarity) -> Quantity:
         std=None if std is None else own(std),
         interval=None if ends is None else (own(ends[0]), own(ends[1])),
     )
-
-
-def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
-    """A proposed run (`separating_run`) in the measured campaign's units, rounded to adjustable values."""
-    own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
-    for name, step in _STEPS.items():
-        if name in own:  # a whole number of steps, or two digits where it is only a few steps
-            few = abs(own[name]) < 10.0 * step
-            own[name] = float(f"{own[name]:.2g}") if few else round(round(own[name] / step) * step, 6)
-    return own

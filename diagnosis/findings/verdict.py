@@ -12,7 +12,7 @@ from diagnosis.findings.disturbed_runs import disturbed_step, disturbed_words
 from diagnosis.findings.input_hold import hold_step, hold_words
 from diagnosis.findings.judgements import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
-from diagnosis.findings.next_run import OTHER_INPUT, distinguishes, run_words, too_close
+from diagnosis.findings.next_run import OTHER_INPUT, NextRun
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_step, model_words
 from diagnosis.findings.remainder import formula_step
@@ -307,10 +307,10 @@ def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-def run_to_make(answer: Findings) -> Mapping[str, Any] | None:
+def run_to_make(answer: Findings) -> NextRun | None:
     """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
     run = answer.next_run
-    return run if run is not None and distinguishes(run, answer.settings) else None
+    return run if run is not None and run.distinguishes(answer.settings.answer) else None
 
 
 def unplannable(answer: Findings) -> str:
@@ -333,14 +333,14 @@ def rival_lines(answer: Findings) -> list[str]:
     if rivals:
         lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
     if run is not None and run_to_make(answer) is None:
-        lines.append(too_close(run))
+        lines.append(run.too_close())
     elif run is not None:
         which = (
             "A run that would distinguish them"
             if decided
             else "A run that would distinguish the likely answers"
         )
-        lines.append(f"{which}: {_run_words(answer, run)}.")
+        lines.append(f"{which}: {run.words(robot=answer.found.robot)}.")
     elif rivals and answer.found.driven:
         lines.append(f"To distinguish them, {OTHER_INPUT}.")
     elif rivals:
@@ -348,11 +348,6 @@ def rival_lines(answer: Findings) -> list[str]:
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
         )
     return lines
-
-
-def _run_words(answer: Findings, run: Mapping[str, float]) -> str:
-    """As `run_words`, for the rig of a document."""
-    return run_words(run, robot=bool(answer.found.robot))
 
 
 def _remedies(remarks: Sequence[Remark]) -> list[str]:
@@ -379,7 +374,7 @@ def next_steps(answer: Findings) -> list[str]:
     if causes != UNKNOWN and answer.decision.decided:
         steps += choice_steps(answer.found.choices)
     if (run := run_to_make(answer)) is not None and answer.ambiguous_with:
-        words = f"Make the run that distinguishes the answers: {_run_words(answer, run)}."
+        words = f"Make the run that distinguishes the answers: {run.words(robot=answer.found.robot)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
     if step := model_step(answer.model, answer):
         steps.append(f"{step}.")

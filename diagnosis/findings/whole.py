@@ -21,6 +21,7 @@ from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import OtherHold
 from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Nearly
+from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
@@ -126,7 +127,7 @@ class Findings:
     where: Where
     candidates: tuple[Candidate, ...]
     ambiguous_with: tuple[str, ...]
-    next_run: Mapping[str, Any] | None
+    next_run: NextRun | None
     coefficients: Coefficients
     confirmation: Confirmation
     noise: NoiseSummary

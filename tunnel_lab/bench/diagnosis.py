@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import tomli_w
 from nicegui import ui
 
-from diagnosis.findings.next_run import distinguishes
+from diagnosis.findings.next_run import NextRun
 from diagnosis.result import Diagnosis
 from identification.show.blocks import Paragraph, typeset
 from identification.show.numbers import plain
@@ -386,8 +386,6 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.findings.next_run import too_close
-
         self._place.clear()
         with self._fault.around():
             first, second = sorted(self._first.value), sorted(self._second.value)
@@ -406,29 +404,33 @@ class _Rivals:
             if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                if not distinguishes(run, self._settings):
-                    ui.label(too_close(run))
+                if not run.distinguishes(self._settings.answer):
+                    ui.label(run.too_close())
                 else:
                     show_run(run)
 
 
-def show_run(run: Mapping[str, float]) -> None:
+def show_run(run: NextRun) -> None:
     """A run to make: its conditions (SI units), duration and separation."""
-    wind = "off" if run["wind_speed"] == 0.0 else f"{run['wind_speed']:g} m/s"
+    wind = "off" if run.wind_speed == 0.0 else f"{run.wind_speed:g} m/s"
     show_facts(
         [
-            (f"{run['spring_stiffness']:.4g} N m/rad", "spring"),
+            (f"{run.spring_stiffness:.4g} N m/rad", "spring"),
             (wind, "wind"),
-            (f"{run['release_angle']:.2g} rad ({degrees(run['release_angle']):.0f}°)", "release"),
-            (f"{run['duration']:.3g} s", "length of the record"),
-            (f"{run['separation']:.0f} standard deviations", "expected difference, in the noise's"),
+            (f"{run.release_angle:.2g} rad ({degrees(run.release_angle):.0f}°)", "release"),
+            (f"{run.duration:.3g} s", "length of the record"),
+            (f"{run.separation:.0f} standard deviations", "expected difference, in the noise's"),
         ]
     )
 
     def download() -> None:
         """The table to add to ``campaign.toml`` once the record exists."""
-        stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
-        head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
+        stated = {
+            "wind_speed": run.wind_speed,
+            "spring_stiffness": run.spring_stiffness,
+            "release_angle": run.release_angle,
+        }
+        head = f"# Record {run.duration:g} s from the release; state air_density where the wind is on.\n"
         table = head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
         ui.download(table.encode(), "next-run.toml")
 

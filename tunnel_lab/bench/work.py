@@ -27,6 +27,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import ByHand, Closure
+    from diagnosis.findings.next_run import NextRun
 
 
 _FIRST = re.compile(r"\$ (?P<command>.*) \(process (?P<process>\d+), started (?P<started>\S+)\)")
@@ -196,10 +197,10 @@ async def closure(runs: Runs, effects: Sequence[str], *, converged: bool) -> Clo
     return found
 
 
-async def next_run(runs: Runs, first: Sequence[str], second: Sequence[str]) -> dict[str, Any] | None:
+async def next_run(runs: Runs, first: Sequence[str], second: Sequence[str]) -> NextRun | None:
     """The run that would distinguish two sets of effects; None in normalised form; errors as of `closure`."""
     answers = tuple(sorted(first)), tuple(sorted(second))
-    found: dict[str, Any] | None = await _in_fitter(_answered, runs, "next_run", *answers)
+    found: NextRun | None = await _in_fitter(_answered, runs, "next_run", *answers)
     return found
 
 

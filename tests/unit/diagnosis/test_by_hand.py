@@ -49,8 +49,8 @@ def test_switching_on_and_off_in_any_order_gives_the_same(hand: ByHand) -> None:
 def test_the_run_that_would_distinguish_two_causes(hand: ByHand) -> None:
     found = hand.next_run(["coulomb_friction"], ["quadratic_damping"])
     assert found is not None
-    assert found["separation"] > 10.0
-    assert found["duration"] > 1.0
+    assert found.separation > 10.0
+    assert found.duration > 1.0
 
 
 def test_a_cause_that_the_runs_cannot_show_is_refused() -> None:

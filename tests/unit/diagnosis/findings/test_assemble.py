@@ -177,7 +177,7 @@ def test_rivals_are_named_with_the_run_that_would_distinguish_them(found):
     document = answered(torn)
     assert list(document.ambiguous_with) == ["coulomb_friction"]
     assert document.next_run is not None
-    assert document.next_run["separation"] > 0.0
+    assert document.next_run.separation > 0.0
     sure = answered(found)
     assert (sure.ambiguous_with, sure.next_run) == ((), None)
     # not knowing which is paid for in the interval

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.next_run import planned_run, separating_run, separation
+from diagnosis.findings.next_run import NextRun, planned_run, separation
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
@@ -44,7 +44,7 @@ def apart(first, second, run, angle):
 
 
 def test_the_run_separates_as_predicted_and_better_than_a_plain_one(rivals):
-    found = separating_run(*rivals)
+    found = NextRun.between(*rivals)
     assert found is not None
     template = rivals[0].problem.data.runs[0]
 
@@ -53,16 +53,16 @@ def test_the_run_separates_as_predicted_and_better_than_a_plain_one(rivals):
         return replace(template, reading=np.zeros(count), spring_stiffness=spring, wind_speed=speed,
                        air_density=1.2 if speed else 0.0, duration=duration)  # fmt: skip
 
-    best = design(found["spring_stiffness"], found["wind_speed"], found["duration"])
-    assert apart(*rivals, best, found["release_angle"]) == pytest.approx(found["separation"], rel=0.01)
-    assert apart(*rivals, design(16.12, 15.0, 10.0), 0.35) < found["separation"]
-    assert found["separation"] > 10.0
+    best = design(found.spring_stiffness, found.wind_speed, found.duration)
+    assert apart(*rivals, best, found.release_angle) == pytest.approx(found.separation, rel=0.01)
+    assert apart(*rivals, design(16.12, 15.0, 10.0), 0.35) < found.separation
+    assert found.separation > 10.0
 
 
 def test_a_model_is_not_distinguished_from_itself(rivals):
-    found = separating_run(rivals[0], rivals[0])
+    found = NextRun.between(rivals[0], rivals[0])
     assert found is not None
-    assert found["separation"] == pytest.approx(0.0, abs=1e-6)
+    assert found.separation == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -133,21 +133,21 @@ def test_runs_without_stiffness_propose_none():
     data = campaign()
     runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])
     base = nominal(replace(data, runs=runs))
-    assert separating_run(base, base) is None
+    assert NextRun.between(base, base) is None
 
 
 def test_the_run_is_one_that_the_rig_can_make(rivals):
     """Its only spring, its wind speeds, and angles within its swing."""
     data = rivals[0].problem.data
-    found = separating_run(*rivals)
-    assert found["spring_stiffness"] == 16.12
-    assert found["wind_speed"] in (0.0, 15.0, 25.0)
-    assert 0.0 < found["release_angle"] <= data.swing
+    found = NextRun.between(*rivals)
+    assert found.spring_stiffness == 16.12
+    assert found.wind_speed in (0.0, 15.0, 25.0)
+    assert 0.0 < found.release_angle <= data.swing
 
 
 def test_a_free_decay_is_not_proposed_where_it_does_not_show_the_question(rivals):
     data = driven("moment")
     base = nominal_study(data, ()).nominal
-    assert separating_run(base, base) is None
+    assert NextRun.between(base, base) is None
     late = replace(rivals[1].problem, effects=(effect_class("input_delay"),))
-    assert separating_run(rivals[0], replace(rivals[1], problem=late)) is None
+    assert NextRun.between(rivals[0], replace(rivals[1], problem=late)) is None

@@ -19,7 +19,7 @@ from diagnosis.findings import sections
 from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
-from diagnosis.findings.next_run import run_words
+from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.verdict import headline, next_steps, size_words, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
@@ -206,7 +206,7 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         assert isinstance(heading, Heading)
         texts = [heading.beside, *next_steps(findings_of(one | undecided))]
         texts += [label for label, _ in tables.place_rows(findings_of(one))]
-        assert ("wind" in " ".join(texts).replace(run_words(given["next_run"]), "")) == said
+        assert ("wind" in " ".join(texts).replace(NextRun(**given["next_run"]).words(), "")) == said
         assert ("Acts" in texts) == said
 
 

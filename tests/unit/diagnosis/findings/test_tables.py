@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
-from diagnosis.findings.next_run import run_words
+from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.sections import printed
 from diagnosis.findings.verdict import rival_lines
 from identification.estimate import Estimate, RunEstimate, WindowEstimate
@@ -184,8 +184,8 @@ def test_the_run_to_make(given: Document) -> None:
     run = given["next_run"]
     keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
     own = run | {"release_angle": np.degrees(run["release_angle"])}
-    assert_shows(run_words(run), [own[key] for key in keys])
-    calm = run_words(run | {"wind_speed": 0.0})
+    assert_shows(NextRun(**run).words(), [own[key] for key in keys])
+    calm = NextRun(**run | {"wind_speed": 0.0}).words()
     assert_shows(calm, [own[key] for key in keys if key != "wind_speed"])
     assert len(rival_lines(findings_of(given))) == 2
     assert len(rival_lines(findings_of(given | {"next_run": None}))) == 2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.findings.units import own_next_run
+from diagnosis.findings.next_run import NextRun
 from diagnosis.model.similar import similar_campaign
 from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,
@@ -279,14 +279,7 @@ def test_the_diagnosis_of_a_stretched_campaign_is_stretched(time, moment):
 
 
 def test_a_run_to_make_can_be_set_by_an_operator():
-    run = {
-        "spring_stiffness": 81.5033,
-        "wind_speed": 20.0,
-        "release_angle": 0.35,
-        "duration": 33.4567,
-        "separation": 9.3,
-    }
-    shown = own_next_run(run, Similarity())
-    assert shown == run | {"spring_stiffness": 81.5, "duration": 33.0}
-    small = own_next_run(run | {"spring_stiffness": 0.012345, "duration": 0.34567}, Similarity())
-    assert (small["spring_stiffness"], small["duration"]) == (0.012, 0.35)
+    run = NextRun(81.5033, 20.0, 0.35, 33.4567, 9.3)
+    assert run.own(Similarity()) == dataclasses.replace(run, spring_stiffness=81.5, duration=33.0)
+    small = dataclasses.replace(run, spring_stiffness=0.012345, duration=0.34567).own(Similarity())
+    assert (small.spring_stiffness, small.duration) == (0.012, 0.35)

@@ -14,6 +14,7 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, R
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import decision
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
+from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
@@ -76,9 +77,7 @@ def document(data):
             Candidate("none", 0.001, base.excess, 0.0),
         ),
         ambiguous_with=("coulomb_friction",),
-        next_run={
-            "spring_stiffness": 80.0, "wind_speed": 0.0, "release_angle": 0.35, "duration": 30.0, "separation": 9.0,
-        },
+        next_run=NextRun(80.0, 0.0, 0.35, 30.0, 9.0),
         coefficients=Coefficients(
             {"cn_r": Quantity(-0.31, 0.02, "1/rad")}, {"cn_r": after}, note="A note."
         ),
