@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.judged import Judged
+from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.terms import answer_name, scattering
-from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
 from identification.show.drawing import ACCENT, NARROW, QUIET
 from identification.show.numbers import (
@@ -29,18 +31,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def ranked(answer: Findings) -> list[Candidate]:
+def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     """The answers of a document, the most probable first.
 
     The document starts with its answer. If undecided, that is the most probable set of effects, and an unknown
     cause may be more probable.
     """
-    return sorted(answer.candidates, key=lambda one: -one.probability)
+    return sorted(candidates, key=lambda one: -one.probability)
 
 
-def candidates_table(answer: Findings) -> TextTable:
+def candidates_table(
+    candidates: Sequence[Candidate], repeated: RunRepeatability, judged: Judged
+) -> TextTable:
     """The answers considered and their shares of the gap, most probable first; a last row counts the others."""
-    rows, given, chosen = [], ranked(answer), answer.settings.words
+    rows, given, chosen = [], ranked(candidates), judged.settings.words
     probable = [c for c in given[: chosen.answers_listed] if c.probability >= chosen.answer_listed]
     shown = probable or given[:1]
     for candidate in shown:
@@ -48,7 +52,7 @@ def candidates_table(answer: Findings) -> TextTable:
         closed = share(candidate.closed) if fitted else "–"
         name = answer_name(candidate.effect).replace(" + ", " +\n")
         parameters = "\n".join(
-            f"{plain(full).replace('.', ': ')} = {_estimate(answer, full, candidate.effect, given)}"
+            f"{plain(full).replace('.', ': ')} = {_estimate(repeated, full, candidate.effect, given)}"
             for full, given in candidate.parameters.items()
         )
         excess = held_out_excess(candidate.excess_after)
@@ -59,7 +63,7 @@ def candidates_table(answer: Findings) -> TextTable:
     detail = ("residual [× noise variance]", "parameters")
     heads = ("answer", "probability", "explained in the fit", *detail)
     return TextTable(
-        f"Answers for {answer.campaign}",
+        f"Answers for {judged.campaign}",
         heads,
         tuple(rows),
         heads[1:4],
@@ -68,34 +72,35 @@ def candidates_table(answer: Findings) -> TextTable:
     )
 
 
-def _estimate(answer: Findings, full: str, candidate: str, given: Quantity) -> str:
+def _estimate(repeated: RunRepeatability, full: str, candidate: str, given: Quantity) -> str:
     """A parameter of an answer, by its full name."""
     mark = unit_mark(beside(given.unit, ""))
-    return answer.repeated.spread_estimate(full.rpartition(".")[0] or candidate, given) or estimated(
-        given, mark
-    )
+    return repeated.spread_estimate(full.rpartition(".")[0] or candidate, given) or estimated(given, mark)
 
 
-def parameters_table(answer: Findings) -> TextTable:
+def parameters_table(first: Candidate, repeated: RunRepeatability, judged: Judged) -> TextTable:
     """The parameters of the answer; a table without rows where it has none."""
-    first = answer.candidates[0]
     rows, effect = [], ""
     for full, given in first.parameters.items():
         owner, _, name = full.rpartition(".")
         owner = owner or first.effect
-        size = _estimate(answer, full, first.effect, given)
+        size = _estimate(repeated, full, first.effect, given)
         rows.append((owner if owner != effect else "", name, size))
         effect = owner
-    whose = "Parameters" if answer.decision.decided else f"Parameters of the {answer.set_out}"
+    whose = "Parameters" if judged.decided else f"Parameters of the {judged.set_out}"
     units = explained({given.unit for given in first.parameters.values()})
     heads = ("effect", "parameter", "estimate")
     return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
 
 
-def inclusion_line(answer: Findings) -> str:
-    """The effects that may be among the causes, most probable first; empty where none is probable enough."""
-    least = answer.settings.words.effect_listed
-    likely = dict(sorted(answer.inclusion.items(), key=lambda item: -item[1]))
+def inclusion_line(inclusion: Mapping[str, float], least: float) -> str:
+    """The effects that may be among the causes, most probable first; empty where none is probable enough.
+
+    Args:
+        inclusion: by effect, the probability that it is among the causes.
+        least: probability of an effect that is listed.
+    """
+    likely = dict(sorted(inclusion.items(), key=lambda item: -item[1]))
     names = [name for name, value in likely.items() if value >= least]
     last = scattering(names)  # scatter is common to every answer
     ordered = [*(name for name in names if name not in last), *last]
@@ -111,17 +116,17 @@ _LABEL = 24  # characters in a line of a label
 
 
 @styled
-def candidates_figure(answer: Findings) -> Figure | None:
+def candidates_figure(candidates: Sequence[Candidate], judged: Judged) -> Figure | None:
     """The answers that are not improbable; None for fewer than two, where words suffice."""
-    least = answer.settings.words.answer_drawn
-    shown = [c for c in ranked(answer)[:SHOWN] if c.probability >= least]
+    least = judged.settings.words.answer_drawn
+    shown = [c for c in ranked(candidates)[:SHOWN] if c.probability >= least]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(answer_name(candidate.effect)), _LABEL) for candidate in shown]
     fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
     values = [candidate.probability for candidate in shown]
-    colours = [ACCENT if candidate is answer.candidates[0] else QUIET for candidate in shown]
+    colours = [ACCENT if candidate is candidates[0] else QUIET for candidate in shown]
     axes.barh(range(len(shown)), values, color=colours, height=0.6)
     for index, value in enumerate(values):
         axes.text(value + 0.01, index, probability(value), va="center")

@@ -21,6 +21,7 @@ from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
+from identification.show.numbers import significant, unit_shown
 from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
@@ -48,6 +49,10 @@ class Candidate:
     excess_after: float
     closed: float
     parameters: Mapping[str, Quantity] = field(default_factory=dict)
+
+
+_VISIBLE = 0.005  # least change of a damping ratio that is stated
+_VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,35 @@ class CauseSize:
         """The fields, with the units of angles in their names."""
         found = dict(vars(self))
         return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
+
+    def words(self, unit: str) -> str:
+        """The effect in a sentence; damping and frequency where they change visibly.
+
+        Args:
+            unit: of the readings.
+
+        Returns:
+            Empty where the simulated run does not show it.
+        """
+        (mark, factor), angle = unit_shown(unit), unit_shown("rad")[1]
+        mark = mark if mark == "°" else f" {mark}"
+        changes = []
+        zeta, without = self.damping_ratio, self.damping_ratio_without
+        if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
+            changes.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
+        if abs(self.frequency_change) > _VISIBLE_FREQUENCY:
+            change = 100.0 * self.frequency_change
+            changes.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
+        reading = factor * self.reading_change
+        if abs(self.zero_change) > 0.5 * self.reading_change:
+            changes.append(f"the middle moves by {significant(factor * self.zero_change, 2)}{mark}")
+        if not changes and not reading:
+            return ""
+        changes.append(f"the reading changes by {significant(reading, 2)}{mark} root mean square")
+        held = angle * self.stands
+        stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
+        amplitude = significant(angle * self.amplitude, 2)
+        return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
 
     @from_json_fields
     @staticmethod

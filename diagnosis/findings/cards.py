@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from diagnosis.findings.causes import said_size
 from diagnosis.findings.closure import WITHIN_THE_NOISE
-from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown
+from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown, unit_of
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
-from diagnosis.findings.verdict import size_words
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from identification.show.blocks import Card, Heading, Paragraph
@@ -90,7 +88,7 @@ def cause_cards(answer: Findings) -> list[Card]:
         return []
     first = answer.candidates[0]
     names = first.effect.split(" + ")
-    does = {size.effect: size_words(answer, size) for size in answer.sizes}
+    does = {size.effect: size.words(unit_of(answer)) for size in answer.sizes}
     steps = answer.waterfall.steps
     gaps = [misfit_shown(answer, step.excess) for step in steps]
     if steps and _calm(answer):
@@ -104,7 +102,7 @@ def cause_cards(answer: Findings) -> list[Card]:
         _cause(
             plain(name),
             acts_on(answer, name),
-            said_size(answer, first, name),
+            answer.named_causes.said_size(first, name),
             does.get(name, ""),
             closes.get(name, ""),
         )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.spring_choices import choices_of_spring, count_of_springs, one_of_springs
 from diagnosis.findings.terms import BETWEEN_RUNS, scattering, without_scatter
-from diagnosis.findings.whole import Findings
+from diagnosis.search.rivals.two_springs import SpringError
 from identification.show.numbers import (
     for_people,
     listed,
@@ -17,95 +20,127 @@ from identification.show.quantity import Quantity
 from tunnel_sim.effects import known_effects
 
 
-def known_and_open(answer: Findings, *, sized: bool = True) -> str:
-    """The causes common to the likely answers, each with its probability, and the alternatives beside them.
+@dataclass(frozen=True)
+class NamedCauses:
+    """The causes of an answer and their rivals.
 
     Args:
-        sized: whether springs of which one is off are given with their errors; False where another sentence does
-            so.
-
-    Returns:
-        Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
-        stated (59 %) or gravity stiffness (40 %)``.
+        causes: effect names, sorted.
+        ambiguous_with: effects that the runs cannot distinguish from the causes.
+        candidates: the answers considered, the answer first.
+        inclusion: by effect, the probability that it is among the causes.
+        choices: springs of which one may be off.
+        robot: whether the body is the joint of a machine.
+        rivals_from: least probability of a rival that is named.
     """
-    certain, alternatives = _parted(answer, sized)
-    scatter = [BETWEEN_RUNS] if scattering(answer.causes) else []
-    known = (
-        listed([*(f"{plain(name)} ({_of(answer, name)})" for name in certain), *scatter]) if certain else ""
-    )
-    if known and len(alternatives) == 1:
-        return known
-    several = [f"{said} ({probability(value)})" for said, value in alternatives]
-    if len(several) == 2:
-        one_of = f"either {several[0]} or {several[1]}"
-    else:
-        one_of = f"one of these: {', '.join(several[:-1])} or {several[-1]}"
-    return f"{known}, and {one_of}" if known else one_of
 
+    causes: tuple[str, ...]
+    ambiguous_with: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
+    inclusion: Mapping[str, float]
+    choices: tuple[SpringError, ...]
+    robot: bool
+    rivals_from: float
 
-def _parted(answer: Findings, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
-    """Effects common to all likely answers, and the further effects of each answer with its probability.
+    def known_and_open(self, *, sized: bool = True) -> str:
+        """The causes common to the likely answers, each with its probability, and the alternatives beside them.
 
-    Causes detected in the records before the fits are part of every answer.
-    """
-    least = answer.settings.answer.rivals_from
-    first, *others = answer.candidates
-    causes = without_scatter(answer.causes)
-    named = {*answer.causes, *answer.ambiguous_with}
-    read_off = [name for name in causes if name not in first.effect.split(" + ")]
-    likely = [one for one in others if one.probability >= least and _effects(one) <= named]
-    sets = [(first, causes)]
-    sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
-    certain = [name for name in causes if all(name in names for _, names in sets)]
-    alternatives = []
-    for one, names in sets:
-        own = [_called(answer, one, name, sized) for name in names if name not in certain]
-        alternatives.append((listed(own) if own else "nothing else", one.probability))
-    return certain, alternatives
+        Args:
+            sized: whether springs of which one is off are given with their errors; False where another sentence
+                does so.
+
+        Returns:
+            Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
+            stated (59 %) or gravity stiffness (40 %)``.
+        """
+        certain, alternatives = self._parted(sized)
+        scatter = [BETWEEN_RUNS] if scattering(self.causes) else []
+        known = (
+            listed([*(f"{plain(name)} ({self._of(name)})" for name in certain), *scatter]) if certain else ""
+        )
+        if known and len(alternatives) == 1:
+            return known
+        several = [f"{said} ({probability(value)})" for said, value in alternatives]
+        if len(several) == 2:
+            one_of = f"either {several[0]} or {several[1]}"
+        else:
+            one_of = f"one of these: {', '.join(several[:-1])} or {several[-1]}"
+        return f"{known}, and {one_of}" if known else one_of
+
+    def said_size(self, candidate: Candidate, name: str) -> str:
+        """The size of an effect of an answer in words; empty for an effect without a phrase.
+
+        Args:
+            candidate: the answer.
+            name: of the effect.
+        """
+        kind = {kind.name: kind for kind in known_effects()}.get(name)
+        given = _parameters(candidate, name)
+        if kind is None or not given:
+            return ""
+        if kind.chosen_spring() and self.choices:
+            return f"{one_of_springs(self.choices)}, {choices_of_spring(self.choices)}"
+        values = {full: one.value for full, one in given.items()}
+        said = {info.unit: given[info.name].unit for info in kind.parameters() if info.name in given}
+
+        def text(value: float, std: float | None, unit: str) -> str:
+            return for_people(
+                value, std, said.get(unit, unit)
+            )  # moments are per unit inertia where no inertia is stated
+
+        return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
+
+    def advice(self, name: str) -> str:
+        """What to do about a cause, with the values that it names, without a full stop."""
+        robot = self.robot
+        said = {kind.name: (robot and kind.advice_for_joint) or kind.advice for kind in known_effects()}.get(
+            name
+        )
+        if not said:
+            return f"Repair or model the cause of {plain(name)}"
+        values = _parameters(self.candidates[0], name)
+        shown = {full: f"{one.value:.4g} {unit_mark(one.unit)}" for full, one in values.items()}
+        for full, text in shown.items():
+            said = said.replace(f"{{{full}}}", text)
+        return said
+
+    def _parted(self, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
+        """Effects common to all likely answers, and the further effects of each answer with its probability.
+
+        Causes detected in the records before the fits are part of every self.
+        """
+        least = self.rivals_from
+        first, *others = self.candidates
+        causes = without_scatter(self.causes)
+        named = {*self.causes, *self.ambiguous_with}
+        read_off = [name for name in causes if name not in first.effect.split(" + ")]
+        likely = [one for one in others if one.probability >= least and _effects(one) <= named]
+        sets = [(first, causes)]
+        sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
+        certain = [name for name in causes if all(name in names for _, names in sets)]
+        alternatives = []
+        for one, names in sets:
+            own = [self._called(one, name, sized) for name in names if name not in certain]
+            alternatives.append((listed(own) if own else "nothing else", one.probability))
+        return certain, alternatives
+
+    def _called(self, candidate: Candidate, name: str, sized: bool) -> str:
+        """An effect by its name; a spring error by the spring and its relative error."""
+        kind = {kind.name: kind for kind in known_effects()}.get(name)
+        if kind is None or not kind.chosen_spring():
+            return plain(name)
+        if self.choices:
+            each = f", {choices_of_spring(self.choices)}" if sized else ""
+            return f"an error of one of the {count_of_springs(self.choices)} springs{each}"
+        return self.said_size(candidate, name).partition(" (")[0] or plain(name)
+
+    def _of(self, name: str) -> str:
+        """The probability that an effect is among the causes, in any combination."""
+        return probability(self.inclusion.get(name, self.candidates[0].probability))
 
 
 def _effects(candidate: Candidate) -> set[str]:
     return set(candidate.effect.split(" + "))
-
-
-def _called(answer: Findings, candidate: Candidate, name: str, sized: bool) -> str:
-    """An effect by its name; a spring error by the spring and its relative error, which the name does not give."""
-    kind = {kind.name: kind for kind in known_effects()}.get(name)
-    if kind is None or not kind.chosen_spring():
-        return plain(name)
-    if answer.found.choices:
-        each = f", {choices_of_spring(answer.found.choices)}" if sized else ""
-        return f"an error of one of the {count_of_springs(answer.found.choices)} springs{each}"
-    return said_size(answer, candidate, name).partition(" (")[0] or plain(name)
-
-
-def _of(answer: Findings, name: str) -> str:
-    """The probability that an effect is among the causes, in any combination."""
-    return probability(answer.inclusion.get(name, answer.candidates[0].probability))
-
-
-def said_size(answer: Findings, candidate: Candidate, name: str) -> str:
-    """The size of an effect of an answer in words; empty for an effect without a phrase.
-
-    Args:
-        candidate: of the answer.
-        name: of the effect.
-    """
-    kind = {kind.name: kind for kind in known_effects()}.get(name)
-    given = _parameters(candidate, name)
-    if kind is None or not given:
-        return ""
-    if kind.chosen_spring() and answer.found.choices:
-        return f"{one_of_springs(answer.found.choices)}, {choices_of_spring(answer.found.choices)}"
-    values = {full: one.value for full, one in given.items()}
-    said = {info.unit: given[info.name].unit for info in kind.parameters() if info.name in given}
-
-    def text(value: float, std: float | None, unit: str) -> str:
-        return for_people(
-            value, std, said.get(unit, unit)
-        )  # moments are per unit inertia where no inertia is stated
-
-    return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
 
 
 def _parameters(candidate: Candidate, name: str) -> dict[str, Quantity]:
@@ -116,16 +151,3 @@ def _parameters(candidate: Candidate, name: str) -> dict[str, Quantity]:
         for full, given in candidate.parameters.items()
         if full.partition(".")[0] == name or (alone and "." not in full)
     }
-
-
-def advice(answer: Findings, name: str) -> str:
-    """What to do about a cause, with the values that it names, without a full stop."""
-    robot = bool(answer.found.robot)
-    said = {kind.name: (robot and kind.advice_for_joint) or kind.advice for kind in known_effects()}.get(name)
-    if not said:
-        return f"Repair or model the cause of {plain(name)}"
-    values = _parameters(answer.candidates[0], name)
-    shown = {full: f"{one.value:.4g} {unit_mark(one.unit)}" for full, one in values.items()}
-    for full, text in shown.items():
-        said = said.replace(f"{{{full}}}", text)
-    return said

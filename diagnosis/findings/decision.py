@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from diagnosis.settings import AnswerSettings
+from identification.show.numbers import share
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
@@ -23,6 +24,27 @@ class Doubt:
 
     kind: str
     share: float | None
+
+    @property
+    def words(self) -> str:
+        """The reason, as a predicate of the answer."""
+        return _DOUBTS[self.kind](self.share or 0.0)
+
+
+def _little(explained: float) -> str:
+    return f"explains only {share(explained)}" if explained > 0.0 else "explains nothing"
+
+
+_DOUBTS: Mapping[str, Callable[[float], str]] = {
+    "held out": lambda found: f"{_little(found)} of the gap on held-out readings",
+    "ahead": lambda found: (
+        f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
+    ),
+    "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
+    "left": lambda found: f"leaves a residual of {share(found)} of the swing",
+    "elsewhere": lambda _: "the residuals point elsewhere",
+}
+"""Reasons not to decide on the answer that fits best, by kind; each takes the share found."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +69,9 @@ class Predictions:
         """The reasons not to decide on the answer, the most basic first."""
         shares = {"held out": self.held_out, "ahead": self.ahead, "patched": self.patched}
         found = [
-            Doubt(kind, share)
-            for kind, share in shares.items()
-            if share is not None and share < chosen.predicted_from
+            Doubt(kind, explained)
+            for kind, explained in shares.items()
+            if explained is not None and explained < chosen.predicted_from
         ]
         if self.left is not None and self.left > chosen.left_of_swing:
             found.append(Doubt("left", self.left))

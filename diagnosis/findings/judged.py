@@ -39,6 +39,10 @@ class Judged(Protocol):
     """The judgement of a diagnosis in plain values: all that the words of a finding know beside its own fields."""
 
     @property
+    def campaign(self) -> str:
+        """The name of the campaign."""
+
+    @property
     def causes(self) -> tuple[str, ...]:
         """Effect names, sorted; ``unknown``, or none."""
 

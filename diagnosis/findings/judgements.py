@@ -9,12 +9,14 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.findings.closure import Confirmation, RunGap
+from diagnosis.findings.terms import MISFITS
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
+from identification.show.numbers import plain, probability, share
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -39,6 +41,22 @@ class Nearly:
     rival: tuple[str, ...] = ()
     rival_probability: float = 0.0
     misfit: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The effects that explain most of a gap without being named, and the reason."""
+        said = f"{plain(*self.effects).capitalize()} would explain {share(self.closes)} of the gap"
+        if self.noisy:
+            return f"{said}, but irregular noise may explain a gap this small."
+        said = f"{said} (probability {probability(self.probability)})"
+        if self.rival:
+            return (
+                f"{said}, and {plain(*self.rival)} explains as much ({probability(self.rival_probability)})."
+            )
+        if self.misfit:
+            left = " and ".join(MISFITS[name] for name in self.misfit)
+            return f"{said}, but leaves a significant misfit of {left}."
+        return f"{said}, which is too little to name it."
 
 
 Estimates = Mapping[str, Quantity]

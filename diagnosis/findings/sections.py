@@ -113,8 +113,8 @@ def _which(answer: Findings) -> Section:
         "Which effect causes it",
         (
             captioned("which"),
-            candidates_table(answer),
-            Paragraph(inclusion_line(answer)),
+            candidates_table(answer.candidates, answer.repeated, answer),
+            Paragraph(inclusion_line(answer.inclusion, answer.settings.words.effect_listed)),
             *(Paragraph(line) for line in rival_lines(answer)),
             *effect_cards(answer),
             *pictured(answer, "friction"),
@@ -127,7 +127,11 @@ def _causes(answer: Findings) -> Section:
     title = "The cause" if len(cards) == 1 else "The causes"
     if not answer.decision.decided:
         title += f" of the {answer.set_out}"
-    return Section("found", title, (*cards, parameters_table(answer)) if cards else ())
+    return Section(
+        "found",
+        title,
+        (*cards, parameters_table(answer.candidates[0], answer.repeated, answer)) if cards else (),
+    )
 
 
 def _repeats(answer: Findings) -> Section:
@@ -164,7 +168,10 @@ def _closable(answer: Findings) -> Section:
 
 
 def _coefficients(answer: Findings) -> Section:
-    table, symbols = coefficients_table(answer.coefficients, answer), symbol_rows(answer)
+    given = answer.coefficients
+    fitted = (name for candidate in answer.candidates[:1] for name in candidate.parameters)
+    table = coefficients_table(given, answer)
+    symbols = symbol_rows(answer.causes, {**given.before, **given.after}, fitted)
     title = "Coefficients before and after" if "change of size" in table.columns else "Coefficients"
     nothing = () if table.rows else (Detail((Paragraph("These runs give no coefficients."),)),)
     return Section(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 
-from diagnosis.findings.whole import Findings
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import unit_mark
 from tunnel_sim.effects import known_effects
@@ -34,11 +33,15 @@ MEANINGS: Mapping[str, str] = {
 _OF_OTHERS: Mapping[str, tuple[str, ...]] = {"½ρV²Al": ("ρ", "V", "A", "l"), "½ρVAl²": ("ρ", "V", "A", "l")}
 
 
-def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
-    """Symbols of a document's coefficients and causes, and those that explain them, with meaning and unit."""
-    named = set(answer.causes)
-    kinds = [kind for kind in known_effects() if kind.name in named]
-    coefficients = {**answer.coefficients.before, **answer.coefficients.after}
+def symbol_rows(
+    causes: Collection[str], coefficients: Iterable[str], parameters: Iterable[str]
+) -> list[tuple[str, str]]:
+    """Symbols of coefficients and causes, and those that explain them, with meaning and unit.
+
+    Args:
+        parameters: fitted ones of the causes, by full name.
+    """
+    kinds = [kind for kind in known_effects() if kind.name in causes]
     texts = [COEFFICIENTS.get(name, name) for name in coefficients] + [kind.equation for kind in kinds]
     rows: dict[str, str] = {}
     while texts:
@@ -49,8 +52,7 @@ def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
             if symbol not in rows and _holds(text, symbol):
                 rows[symbol] = meaning
                 texts.append(meaning)
-    first = answer.candidates[:1]
-    own, fitted = {}, {name.rpartition(".")[2] for one in first for name in one.parameters}
+    own, fitted = {}, {name.rpartition(".")[2] for name in parameters}
     for kind in kinds:
         for info in kind.parameters():
             if info.symbol not in MEANINGS and info.name in fitted and _holds(kind.equation, info.symbol):

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from diagnosis.findings.candidates import CauseSize
-from diagnosis.findings.causes import advice, known_and_open
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.disturbed_runs import disturbed_step, disturbed_words
 from diagnosis.findings.input_hold import hold_step, hold_words
-from diagnosis.findings.judgements import Nearly
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
 from diagnosis.findings.next_run import OTHER_INPUT, NextRun
 from diagnosis.findings.other_motions import second_mode_words
@@ -21,7 +18,6 @@ from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
     CONDITIONS,
-    MISFITS,
     named_answer,
     scattering,
     without_scatter,
@@ -36,9 +32,7 @@ from identification.show.numbers import (
     probability,
     rounded_up,
     share,
-    significant,
     times_noise,
-    unit_shown,
 )
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class, known_effects, the_effect
@@ -77,7 +71,7 @@ def _answer_in_words(answer: Findings) -> tuple[str, str]:
         return "Unexplained gap", "unknown"
     names = named_answer(causes)
     if answer.ambiguous_with:
-        return known_and_open(answer), "open"
+        return answer.named_causes.known_and_open(), "open"
     if answer.rest_is_material:
         return f"{names}, in part", "open"
     return names, "found"
@@ -126,7 +120,7 @@ def _answer(answer: Findings, rest: str) -> str:
         by_first = "" if causes == UNKNOWN else f"{first} {explained}"
         return " ".join(filter(None, (sentence, undecided_words(answer), repeats, by_first)))
     if causes == UNKNOWN:
-        nearly = "" if facts.nearly is None else _nearly(facts.nearly)
+        nearly = "" if facts.nearly is None else facts.nearly.words
         sentence = (
             "No effect is named as its cause."
             if nearly
@@ -146,7 +140,7 @@ def _answer(answer: Findings, rest: str) -> str:
     they = "They" if len(proper) > 1 else "It"
     part = "part of the gap" if answer.rest_is_material else "the gap"
     if answer.ambiguous_with:
-        sentence = f"{_sentence(part)} is explained by {known_and_open(answer, sized=False)}."
+        sentence = f"{_sentence(part)} is explained by {answer.named_causes.known_and_open(sized=False)}."
     else:
         likely = probability(answer.decision.credible[0][1])
         sentence = f"{_sentence(plain(*proper))} {_explain(proper)} {part} (probability {likely})."
@@ -190,7 +184,7 @@ def undecided_words(answer: Findings) -> str:
     together = probability(sum(value for _, value in credible))
     if answer.decision.unpredictive:
         best = _among_answers(answer.decision.unpredictive).capitalize()
-        doubts = [DOUBTS[one.kind](one.share or 0.0) for one in answer.decision.doubts]
+        doubts = [one.words for one in answer.decision.doubts]
         fit = "fits" if len(without_scatter(answer.decision.unpredictive.split(" + "))) == 1 else "fit"
         said += f"{best} {fit} best, but {' and '.join(doubts)}"
         said += f": look at {_places(answer)} there first. " if in_doubt_of_place(answer) else ". "
@@ -208,22 +202,6 @@ def _places(answer: Findings) -> str:
     return _runs(runs) if place is not None and 0 < len(runs) < place.runs else "the runs"
 
 
-def _little(explained: float) -> str:
-    return f"explains only {share(explained)}" if explained > 0.0 else "explains nothing"
-
-
-DOUBTS: Mapping[str, Callable[[float], str]] = {
-    "held out": lambda found: f"{_little(found)} of the gap on held-out readings",
-    "ahead": lambda found: (
-        f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
-    ),
-    "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
-    "left": lambda found: f"leaves a residual of {share(found)} of the swing",
-    "elsewhere": lambda _: "the residuals point elsewhere",
-}
-"""Reasons not to decide on the answer that fits best, by kind; each takes the share found."""
-
-
 def _among_answers(effect: str) -> str:
     """An answer by name, without scatter between runs, which is stated for all answers together."""
     names = effect.split(" + ")
@@ -231,20 +209,6 @@ def _among_answers(effect: str) -> str:
     if effect == "unknown":
         return "an unknown cause"
     return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
-
-
-def _nearly(found: Nearly) -> str:
-    """The effects that explain most of a gap without being named, and the reason."""
-    said = f"{plain(*found.effects).capitalize()} would explain {share(found.closes)} of the gap"
-    if found.noisy:
-        return f"{said}, but irregular noise may explain a gap this small."
-    said = f"{said} (probability {probability(found.probability)})"
-    if found.rival:
-        return f"{said}, and {plain(*found.rival)} explains as much ({probability(found.rival_probability)})."
-    if found.misfit:
-        misfit = " and ".join(MISFITS[name] for name in found.misfit)
-        return f"{said}, but leaves a significant misfit of {misfit}."
-    return f"{said}, which is too little to name it."
 
 
 def _immaterial(changes: Mapping[str, float]) -> str:
@@ -274,37 +238,6 @@ RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "stated": lambda found: str(found["words"]),
 }
 """Sentences on a rival that is not an effect of the vocabulary, by kind."""
-
-
-_VISIBLE = 0.005  # least change of a damping ratio that is stated
-_VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
-
-
-def size_words(answer: Findings, size: CauseSize) -> str:
-    """A cause's effect on a swing, in a sentence; damping and frequency where they change visibly."""
-    mark, factor = unit_shown(answer.figure_data.get("unit", "rad"))
-    angle = unit_shown("rad")[1]
-    changes = []
-    zeta, without = size.damping_ratio, size.damping_ratio_without
-    if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
-        changes.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
-    if abs(size.frequency_change) > _VISIBLE_FREQUENCY:
-        change = 100.0 * size.frequency_change
-        changes.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
-    reading = factor * size.reading_change
-    if abs(size.zero_change) > 0.5 * size.reading_change:
-        changes.append(f"the middle moves by {significant(factor * size.zero_change, 2)}{_spaced(mark)}")
-    if not changes and not reading:  # the run that is simulated does not show it
-        return ""
-    changes.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
-    held = angle * size.stands
-    stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
-    amplitude = significant(angle * size.amplitude, 2)
-    return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
-
-
-def _spaced(mark: str) -> str:
-    return mark if mark == "°" else f" {mark}"
 
 
 def run_to_make(answer: Findings) -> NextRun | None:
@@ -404,7 +337,7 @@ def next_steps(answer: Findings) -> list[str]:
         to_mend = [name for name in causes if name not in of_spring or not answer.found.choices]
         steps += [
             *(f"{step}." for step in [hold_step(answer.found.hold)] if step),
-            *(f"{advice(answer, name)}." for name in to_mend),
+            *(f"{answer.named_causes.advice(name)}." for name in to_mend),
             *(f"{step}." for step in [formula_step(answer.closable)] if step),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",

@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
 from diagnosis.findings.candidates import Candidate, CauseSize
+from diagnosis.findings.causes import NamedCauses
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, closure_pictures
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
@@ -235,6 +236,14 @@ class Findings:
     def names_effects(self) -> bool:
         """Whether the answer names effects: there is a gap, and its cause is not unknown."""
         return self.causes not in ((), UNKNOWN)
+
+    @property
+    def named_causes(self) -> NamedCauses:
+        """The causes and their rivals."""
+        return NamedCauses(
+            self.causes, self.ambiguous_with, self.candidates, self.inclusion, self.found.choices,
+            self.found.robot, self.settings.answer.rivals_from,
+        )  # fmt: skip
 
     @property
     def figure_data(self) -> Mapping[str, Any]:

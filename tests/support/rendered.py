@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from diagnosis.findings import answers, closure, coefficients, place, remainder
+from diagnosis.findings import answers, closure, coefficients, place, remainder, symbols
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
 
@@ -13,11 +13,27 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TESTS, SOURCES = closure.TESTS, coefficients.SOURCES
-candidates_table, parameters_table, inclusion_line = (
-    answers.candidates_table,
-    answers.parameters_table,
-    answers.inclusion_line,
-)
+
+
+def candidates_table(answer: Findings) -> TextTable:
+    return answers.candidates_table(answer.candidates, answer.repeated, answer)
+
+
+def parameters_table(answer: Findings) -> TextTable:
+    return answers.parameters_table(answer.candidates[0], answer.repeated, answer)
+
+
+def inclusion_line(answer: Findings) -> str:
+    return answers.inclusion_line(answer.inclusion, answer.settings.words.effect_listed)
+
+
+def candidates_figure(answer: Findings) -> Figure | None:
+    return answers.candidates_figure(answer.candidates, answer)
+
+
+def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
+    stated = {**answer.coefficients.before, **answer.coefficients.after}
+    return symbols.symbol_rows(answer.causes, stated, answer.candidates[0].parameters)
 
 
 def rest_words(answer: Findings) -> str:

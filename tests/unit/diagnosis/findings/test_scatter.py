@@ -6,13 +6,15 @@ from typing import Any
 
 import pytest
 
-from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.repeatability import Spread, width_text
 from diagnosis.findings.sections import diagnosis_brief
 from diagnosis.findings.verdict import headline, next_steps, undecided_words, verdict
 from tests.support.diagnosis_document import CAUSE, findings_of, scattering_document
 from tests.support.rendered import (
+    candidates_table,
     closable_words,
+    inclusion_line,
+    parameters_table,
     repeatability_line,
     repeatability_table,
     scatter_words,

@@ -16,11 +16,10 @@ import numpy as np
 import pytest
 
 from diagnosis.findings import sections
-from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
 from diagnosis.findings.next_run import NextRun
-from diagnosis.findings.verdict import headline, next_steps, size_words, undecided_words
+from diagnosis.findings.verdict import headline, next_steps, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import left_over, probability
@@ -118,7 +117,7 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
     ).endswith(f": quadratic damping ({text}).")
     assert key_figures(findings_of(given))[-1].value == text
     assert tables.candidates_table(findings_of(given)).rows[0][1] == text
-    drawn = candidates_figure(findings_of(given))
+    drawn = tables.candidates_figure(findings_of(given))
     assert drawn is not None
     assert drawn.axes[0].texts[0].get_text() == text
 
@@ -183,7 +182,7 @@ def test_the_causes_have_their_sizes(given: Document, answer: Answer) -> None:
 
     def said(**changes: float) -> str:
         found = findings_of(given | {"sizes": [size | changes]})
-        return size_words(found, found.sizes[0])
+        return found.sizes[0].words("rad")
 
     moved = said(zero_change=-0.00285, stands_rad=0.0)
     assert "the middle moves by -0.16°" in moved

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.sections import printed
 from diagnosis.findings.verdict import rival_lines
@@ -26,11 +25,14 @@ from identification.status import Status
 from tests.support import rendered as tables
 from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document, findings_of
 from tests.support.rendered import (
+    candidates_table,
     coefficients_line,
     hidden_line,
     hidden_table,
+    inclusion_line,
     model_line,
     noise_line,
+    parameters_table,
     runs_table,
     waterfall_table,
 )

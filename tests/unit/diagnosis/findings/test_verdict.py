@@ -8,10 +8,8 @@ from typing import Any
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
-from diagnosis.findings.answers import candidates_table, parameters_table
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cards import key_figures
-from diagnosis.findings.causes import said_size
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.judged import Misfit
@@ -27,7 +25,7 @@ from identification.show.blocks import typeset
 from tests.support.diagnosis_document import campaign, document, findings_of
 from tests.support.gap_campaigns import answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
-from tests.support.rendered import runs_table
+from tests.support.rendered import candidates_table, parameters_table, runs_table
 from tunnel_lab.report.page import render_report
 from tunnel_sim.effects import effect_class, effect_from, known_effects
 
@@ -465,7 +463,7 @@ def test_what_the_causes_change_is_said_in_per_cent():
 def test_effects_say_their_sizes_as_a_person_would():
     def size(effect, parameter, given, asked=""):
         one = Candidate(effect, 0.9, 0.0, 0.0, {parameter: given})
-        return said_size(findings_of(document()), one, asked or effect)
+        return findings_of(document()).named_causes.said_size(one, asked or effect)
 
     friction = Quantity(0.0039991, 4.1e-6, "N m")
     assert size("coulomb_friction", "friction_moment", friction) == "dry friction of 0.00400 N m"

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from diagnosis.findings import answers
 from diagnosis.findings.misfit import run_labels
 from identification.show.style import styled
 from tests.support import rendered
@@ -34,7 +33,7 @@ def band(area: Any) -> np.ndarray:
 
 
 def test_bars_of_the_answers(given: Document) -> None:
-    fig = answers.candidates_figure(findings_of(given))
+    fig = rendered.candidates_figure(findings_of(given))
     assert fig is not None
     axes, shown = fig.axes[0], given["candidates"][:4]  # the others are improbable
     assert [bar.get_width() for bar in axes.patches] == [c["probability"] for c in shown]
@@ -57,12 +56,12 @@ def test_bars_of_the_answers(given: Document) -> None:
 def test_one_probable_answer_needs_no_bars(given: Document) -> None:
     for candidate in given["candidates"][1:]:
         candidate["probability"] = 0.009
-    assert answers.candidates_figure(findings_of(given)) is None
+    assert rendered.candidates_figure(findings_of(given)) is None
 
 
 def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
-    fig = answers.candidates_figure(findings_of(given))
+    fig = rendered.candidates_figure(findings_of(given))
     assert fig is not None
     assert fig.axes[0].texts[0].get_text() == "> 99 %"
 
@@ -409,7 +408,10 @@ def test_runs_that_repeat_have_bands_of_the_noise_and_a_single_run_no_figure() -
 
 def test_scatter_between_runs_is_one_bar_of_the_waterfall_and_of_the_answers() -> None:
     given = scattering_document()
-    for fig in (rendered.waterfall_figure(findings_of(given)), answers.candidates_figure(findings_of(given))):
+    for fig in (
+        rendered.waterfall_figure(findings_of(given)),
+        rendered.candidates_figure(findings_of(given)),
+    ):
         assert fig is not None
         labels = " ".join(label.get_text() for label in fig.axes[0].get_yticklabels()).replace("\n", " ")
         assert "scatter between runs" in labels

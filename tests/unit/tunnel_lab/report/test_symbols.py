@@ -6,10 +6,9 @@ import re
 
 import pytest
 
-from diagnosis.findings.symbols import symbol_rows
 from identification.show.drawing import inline_svg
 from tests.support.diagnosis_document import campaign, document, findings_of
-from tests.support.rendered import law_figure, place_figure
+from tests.support.rendered import law_figure, place_figure, symbol_rows
 from tunnel_lab.report import render_report
 
 
