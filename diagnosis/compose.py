@@ -183,7 +183,7 @@ def composed(
         trade_off=None if withheld else least_separated(fitted, study.campaign),
         blind_spots=() if cycling else study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
-        maps=maps.to_json_dict(),
+        maps=maps.rounded(),
         friction=_friction(study),
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},
@@ -285,9 +285,8 @@ def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFo
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(survey, chosen.interval_share, chosen)
-        or survey.maps.time.interval(chosen.interval_share),
-        amplitude_rad=survey.maps.amplitude.interval(chosen.interval_share),
+        time_s=blow_interval(survey, chosen.interval_share, chosen) or survey.time_interval,
+        amplitude_rad=survey.amplitude_interval,
         frequency_hz=survey.frequency_interval,
     )
     kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)

@@ -377,7 +377,7 @@ def closure_figure(gap: GapSummary, judged: Judged) -> Figure:
     unit, size = misfit_scale(judged)
     before = np.array([size(run.before) for run in runs])
     after = np.array([size(run.after) for run in runs])
-    stds = [run["std"] for run in judged.figure_data.get("runs", [])]
+    stds = [run.std for run in judged.maps.runs] if judged.maps else []
     noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
     axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
     most = 1.05 * float(max(before.max(), after.max())) or 1.0

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from diagnosis.settings import Settings
+from diagnosis.where.maps import Maps
 from identification.show.quantity import Quantity
 from identification.status import Remark
 
@@ -67,8 +68,8 @@ class Judged(Protocol):
         """The conversion from an excess to a misfit; None where it is not known."""
 
     @property
-    def figure_data(self) -> Mapping[str, Any]:
-        """The data of the figures, in JSON's types; empty for an answer without them."""
+    def maps(self) -> Maps | None:
+        """The data of the figures; None for an answer without them."""
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from diagnosis.findings.judged import Judged, Misfit
-from identification.printing import Document
+from diagnosis.where.maps import RunMap
 from identification.show.numbers import held_out_excess, reading_shown, significant, times_noise, unit_shown
 
 
@@ -76,28 +76,29 @@ def misfit_scale(answer: Judged) -> tuple[str, Callable[[float], float]]:
 
 def excess_std(answer: Judged) -> float | None:
     """Standard deviation of the campaign's excess by chance, in noise variances; None where there are no maps."""
-    runs = answer.figure_data.get("runs", [])
-    return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None
+    if answer.maps is None:
+        return None
+    runs = answer.maps.runs
+    return math.sqrt(sum(run.std**2 for run in runs)) / len(runs)
 
 
 def windy(answer: Judged) -> bool:
     """Whether any run had wind; True where the document does not say."""
-    runs = answer.figure_data.get("runs")
-    return not runs or any(run["wind_speed"] > 0.0 for run in runs)
+    return answer.maps is None or any(run.wind_speed > 0.0 for run in answer.maps.runs)
 
 
-def run_labels(maps: Document) -> list[str]:
-    """The runs of ``maps`` with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
+def run_labels(runs: Sequence[RunMap]) -> list[str]:
+    """Runs with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
 
     A spring is named where stated, and the wind speed where any run had wind.
     """
-    windy = any(run["wind_speed"] > 0.0 for run in maps["runs"])
+    windy = any(run.wind_speed > 0.0 for run in runs)
     labels = []
-    for run in maps["runs"]:
-        parts = [str(run["id"])]
-        if run["spring_stiffness"]:
-            parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
+    for run in runs:
+        parts = [run.id]
+        if run.spring_stiffness:
+            parts.append(f"{run.spring_stiffness:.4g} N m/rad")
         if windy:
-            parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0.0 else "wind off")
+            parts.append(f"{run.wind_speed:g} m/s" if run.wind_speed > 0.0 else "wind off")
         labels.append(" · ".join(parts))
     return labels

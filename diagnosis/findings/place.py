@@ -15,8 +15,9 @@ from diagnosis.findings.misfit import misfit_scale, run_labels, unit_of, windy
 from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, scattering
 from diagnosis.model.fact import Fact
 from diagnosis.settings.words import WordsSettings
+from diagnosis.where.along_motion import PhasePlane
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
-from identification.printing import Document
+from diagnosis.where.maps import ExcessSpectrum, Maps
 from identification.show.blocks import TextTable
 from identification.show.drawing import (
     AFTER,
@@ -27,7 +28,6 @@ from identification.show.drawing import (
     NOISE,
     QUIET,
     SIGMAS,
-    array,
     colour_bar,
     faded,
 )
@@ -231,12 +231,12 @@ def lines_table(judged: Judged) -> TextTable:
     """Narrow lines in the residuals."""
     rows = tuple(
         (
-            line["run"],
-            significant(line["frequency_hz"], 4),
-            reading_shown(line["amplitude_rad"], 2, unit_of(judged)),
-            share(min(line["share"], 1.0)),
+            line.run,
+            significant(line.frequency_hz, 4),
+            reading_shown(line.amplitude_rad, 2, unit_of(judged)),
+            share(min(line.share, 1.0)),
         )
-        for line in judged.figure_data.get("lines", [])
+        for line in (judged.maps.lines if judged.maps else ())
     )
     heads = ("run", "frequency [Hz]", "amplitude", "share of the run's gap")
     return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])
@@ -244,9 +244,10 @@ def lines_table(judged: Judged) -> TextTable:
 
 def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
     """The place of the gap in the data of the figures; none without data, and no map without a gap."""
-    if not judged.figure_data:
+    maps = judged.maps
+    if maps is None:
         return ()
-    axis = "the wind speed" if (judged.figure_data.get("grid") or {}).get("wind_speeds") else "time"
+    axis = "time" if maps.grid.wind_speeds is None else "the wind speed"
     place = Picture(
         "place",
         f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
@@ -262,7 +263,7 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
             "variance, minus one, on a logarithmic scale. Empty cells are within three standard deviations "
             "of the noise.",
             "Heat map of the excess of every run over time.",
-            partial(runs_figure, judged),
+            partial(runs_figure, maps),
         ),
         Picture(
             "where-profiles",
@@ -271,7 +272,7 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
             "interval with four fifths of the gap. Missing moment: the share of its energy by time. It "
             "shows when a moment acts, and so locates a blow.",
             "Excess against time and against amplitude, and the missing moment against time.",
-            partial(profiles_figure, where, judged),
+            partial(profiles_figure, where, maps),
         ),
         Picture(
             "where-spectrum",
@@ -279,7 +280,7 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
             "standard deviations. In print, yellow: the shortest interval with four fifths of the gap; dark "
             "bar on the axis: the natural frequencies of the runs.",
             "Residual power against frequency, with the nominal model and with the causes added.",
-            partial(spectrum_figure, where, judged),
+            partial(spectrum_figure, where, maps.frequency),
         ),
         Picture(
             "where-backbones",
@@ -289,7 +290,7 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
             "frequency lines indicate an effect on the stiffness; curved damping lines indicate an effect "
             "on the damping.",
             "Frequency and damping ratio of each run against amplitude, relative to the nominal model.",
-            partial(backbone_figure, where, judged),
+            partial(backbone_figure, where, maps),
         ),
         Picture(
             "where-phase-plane",
@@ -297,14 +298,14 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
             "the residuals with the fitted equation of motion. Empty cells are within three standard "
             "deviations of zero. The part that the nominal coefficients absorb is not shown.",
             "Map of the missing moment over angle and rate.",
-            partial(phase_plane_figure, judged),
+            partial(phase_plane_figure, maps.phase_plane),
         ),
         Picture(
             "where-moment",
             "Means of the missing moment, with 95 % bands. A dependence on the angle indicates stiffness; a "
             "dependence on the rate indicates damping.",
             "Mean of the missing moment against the angle and against the rate.",
-            partial(moment_figure, judged),
+            partial(moment_figure, maps.phase_plane),
         ),
     )
 
@@ -321,23 +322,22 @@ _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line be
 
 @styled
 def place_figure(judged: Judged, height: float = PLACE_HEIGHT) -> Figure | None:
-    """Misfit by amplitude and by wind speed, or by time where there is one speed; None where the maps lack it.
+    """Misfit by amplitude and by wind speed, or by time where there is one speed; None without maps.
 
     Cells within the noise are empty.
 
     Args:
         height: of the figure, inches; small enough for a phone.
     """
-    grid_of = judged.figure_data.get("grid")
-    if grid_of is None:
+    if judged.maps is None:
         return None
     unit, size = misfit_scale(judged)
-    excess, std = (np.stack([array(row) for row in grid_of[name]]) for name in ("excess", "std"))
-    rows = np.degrees(array(grid_of["amplitude_edges_rad"]))
-    speeds = grid_of["wind_speeds"]
-    columns = np.arange(len(speeds) + 1) - 0.5 if speeds else array(grid_of["time_edges_s"])
-    cells = np.vectorize(size, otypes=[float])(np.nan_to_num(excess))
-    shown = np.where(excess > SIGMAS * std, cells, np.nan)
+    cells = judged.maps.grid
+    rows = np.degrees(cells.amplitude_edges_rad)
+    speeds = [] if cells.wind_speeds is None else cells.wind_speeds.tolist()
+    columns = np.arange(len(speeds) + 1) - 0.5 if cells.time_edges_s is None else cells.time_edges_s
+    sizes = np.vectorize(size, otypes=[float])(np.nan_to_num(cells.excess))
+    shown = np.where(cells.excess > SIGMAS * cells.std, sizes, np.nan)
     fig = figure(NARROW, height)
     axes = fig.add_subplot()
     top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
@@ -351,15 +351,14 @@ def place_figure(judged: Judged, height: float = PLACE_HEIGHT) -> Figure | None:
 
 
 @styled
-def runs_figure(judged: Judged) -> Figure:
+def runs_figure(maps: Maps) -> Figure:
     """Excess of every run over time on a logarithmic scale; cells within the noise are empty."""
     from matplotlib.colors import LogNorm
 
-    maps = judged.figure_data
-    runs = maps["runs"]
+    runs = maps.runs
     fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
-    first, *_, last = maps["time"]["edges_s"]
+    first, *_, last = maps.time.edges_s.tolist()
     cells, floor, top = run_cells(maps)
     image = axes.imshow(
         cells, aspect="auto", extent=(first, last, len(runs) - 0.5, -0.5), cmap=faded(BEFORE),
@@ -367,37 +366,34 @@ def runs_figure(judged: Judged) -> Figure:
     )  # fmt: skip
     if not np.isfinite(cells).any():
         axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
-    axes.set_yticks(range(len(runs)), [*map(figure_text, run_labels(maps))])
+    axes.set_yticks(range(len(runs)), [*map(figure_text, run_labels(runs))])
     axes.set_xlabel(TIME)
     colour_bar(fig, image, axes, location="top", label="excess (noise variances)", aspect=50)
     return fig
 
 
-def run_cells(maps: Document) -> tuple[Array, float, float]:
+def run_cells(maps: Maps) -> tuple[Array, float, float]:
     """Excess by run and bin of time, shape (runs, n), NaN within the noise; and the limits of its scale."""
-    cells = np.stack([array(row) for row in maps["time"]["by_run"]])
-    times = array(maps["time"]["edges_s"])
-    run = min(maps["runs"], key=lambda entry: entry["std"])
-    floor = SIGMAS * float(run["std"] * np.sqrt(times.size - 1))
+    cells, times = maps.time.by_run, maps.time.edges_s
+    floor = SIGMAS * float(min(run.std for run in maps.runs) * np.sqrt(times.size - 1))
     known = cells[np.isfinite(cells)]
     return np.where(cells > floor, cells, np.nan), floor, max(float(known.max(initial=0.0)), 2.0 * floor)
 
 
 @styled
-def profiles_figure(where: Where, judged: Judged) -> Figure:
+def profiles_figure(where: Where, maps: Maps) -> Figure:
     """Excess over time and amplitude, all runs together, and the times at which a moment is missing.
 
     The shaded intervals contain four fifths of the gap.
     """
-    maps = judged.figure_data
     swings = None if where.amplitude_rad is None else np.degrees(where.amplitude_rad).tolist()
     fig = figure(NARROW, 6.0)
     by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
     for axes, values, bounds, interval in (
-        (by_time, maps["time"], array(maps["time"]["edges_s"]), where.time_s),
-        (by_amplitude, maps["amplitude"], np.degrees(array(maps["amplitude"]["edges_rad"])), swings),
+        (by_time, maps.time, maps.time.edges_s, where.time_s),
+        (by_amplitude, maps.amplitude, np.degrees(maps.amplitude.edges_rad), swings),
     ):
-        mean, std = array(values["excess"]), array(values["std"])
+        mean, std = values.excess, values.std
         if interval is not None:
             axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
         axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
@@ -407,7 +403,7 @@ def profiles_figure(where: Where, judged: Judged) -> Figure:
         grid(axes)
     by_time.tick_params(labelbottom=False)
     # The missing moment's energy shows when a moment acts, not the duration of the motion after it.
-    edges, share = array(maps["time"]["edges_s"]), 100.0 * array(maps["time"]["moment_share"])
+    edges, share = maps.time.edges_s, 100.0 * maps.time.moment_share
     moment.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
     moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
     moment.set(xlabel=TIME, ylabel="missing moment\n[% of its energy]")
@@ -417,27 +413,27 @@ def profiles_figure(where: Where, judged: Judged) -> Figure:
 
 
 @styled
-def spectrum_figure(where: Where, judged: Judged) -> Figure:
+def spectrum_figure(where: Where, given: ExcessSpectrum) -> Figure:
     """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
     The shaded interval contains four fifths of the gap.
     """
-    values, interval = judged.figure_data["frequency"], where.frequency_hz
+    interval = where.frequency_hz
     fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
-    edges, centre = spectrum_axis(values)
-    known = np.isfinite(array(values["excess"]))
-    centre, noise = centre[known], SIGMAS * array(values["std"])[known]
+    edges, centre = spectrum_axis(given)
+    known = np.isfinite(given.excess)
+    centre, noise = centre[known], SIGMAS * given.std[known]
     if interval is not None:
         axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
-    low, high = values["resonance_hz"]
+    low, high = given.resonance_hz
     axes.axvspan(0.985 * low, 1.015 * high, ymax=0.035, color=QUIET, linewidth=0)
     floor = np.maximum(1.0 - noise, LEAST_POWER)
     axes.fill_between(centre, floor, 1.0 + noise, color=NOISE, linewidth=0, label="noise (3σ)")
-    before = np.maximum((array(values["excess"]) + 1.0)[known], LEAST_POWER)
+    before = np.maximum((given.excess + 1.0)[known], LEAST_POWER)
     axes.plot(centre, before, color=BEFORE, label="nominal model")
-    if values["after"] is not None:
-        after = np.maximum((array(values["after"]) + 1.0)[known], LEAST_POWER)
+    if given.after is not None:
+        after = np.maximum((given.after + 1.0)[known], LEAST_POWER)
         axes.plot(centre, after, color=AFTER, lw=1.2, label="with the causes")
     axes.set(xscale="log", yscale="log", xlim=(edges[0], edges[-1]), ylabel="residual power over noise")
     axes.set_xlabel("frequency [Hz]; dark bar: the natural frequencies of the runs")
@@ -446,20 +442,19 @@ def spectrum_figure(where: Where, judged: Judged) -> Figure:
     return fig
 
 
-def spectrum_axis(values: Document) -> tuple[Array, Array]:
+def spectrum_axis(given: ExcessSpectrum) -> tuple[Array, Array]:
     """Edges of the bins for a logarithmic scale, the first half the second instead of zero; and centres, Hz."""
-    edges = array(values["edges_hz"])
+    edges = given.edges_hz
     positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
     return positive, np.sqrt(positive[:-1] * positive[1:])
 
 
 @styled
-def phase_plane_figure(judged: Judged) -> Figure | None:
-    """The missing moment over angle and rate; None where the maps lack it."""
-    plane = judged.figure_data["phase_plane"]
+def phase_plane_figure(plane: PhasePlane | None) -> Figure | None:
+    """The missing moment over angle and rate; None where it is not known."""
     if plane is None:
         return None
-    low, *_, high = np.degrees(plane["edges_rad"]).tolist()
+    low, *_, high = np.degrees(plane.edges_rad).tolist()
     clear, reach, unit, _ = plane_cells(plane)
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
@@ -473,36 +468,40 @@ def phase_plane_figure(judged: Judged) -> Figure | None:
 
 
 @styled
-def moment_figure(judged: Judged) -> Figure | None:
-    """Means of the missing moment over all rates and over all angles; None where the maps lack it."""
-    plane = judged.figure_data["phase_plane"]
+def moment_figure(plane: PhasePlane | None) -> Figure | None:
+    """Means of the missing moment over all rates and over all angles; None where it is not known."""
     if plane is None:
         return None
-    edges = np.degrees(array(plane["edges_rad"]))
+    edges = np.degrees(plane.edges_rad)
     _, _, unit, factor = plane_cells(plane)
     fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
-    for axes, name, label in zip(fig.subplots(2, 1), ("by_angle", "by_rate"), (ANGLE, RATE), strict=True):
-        mean, band = factor * array(plane[name]), INTERVAL * (factor * array(plane[f"{name}_std"]))
+    for axes, mean, std, label, others in zip(
+        fig.subplots(2, 1),
+        (plane.by_angle, plane.by_rate),
+        (plane.by_angle_std, plane.by_rate_std),
+        (ANGLE, RATE),
+        ("rates", "angles"),
+        strict=True,
+    ):
+        mean, band = factor * mean, INTERVAL * (factor * std)
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
         axes.fill_between(centre, mean - band, mean + band, color=BEFORE, alpha=0.2, lw=0)
         axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
-        others = "rates" if name == "by_angle" else "angles"
         axes.set(xlabel=label, ylabel=f"mean over all {others} [{unit}]")
         grid(axes)
     return fig
 
 
-def plane_cells(plane: Document) -> tuple[Array, float, str, float]:
+def plane_cells(plane: PhasePlane) -> tuple[Array, float, str, float]:
     """The missing moment by rate (rows) and angle (columns), NaN within three standard deviations of zero.
 
     Also the greatest value of its scale, a unit that suits the size of the values, and the factor from the
     document's unit to it.
     """
-    moment = np.stack([array(row) for row in plane["moment"]])
-    std = np.stack([array(row) for row in plane["std"]])
+    moment, std = plane.moment, plane.std
     known = np.abs(moment[np.isfinite(moment)])
-    unit, factor = plane["unit"].replace("rad/s2", "rad/s²"), 1.0
+    unit, factor = plane.unit.replace("rad/s2", "rad/s²"), 1.0
     if known.size and known.max() < 0.1:
         unit, factor = f"10⁻³ {unit}", 1e3
     reach = float(np.quantile(known, 0.98)) * factor if known.size else 1.0
@@ -510,28 +509,25 @@ def plane_cells(plane: Document) -> tuple[Array, float, str, float]:
 
 
 @styled
-def backbone_figure(where: Where, judged: Judged) -> Figure:
+def backbone_figure(where: Where, maps: Maps) -> Figure:
     """Frequency and damping against amplitude, relative to the nominal model's, with 95 % bands."""
-    maps = judged.figure_data
-    curves = [curve for curve in maps["backbones"] if len(curve["time_s"]) > 1]
-    named = [curve for curve in curves if curve["id"] in where.runs]
+    curves = [curve for curve in maps.backbones if curve.time_s.size > 1]
+    named = [curve for curve in curves if curve.id in where.runs]
     # first the runs that show the gap, in the campaign's order, then the others for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
-    labels = {
-        run["id"]: figure_text(label) for run, label in zip(maps["runs"], run_labels(maps), strict=True)
-    }
+    labels = {run.id: figure_text(label) for run, label in zip(maps.runs, run_labels(maps.runs), strict=True)}
     fig = figure(NARROW, 7.0)
     frequency, damping = fig.subplots(2, 1)
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}
     for index, curve in enumerate(chosen):
-        order = np.argsort(array(curve["amplitude_rad"]))
-        x, nominal = np.degrees(array(curve["amplitude_rad"])[order]), curve["nominal_frequency_hz"]
+        order = np.argsort(curve.amplitude_rad)
+        x, nominal = np.degrees(curve.amplitude_rad[order]), curve.nominal_frequency_hz
         colour, marker = COLOURS[index], MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]
-        shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
-        change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
+        shift = 100.0 * (curve.frequency_hz / nominal - 1.0)
+        change = 1e3 * (curve.zeta - curve.nominal_zeta)
         for axes, y, std, label in (
-            (frequency, shift, 100.0 * array(curve["frequency_std"]) / nominal, None),
-            (damping, change, 1e3 * array(curve["zeta_std"]), labels[curve["id"]]),
+            (frequency, shift, 100.0 * curve.frequency_std / nominal, None),
+            (damping, change, 1e3 * curve.zeta_std, labels[curve.id]),
         ):
             drawn[axes].append((y, std))
             y, band = y[order], INTERVAL * std[order]
@@ -547,7 +543,7 @@ def backbone_figure(where: Where, judged: Judged) -> Figure:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
             log_axis(axes, "x")
     if chosen:
-        longest = max(len(labels[curve["id"]]) for curve in chosen)
+        longest = max(len(labels[curve.id]) for curve in chosen)
         columns = min(3, _LEGEND // (longest + _HANDLE)) or 1
         fig.legend(loc="outside lower center", ncols=columns, fontsize="x-small" if longest > _LONG else None)
     return fig

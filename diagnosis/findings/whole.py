@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Annotated, Any, Self, cast, get_args, get_type_hints
@@ -36,6 +36,7 @@ from diagnosis.search.rivals.two_springs import SpringError
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from diagnosis.where.described import Nowhere, PlaceFound, Where
+from diagnosis.where.maps import Maps
 from identification.show.quantity import Quantity
 from identification.status import Remark
 from identification.trade_off import TradeOff
@@ -43,6 +44,7 @@ from tunnel_sim.files.from_json import UNWRITTEN
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SCHEMA_VERSION = 1
 _LAST = (
@@ -108,7 +110,7 @@ class Findings:
         trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
-        maps: data of the figures, in JSON's types.
+        maps: data of the figures; None for an answer without them.
         disturbed: disturbed runs; the answer excludes them from the disturbance on.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
@@ -139,7 +141,7 @@ class Findings:
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     cautions: tuple[str, ...] = ()
-    maps: Mapping[str, Any] | None = None
+    maps: Maps | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     disturbed: tuple[Disturbance, ...] = ()
     remarks: tuple[Remark, ...] = ()
@@ -246,11 +248,6 @@ class Findings:
         )  # fmt: skip
 
     @property
-    def figure_data(self) -> Mapping[str, Any]:
-        """The data of the figures, in JSON's types; empty for an answer without them."""
-        return self.maps or {}
-
-    @property
     def rest_is_material(self) -> bool:
         """Whether the remaining gap may move a coefficient."""
         return self.rest is not None and self.rest.material
@@ -285,17 +282,34 @@ class Findings:
         """The inverse of `to_json_dict`.
 
         Args:
-            data: the document; further keys are ignored.
+            data: the document.
             where: it is from, in an error.
             remedy: in an error.
 
         Raises:
-            TunnelError: when it is not a diagnosis: a key is missing, or a value has the wrong type.
+            TunnelError: when it is not a diagnosis: a key is missing or unknown, or a value has the wrong type.
         """
         check_shape(data, where, remedy)
         with as_described("is not a diagnosis", where, remedy):
-            found = _adapter(cast(Any, cls)).validate_json(json.dumps(_by_field(data)), strict=True)
-        return cast(Self, found)
+            found = cast(
+                Self, _adapter(cast(Any, cls)).validate_json(json.dumps(_by_field(data)), strict=True)
+            )
+        for place in _unknown_keys(data, found.to_json_dict()):
+            raise TunnelError(f"is not a diagnosis ({place}: unknown key)", where=where, remedy=remedy)
+        return found
+
+
+def _unknown_keys(data: Any, known: Any) -> Iterator[str]:
+    """The places of the keys of a document that it lacks when it is written again."""
+    if isinstance(data, Mapping) and isinstance(known, Mapping):
+        inner = {key: (value, known.get(key)) for key, value in data.items()}
+        yield from (str(key) for key in data if key not in known)
+    elif isinstance(data, list) and isinstance(known, list) and isinstance(next(iter(data), None), Mapping):
+        inner = dict(enumerate(zip(data, known, strict=False)))
+    else:
+        return
+    for key, both in inner.items():
+        yield from (f"{key}.{place}" for place in _unknown_keys(*both))
 
 
 def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from identification.estimate import NoiseLevel
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from identification.signal.run_fit import fit_windows
+from tunnel_sim.files.from_json import Row, Rows
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -30,29 +31,30 @@ class Backbone:
     """One run's frequency and damping by windows of three cycles; none where it decays too quickly or is driven.
 
     Args:
-        time: mid-window since the start of the record, shape (n,), s.
-        amplitude: at mid-window, shape (n,), rad.
-        frequency: undamped natural frequency, shape (n,), Hz.
+        id: of the run.
+        time_s: mid-window since the start of the record, shape (n,), s.
+        amplitude_rad: at mid-window, shape (n,), rad.
+        frequency_hz: undamped natural frequency, shape (n,), Hz.
         frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
         zeta: damping ratio, shape (n,).
         zeta_std: of each, shape (n,).
-        nominal_frequency: of the nominal model, Hz; for a body without a spring, from `resonance`.
+        nominal_frequency_hz: of the nominal model, Hz; for a body without a spring, from `resonance`.
         nominal_zeta: of the nominal model, dimensionless.
-        alone_frequency: frequency of a linear fit to this run alone, Hz; None where that fails.
+        alone_frequency_hz: frequency of a linear fit to this run alone, Hz; None where that fails.
         alone_zeta: damping ratio of the same fit.
         alone_excess: mean squared scaled residual of that fit minus one, a ratio.
     """
 
     id: str
-    time: Array
-    amplitude: Array
-    frequency: Array
-    frequency_std: Array
-    zeta: Array
-    zeta_std: Array
-    nominal_frequency: float
+    time_s: Row
+    amplitude_rad: Row
+    frequency_hz: Row
+    frequency_std: Row
+    zeta: Row
+    zeta_std: Row
+    nominal_frequency_hz: float
     nominal_zeta: float
-    alone_frequency: float | None = None
+    alone_frequency_hz: float | None = None
     alone_zeta: float | None = None
     alone_excess: float | None = None
 
@@ -102,7 +104,7 @@ def drift(curves: list[Backbone]) -> tuple[float, float]:
     determined in ω, so they can be compared.
     """
     return (
-        sum(_departure(c.frequency, c.frequency_std) for c in curves),
+        sum(_departure(c.frequency_hz, c.frequency_std) for c in curves),
         sum(_departure(c.zeta, c.zeta_std) for c in curves),
     )
 
@@ -200,7 +202,7 @@ class PhasePlane:
     """The mean missing moment by angle and rate.
 
     Args:
-        edges: of the bins of both axes, shape (n + 1,), rad.
+        edges_rad: of the bins of both axes, shape (n + 1,), rad.
         moment: mean by rate (rows) and angle (columns), shape (n, n); NaN where too few residuals fall.
         std: of each mean under white noise, shape (n, n).
         by_angle: mean over all rates, shape (n,).
@@ -208,15 +210,16 @@ class PhasePlane:
         by_rate: mean over all angles, shape (n,).
         by_rate_std: of each, shape (n,).
         unit: of the moment: ``N m``, or ``rad/s2`` in normalised form.
+        runs: ids of the runs that it is the mean of.
     """
 
-    edges: Array
-    moment: Array
-    std: Array
-    by_angle: Array
-    by_angle_std: Array
-    by_rate: Array
-    by_rate_std: Array
+    edges_rad: Row
+    moment: Rows
+    std: Rows
+    by_angle: Row
+    by_angle_std: Row
+    by_rate: Row
+    by_rate_std: Row
     unit: str
     runs: tuple[str, ...]
 

@@ -113,7 +113,7 @@ def described(
         explained: share of the gap that they explain on held-out readings.
     """
     maps, chosen = place.survey.maps, settings.words
-    length, greatest = float(maps.time.edges[-1]), float(maps.amplitude.edges[-1])
+    length, greatest = float(maps.time.edges_s[-1]), float(maps.amplitude.edges_rad[-1])
     wide = {"time_s": chosen.interval_located * length, "amplitude_rad": chosen.interval_located * greatest}
     intervals = {
         "time_s": where.time_s, "amplitude_rad": where.amplitude_rad, "frequency_hz": where.frequency_hz,

@@ -21,7 +21,6 @@ from diagnosis.noise.bands import chance
 from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array
 
 #: Bands by their upper edges in multiples of the run's own frequency.
@@ -244,14 +243,16 @@ class ResidualLine:
     """A line in one run.
 
     Args:
+        run: its id.
+        frequency_hz: Hz.
         share: of the run's excess squared residual, a fraction.
-        amplitude: of the reading, rad.
+        amplitude_rad: of the reading, in its unit.
     """
 
     run: str
-    frequency: Hertz
+    frequency_hz: float
     share: float
-    amplitude: float
+    amplitude_rad: float
 
 
 def residual_lines(
@@ -269,7 +270,7 @@ def residual_lines(
             if unlikely > chosen.line_rate or len(of_run) == _PER_RUN:
                 break
             close = any(
-                abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in of_run
+                abs(line.frequency_hz - run.frequency[index]) < _APART * run.resonance for line in of_run
             )
             beside = np.concatenate(
                 [

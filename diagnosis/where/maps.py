@@ -1,17 +1,21 @@
-"""Data of a diagnosis' figures: plain arrays, small enough to be part of its JSON, in the measured rig's units."""
+"""Data of a diagnosis' figures, small enough to be part of its JSON, in the measured rig's units.
+
+An excess is the mean squared residual over the noise variance, minus one, a ratio.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from diagnosis.where.along_motion import Backbone, PhasePlane
-from diagnosis.where.excess import BandExcess, Profile, ResidualLine
-from tunnel_sim.vocabulary.record import Array
+from diagnosis.where.excess import BandExcess, ResidualLine
+from tunnel_sim.files.from_json import Row, Rows
 
 _DIGITS = 5  # significant: more than any figure shows
+_DIGITS_OF_BACKBONE = {"frequency_hz": 8, "zeta": 8}  # shown as differences from the nominal model
 
 
 @dataclass(frozen=True)
@@ -21,9 +25,10 @@ class RunMap:
     Args:
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
-        amplitude: at the start of the record, rad.
-        frequency: of the free motion in the nominal model, Hz.
-        excess: mean squared residual over the noise variance, minus one, a ratio.
+        id: of the run.
+        amplitude_rad: at the start of the record, rad.
+        frequency_hz: of the free motion in the nominal model, Hz.
+        excess: of the nominal model.
         std: its standard deviation where there is no gap, a ratio.
         p_value: probability of as large an excess without a gap.
         share: of the campaign's excess, a fraction.
@@ -32,8 +37,8 @@ class RunMap:
     id: str
     spring_stiffness: float | None
     wind_speed: float
-    amplitude: float
-    frequency: float
+    amplitude_rad: float
+    frequency_hz: float
     excess: float
     std: float
     p_value: float
@@ -47,7 +52,8 @@ class GroupExcess:
     Args:
         by: ``wind``, ``spring``, ``speed`` or ``amplitude``.
         label: in words, with unit.
-        excess: mean over the runs, a ratio.
+        runs: their number.
+        excess: mean over the runs.
         std: its standard deviation where there is no gap, a ratio.
     """
 
@@ -59,28 +65,58 @@ class GroupExcess:
 
 
 @dataclass(frozen=True, eq=False)
-class RunTrace:
-    """One run against time: the readings and the residuals of the models.
-
-    A model's prediction is the reading minus its residual.
+class TimeExcess:
+    """Excess over time, all runs together.
 
     Args:
-        time: s, shape (n,); without the times at which the record has no sample.
-        reading: means of the fitted reading, shape (n,), rad.
-        before: residuals of the nominal model, shape (n,), rad.
-        after: residuals with the causes added, shape (n,), rad; None where nothing was added.
-        noise_std: of one value, rad.
-        differ: the few cycles in which the models differ most, s; where nothing was added, in which the nominal
-            model has its largest misfit.
+        edges_s: of the bins, since the start of the record, shape (n + 1,), s.
+        excess: mean by bin, shape (n,); NaN where a bin is empty.
+        std: of it where there is no gap, shape (n,).
+        by_run: mean by run (rows) and bin (columns), shape (runs, n); NaN after a run's end.
+        moment_share: energy of the apparent moment by bin, shape (n,), as shares of the whole.
     """
 
-    id: str
-    time: Array
-    reading: Array
-    before: Array
-    after: Array | None
-    noise_std: float
-    differ: tuple[float, float]
+    edges_s: Row
+    excess: Row
+    std: Row
+    by_run: Rows
+    moment_share: Row
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeExcess:
+    """Excess over the amplitude of the motion, all runs together.
+
+    Args:
+        edges_rad: of the bins, shape (n + 1,), rad.
+        excess: mean by bin, shape (n,); NaN where a bin is empty.
+        std: of it where there is no gap, shape (n,).
+    """
+
+    edges_rad: Row
+    excess: Row
+    std: Row
+
+
+@dataclass(frozen=True, eq=False)
+class ExcessSpectrum:
+    """Excess over frequency, all runs together.
+
+    Args:
+        edges_hz: of the bins, shape (n + 1,), Hz.
+        excess: mean by bin, shape (n,); NaN where a bin is empty.
+        std: of it where there is no gap, shape (n,).
+        after: mean by bin with the causes added, shape (n,); None where nothing was added.
+        by_run: mean by run (rows) and bin (columns), shape (runs, n); NaN where a bin is empty.
+        resonance_hz: least and greatest frequency of the runs' free motion, Hz.
+    """
+
+    edges_hz: Row
+    excess: Row
+    std: Row
+    after: Row | None
+    by_run: Rows
+    resonance_hz: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,18 +124,44 @@ class ExcessMap:
     """Excess by amplitude and by wind speed, or by time where the runs have one speed.
 
     Args:
-        amplitude: edges of the rows, rad, shape (m + 1,).
-        speeds: of the columns, m/s, shape (n,); None where the columns are times.
-        time: edges of the columns since the start of the record, s, shape (n + 1,); None where they are speeds.
+        amplitude_edges_rad: of the rows, rad, shape (m + 1,).
+        wind_speeds: of the columns, m/s, shape (n,); None where the columns are times.
+        time_edges_s: of the columns, since the start of the record, s, shape (n + 1,); None where they are speeds.
         excess: mean by cell, shape (m, n), in noise variances of a sample; NaN where a cell is empty.
         std: of it where there is no gap, shape (m, n).
     """
 
-    amplitude: Array
-    speeds: Array | None
-    time: Array | None
-    excess: Array
-    std: Array
+    amplitude_edges_rad: Row
+    wind_speeds: Row | None
+    time_edges_s: Row | None
+    excess: Rows
+    std: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class RunTrace:
+    """One run against time: the readings and the residuals of the models, in the unit of the readings.
+
+    A model's prediction is the reading minus its residual.
+
+    Args:
+        id: of the run.
+        time_s: s, shape (n,); without the times at which the record has no sample.
+        reading_rad: means of the fitted reading, shape (n,).
+        before_rad: residuals of the nominal model, shape (n,).
+        after_rad: residuals with the causes added, shape (n,); None where nothing was added.
+        noise_std_rad: of one value.
+        differ_s: the few cycles in which the models differ most, s; where nothing was added, in which the nominal
+            model has its largest misfit.
+    """
+
+    id: str
+    time_s: Row
+    reading_rad: Row
+    before_rad: Row
+    after_rad: Row | None
+    noise_std_rad: float
+    differ_s: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,100 +169,62 @@ class Maps:
     """All maps of a campaign.
 
     Args:
-        time: excess over time since the start of the record, s.
-        time_by_run: mean excess by run (rows) and bin of time (columns), shape (runs, n); NaN after a run's end.
-        moment_time: energy of the apparent moment by bin of ``time``, shape (n,), as shares of the whole.
-        amplitude: excess over the amplitude of the motion, rad.
-        frequency: excess over frequency, Hz.
-        frequency_by_run: mean excess by run and bin of frequency, shape (runs, n); NaN where a bin is empty.
-        frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.
-        resonance: least and greatest frequency of the runs' free motion, Hz.
+        runs: every run, in the order of the campaign.
+        groups: runs that share a condition; conditions that do not vary are left out.
+        time: excess over time.
+        amplitude: excess over the amplitude of the motion.
+        frequency: excess over frequency.
         bands: the residual by multiples of the runs' own frequency.
+        lines: narrow lines in the residuals of single runs.
+        backbones: frequency and damping of every run by amplitude.
         phase_plane: missing moment by angle and rate; None where there is none.
-        traces: every run against time, the largest excess first.
         grid: excess by amplitude and speed, or amplitude and time.
         unit: of the readings and residuals.
+        traces: every run against time, the largest excess first.
     """
 
     runs: tuple[RunMap, ...]
     groups: tuple[GroupExcess, ...]
-    time: Profile
-    time_by_run: Array
-    moment_time: Array
-    amplitude: Profile
-    frequency: Profile
-    frequency_by_run: Array
-    frequency_after: Array | None
-    resonance: tuple[float, float]
+    time: TimeExcess
+    amplitude: AmplitudeExcess
+    frequency: ExcessSpectrum
     bands: tuple[BandExcess, ...]
     lines: tuple[ResidualLine, ...]
     backbones: tuple[Backbone, ...]
     phase_plane: PhasePlane | None
-    traces: tuple[RunTrace, ...]
     grid: ExcessMap
-    unit: str = "rad"
+    unit: str
+    traces: tuple[RunTrace, ...]
+
+    def rounded(self) -> Maps:
+        """The same with the digits of a document in its arrays."""
+        return replace(self, **{name: _rounded(value) for name, value in vars(self).items()})
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name with their units, in JSON's types; null where a bin is empty."""
-        return {
-            "runs": [_fields(run, amplitude="amplitude_rad", frequency="frequency_hz") for run in self.runs],
-            "groups": [vars(group) for group in self.groups],
-            "time": {
-                **_profile(self.time, "edges_s"),
-                "by_run": _plain(self.time_by_run),
-                "moment_share": _plain(self.moment_time),
-            },
-            "amplitude": _profile(self.amplitude, "edges_rad"),
-            "frequency": {
-                **_profile(self.frequency, "edges_hz"),
-                "after": _plain(self.frequency_after),
-                "by_run": _plain(self.frequency_by_run),
-                "resonance_hz": list(self.resonance),
-            },
-            "bands": [vars(band) for band in self.bands],
-            "lines": [
-                _fields(line, frequency="frequency_hz", amplitude="amplitude_rad") for line in self.lines
-            ],
-            "backbones": [
-                _fields(curve, **_OF_BACKBONE)
-                | {
-                    "frequency_hz": [float(f"{v:.8g}") for v in curve.frequency],
-                    "zeta": [float(f"{v:.8g}") for v in curve.zeta],
-                }
-                for curve in self.backbones
-            ],
-            "phase_plane": None if self.phase_plane is None else _fields(self.phase_plane, edges="edges_rad"),
-            "grid": _fields(
-                self.grid, amplitude="amplitude_edges_rad", speeds="wind_speeds", time="time_edges_s"
-            ),
-            "unit": self.unit,
-            "traces": [_fields(trace, **_OF_TRACE) for trace in self.traces],
-        }
+        """The fields, in JSON's types; null for NaN."""
+        return {name: _plain(value) for name, value in vars(self).items()}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Maps) and self.to_json_dict() == other.to_json_dict()
 
 
-_OF_BACKBONE = {
-    "time": "time_s", "amplitude": "amplitude_rad", "frequency": "frequency_hz",
-    "nominal_frequency": "nominal_frequency_hz", "alone_frequency": "alone_frequency_hz",
-}  # fmt: skip
-_OF_TRACE = {
-    "time": "time_s", "reading": "reading_rad", "before": "before_rad", "after": "after_rad",
-    "noise_std": "noise_std_rad", "differ": "differ_s",
-}  # fmt: skip
-
-
-def _fields(value: object, **names: str) -> dict[str, Any]:
-    """The fields of a dataclass in JSON's types; some under names with their units."""
-    return {names.get(name, name): _plain(field) for name, field in vars(value).items()}
+def _rounded(value: Any, digits: int = _DIGITS) -> Any:
+    """A value with arrays of fewer digits."""
+    if isinstance(value, np.ndarray):
+        return np.array([float(f"{v:.{digits}g}") for v in value.ravel().tolist()]).reshape(value.shape)
+    if is_dataclass(value) and not isinstance(value, type):
+        digits_of = _DIGITS_OF_BACKBONE if isinstance(value, Backbone) else {}
+        changed = {name: _rounded(one, digits_of.get(name, _DIGITS)) for name, one in vars(value).items()}
+        return replace(value, **changed)
+    return tuple(map(_rounded, value)) if isinstance(value, tuple) else value
 
 
 def _plain(value: Any) -> Any:
-    """A field in JSON's types: arrays as lists, by row, of rounded numbers; None for values that are not finite."""
-    if isinstance(value, np.ndarray) and value.ndim > 1:
-        return [_plain(row) for row in value]
+    """A value in JSON's types: arrays and tuples as lists, dataclasses by field, None for NaN."""
     if isinstance(value, np.ndarray):
-        return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in value.tolist()]
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _profile(values: Profile, edges: str) -> dict[str, Any]:
-    return {edges: _plain(values.edges), "excess": _plain(values.mean), "std": _plain(values.std)}
+        found = value.astype(object)
+        found[~np.isfinite(value)] = None
+        return found.tolist()
+    if is_dataclass(value):
+        return {name: _plain(one) for name, one in vars(value).items()}
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value

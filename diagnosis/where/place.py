@@ -118,7 +118,7 @@ def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[f
         Start and end since the start of the record, s; None where the moment is spread out, acts at the release,
         or is not clear of the noise.
     """
-    edges = found.maps.time.edges
+    edges = found.maps.time.edges_s
     interval = shortest_interval(edges, found.moment_energy, share)
     if interval is None or found.moment_z < chosen.blow_stds:
         return None
@@ -138,7 +138,7 @@ def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclu
     whole = max(sum(excess.values()), 1e-300)
     lines = [line for line in survey.maps.lines if line.share > chosen.line_share]
     if lines and len(lines) >= max(1, len(survey.maps.runs) // chosen.line_one_in):
-        hertz = float(np.median([line.frequency for line in lines]))
+        hertz = float(np.median([line.frequency_hz for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Conclusion(
             "forcing" if similar < chosen.fastest_moment else "sensor",
@@ -172,10 +172,10 @@ def _between_runs(nominal: Fit, found: Survey) -> Conclusion | None:
     sizes = [run.reading.size for run in nominal.problem.data.runs]
     left, shifts = 0.0, []
     for curve, size in zip(found.maps.backbones, sizes, strict=True):
-        if curve.alone_excess is None or curve.alone_frequency is None or curve.alone_zeta is None:
+        if curve.alone_excess is None or curve.alone_frequency_hz is None or curve.alone_zeta is None:
             return None
         left += max(curve.alone_excess, 0.0) * size
-        frequency = curve.alone_frequency / curve.nominal_frequency - 1.0
+        frequency = curve.alone_frequency_hz / curve.nominal_frequency_hz - 1.0
         shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
     if len(sizes) < 2 or left > nominal.settings.where.alone_leaves * whole:

@@ -21,7 +21,16 @@ from diagnosis.where.excess import (
     run_excesses,
     within_bands,
 )
-from diagnosis.where.maps import ExcessMap, GroupExcess, Maps, RunMap, RunTrace
+from diagnosis.where.maps import (
+    AmplitudeExcess,
+    ExcessMap,
+    ExcessSpectrum,
+    GroupExcess,
+    Maps,
+    RunMap,
+    RunTrace,
+    TimeExcess,
+)
 from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
 from tunnel_sim.vocabulary.record import Array
 
@@ -41,13 +50,17 @@ class Survey:
     """Maps, and further figures for the text about them.
 
     Args:
-        frequency_interval: shortest interval of frequency with most of the excess, Hz.
+        time_interval: shortest interval of time with most of the excess, s; None where there is no excess.
+        amplitude_interval: shortest interval of amplitude with most of it, rad.
+        frequency_interval: shortest interval of frequency with most of it, Hz.
         moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """
 
     maps: Maps
     excesses: list[RunExcess]
+    time_interval: tuple[float, float] | None
+    amplitude_interval: tuple[float, float] | None
     frequency_interval: tuple[float, float] | None
     moment_energy: Array
     moment_z: float
@@ -113,30 +126,49 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     ]
     starts = [float(amplitude[0]) for amplitude in samples.amplitude]
     seconds, hertz = similarity.own(1.0, "s"), similarity.own(1.0, "Hz")
-    over_time, spectrum = samples.over(instants, samples.time), _spectrum(excesses, edges)
+    over_time = replace(samples.over(instants, samples.time), edges=instants * seconds)
+    swings = samples.over(np.linspace(0.0, widest, _AMPLITUDE_BINS + 1), samples.amplitude)
+    spectrum = _spectrum(excesses, edges)
     maps = Maps(
         runs=_run_maps(scaled, excesses, starts),
         groups=_groups(scaled, excesses, starts),
-        time=replace(over_time, edges=instants * seconds),
-        time_by_run=np.stack(by_run),
-        moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
-        amplitude=samples.over(np.linspace(0.0, widest, _AMPLITUDE_BINS + 1), samples.amplitude),
-        frequency=replace(spectrum, edges=edges * hertz),
-        frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
-        frequency_after=None,
-        resonance=(similarity.own(min(resonances), "Hz"), similarity.own(max(resonances), "Hz")),
+        time=TimeExcess(
+            edges_s=over_time.edges,
+            excess=over_time.mean,
+            std=over_time.std,
+            by_run=np.stack(by_run),
+            moment_share=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
+        ),
+        amplitude=AmplitudeExcess(swings.edges, swings.mean, swings.std),
+        frequency=ExcessSpectrum(
+            edges_hz=edges * hertz,
+            excess=spectrum.mean,
+            std=spectrum.std,
+            after=None,
+            by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
+            resonance_hz=(similarity.own(min(resonances), "Hz"), similarity.own(max(resonances), "Hz")),
+        ),
         bands=bands,
         lines=tuple(
-            replace(line, frequency=similarity.own(line.frequency, "Hz"))
+            replace(line, frequency_hz=similarity.own(line.frequency_hz, "Hz"))
             for line in residual_lines(excesses, runs, settings)
         ),
         backbones=tuple(backbones(nominal)),
         phase_plane=phase_plane(nominal, chosen),
-        traces=_traces(nominal, None, excesses),
         grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
         unit=similarity.reading,
+        traces=_traces(nominal, None, excesses),
     )
-    return Survey(maps, excesses, _frequency_interval(nominal, excesses, beyond), energy, z)
+    share = settings.interval_share
+    return Survey(
+        maps,
+        excesses,
+        over_time.interval(share),
+        swings.interval(share),
+        _frequency_interval(nominal, excesses, beyond),
+        energy,
+        z,
+    )
 
 
 def _moment_energy(nominal: Fit, times: Sequence[Array], instants: Array) -> tuple[Array, float]:
@@ -176,7 +208,11 @@ def _frequency_interval(
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
     """The maps with the residuals of a fit with the causes beside those of the nominal model."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
-    return replace(found.maps, frequency_after=after, traces=_traces(nominal, answer, found.excesses))
+    return replace(
+        found.maps,
+        frequency=replace(found.maps.frequency, after=after),
+        traces=_traces(nominal, answer, found.excesses),
+    )
 
 
 def _run_maps(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[RunMap, ...]:
@@ -188,8 +224,8 @@ def _run_maps(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple
             id=run.id,
             spring_stiffness=None if run.spring_stiffness is None else own(run.spring_stiffness, "N m/rad"),
             wind_speed=run.wind_speed,
-            amplitude=start,
-            frequency=own(excess.resonance, "Hz"),
+            amplitude_rad=start,
+            frequency_hz=own(excess.resonance, "Hz"),
             excess=excess.excess / run.block,
             std=excess.std / run.block,
             p_value=excess.p_value(),

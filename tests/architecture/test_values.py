@@ -53,4 +53,6 @@ def test_values_that_hold_arrays_are_not_compared(
 
 def holds_array(statement: ast.stmt) -> bool:
     """Whether a field is an array, or perhaps none."""
-    return isinstance(statement, ast.AnnAssign) and "Array" in ast.unparse(statement.annotation).split(" | ")
+    return isinstance(statement, ast.AnnAssign) and not {"Array", "Row", "Rows"}.isdisjoint(
+        ast.unparse(statement.annotation).split(" | ")
+    )

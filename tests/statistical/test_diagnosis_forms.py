@@ -79,5 +79,5 @@ def test_the_gap_is_as_large_as_it_was_made():
     form = forms_of("quadratic_damping")[0]
     case = simulated((EffectDraw(form, {}, 1, 0.0, 0.003),), 5)
     found = diagnose(as_campaign(replace(case), "size"))
-    fitted = [run["excess"] for run in found.maps["runs"]]
+    fitted = [run.excess for run in found.maps.runs]
     assert np.mean(fitted) == pytest.approx(case.excess, rel=0.05, abs=0.05)

@@ -94,7 +94,6 @@ def document() -> dict[str, Any]:
             "excess_before": 27.35,
             "excess_after": 0.1234,
             "closed": 0.9876,
-            "after_on": "in all runs, two held out",
             "closed_on": "on held-out runs",
             "runs": [
                 {"id": "alpha", "before": 31.72, "after": -0.0567, "held_out": True},
@@ -224,11 +223,13 @@ def maps() -> dict[str, Any]:
     """The pictures' data."""
     return {
         "runs": [
-            {"id": name, "spring_stiffness": spring, "wind_speed": speed, "excess": excess, "std": std}
-            for name, (spring, speed, *_), excess, std in zip(
-                IDS, CONDITIONS, (31.5, 4.5, 0.65), (0.021, 0.019, 0.017), strict=True
+            {"id": name, "spring_stiffness": spring, "wind_speed": speed, "amplitude_rad": 0.31,
+             "frequency_hz": 2.15, "excess": excess, "std": std, "p_value": 1.7e-7, "share": share}
+            for name, (spring, speed, *_), excess, std, share in zip(
+                IDS, CONDITIONS, (31.5, 4.5, 0.65), (0.021, 0.019, 0.017), (0.86, 0.12, 0.02), strict=True
             )
         ],
+        "groups": [{"by": "wind", "label": "off", "runs": 1, "excess": 31.5, "std": 0.021}],
         "time": {
             "edges_s": [0.0, 2.0, 5.0, 9.0],
             "excess": [30.0, 12.0, 3.0],
@@ -242,8 +243,10 @@ def maps() -> dict[str, Any]:
             "excess": [1.25, 80.0, -0.9],
             "std": [0.051, 0.052, 0.4],
             "after": [0.15, 0.75, 0.05],
+            "by_run": [[1.35, 85.0, -0.8], [1.15, 75.0, 0.1], [0.95, 65.0, None]],
             "resonance_hz": [1.9, 2.6],
         },
+        "bands": [{"band": "f0", "excess": 7250.0, "mean": 30.5, "p_value": 1.3e-8}],
         "lines": [
             {"run": "alpha", "frequency_hz": 50.13, "share": 0.1357, "amplitude_rad": 2.4e-4},
             {"run": "beta", "frequency_hz": 99.87, "share": 0.2468, "amplitude_rad": 8.3e-4},

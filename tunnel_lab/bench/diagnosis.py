@@ -207,7 +207,7 @@ class ShownAnswer:
             ui.label(words).classes("answer")
             ui.label(answer.verdict)
             show_facts((typeset(one.value), one.label, typeset(one.note)) for one in key_figures(answer))
-        if answer.figure_data.get("traces"):
+        if answer.maps:
             heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
             ui.element("iframe").classes("fit-frame").props(
@@ -240,7 +240,7 @@ class ShownAnswer:
                     if name in answer.pictures
                 }
             if answer.maps:
-                drawn["where-runs"] = runs_figure(answer)
+                drawn["where-runs"] = runs_figure(answer.maps)
             own = [drawing for one in answer.findings.values() for drawing in one.pictures(answer)]
             drawn |= {drawing.name: drawing.draw() for drawing in own}
             described = descriptions(answer)

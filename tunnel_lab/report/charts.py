@@ -17,7 +17,6 @@ from identification.show.drawing import (
     MARK,
     QUIET,
     SIGMAS,
-    array,
 )
 from identification.show.numbers import unit_shown
 from identification.show.style import WIDTH, figure, figure_text, grid, styled, with_breaks
@@ -45,15 +44,15 @@ _MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 def charts(answer: Findings) -> dict[str, list[Chart]]:
     """The charts of a diagnosis by the name of the figure that they replace on a screen; none without ``maps``."""
     maps = answer.maps
-    if not maps:
+    if maps is None:
         return {}
     cells, low, high = run_cells(maps)
-    labels = run_labels(maps)
-    ids = [str(run["id"]) for run in maps["runs"]]
+    labels = run_labels(maps.runs)
+    ids = [run.id for run in maps.runs]
     runs = {
         "kind": "cells",
         "title": "Excess of every run over time",
-        "x": {"label": TIME, "edges": maps["time"]["edges_s"]},
+        "x": {"label": TIME, "edges": maps.time.edges_s.tolist()},
         "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
         "labels": labels,
         "values": [_rounded(row) for row in cells],
@@ -61,14 +60,14 @@ def charts(answer: Findings) -> dict[str, list[Chart]]:
         "range": [low, high],
         "log": True,
     }
-    given = maps["frequency"]
+    given = maps.frequency
     centre = spectrum_axis(given)[1]
     none = np.full(centre.size, np.nan)
-    excess, std = array(given["excess"]), SIGMAS * array(given["std"])
-    after = none if given["after"] is None else array(given["after"])
-    views = [_filled("all runs together", centre, -std, std, excess, after)]
-    for run, label, by_bin in zip(maps["runs"], labels, given.get("by_run", []), strict=False):
-        views.append(_filled(label, centre, none, none, array(by_bin), none, run=run["id"]))
+    std = SIGMAS * given.std
+    after = none if given.after is None else given.after
+    views = [_filled("all runs together", centre, -std, std, given.excess, after)]
+    for run, label, by_bin in zip(maps.runs, labels, given.by_run, strict=True):
+        views.append(_filled(label, centre, none, none, by_bin, none, run=run.id))
     spectrum = {
         "kind": "lines",
         "title": "Residual power over noise against frequency",
@@ -84,10 +83,10 @@ def charts(answer: Findings) -> dict[str, list[Chart]]:
         "views": views,
     }
     by_figure: dict[str, list[Chart]] = {"where-runs": [runs], "where-spectrum": [spectrum]}
-    plane = maps["phase_plane"]
+    plane = maps.phase_plane
     if plane is not None:
         cells, reach, unit, _ = plane_cells(plane)
-        edges = np.degrees(plane["edges_rad"]).tolist()
+        edges = np.degrees(plane.edges_rad).tolist()
         missing = {
             "kind": "cells",
             "title": "Missing moment",
@@ -139,22 +138,22 @@ class Curves:
 
 def fitted_runs(answer: Findings, ids: Sequence[str] = ()) -> list[Curves]:
     """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
-    maps = answer.figure_data or {"runs": [], "traces": []}
-    unit, factor = unit_shown(maps.get("unit", "rad"))
-    labels = {run["id"]: label for run, label in zip(maps["runs"], run_labels(maps), strict=True)}
-    traces = {trace["id"]: trace for trace in maps["traces"] if "reading_rad" in trace}
+    maps = answer.maps
+    known = () if maps is None else maps.runs
+    labels = dict(zip((run.id for run in known), run_labels(known), strict=True))
+    traces = {} if maps is None else {trace.id: trace for trace in maps.traces}
+    unit, factor = unit_shown("rad" if maps is None else maps.unit)
     runs = []
     for name in ids or traces:
         if name not in traces:
-            known = ", ".join(traces) or "none"
-            raise TunnelError(f"the diagnosis has no run {name!r}", remedy=f"choose of its runs: {known}")
-        trace = traces[name]
-        time = array(trace["time_s"])
-        reading, before = factor * array(trace["reading_rad"]), factor * array(trace["before_rad"])
-        after = trace["after_rad"]
-        after = np.full(time.size, np.nan) if after is None else factor * array(after)
-        first, last = trace["differ_s"]
-        runs.append(Curves(name, labels.get(name, name), unit, time, reading, before, after, (first, last)))
+            all_runs = ", ".join(traces) or "none"
+            raise TunnelError(f"the diagnosis has no run {name!r}", remedy=f"choose of its runs: {all_runs}")
+        one = traces[name]
+        reading, before = factor * one.reading_rad, factor * one.before_rad
+        after = np.full(one.time_s.size, np.nan) if one.after_rad is None else factor * one.after_rad
+        runs.append(
+            Curves(name, labels.get(name, name), unit, one.time_s, reading, before, after, one.differ_s)
+        )
     return runs
 
 

@@ -47,6 +47,9 @@ def _check(found: Diagnosis) -> None:
         dimension(given.unit)
         if given.std is not None and given.std < 0.0:
             raise ValueError(f"a standard deviation is {given.std:g}")
-    units = {found.figure_data.get("unit", "rad"), *([found.gap.misfit.unit] if found.gap.misfit else [])}
+    units = {
+        *([found.maps.unit] if found.maps else []),
+        *([found.gap.misfit.unit] if found.gap.misfit else []),
+    }
     for unit in units - READING_UNITS:
         raise ValueError(f"{unit!r} is no unit of a reading")

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
+import numpy as np
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
+
+from tunnel_sim.vocabulary.columns import Array
 
 
 def from_json_fields(read: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> Any:
@@ -38,3 +41,27 @@ class _Unwritten:
 
 
 UNWRITTEN = _Unwritten()
+
+
+class _Numbers:
+    """Mark of an array that a document has as a list of numbers, or of rows; null stands for NaN."""
+
+    def __init__(self, *, rows: bool) -> None:
+        self._rows = rows
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        listed: CoreSchema = core_schema.list_schema(
+            core_schema.nullable_schema(core_schema.float_schema(allow_inf_nan=False))
+        )
+        listed = core_schema.list_schema(listed) if self._rows else listed
+        return core_schema.no_info_after_validator_function(_as_array, listed)
+
+
+def _as_array(values: list[Any]) -> Array:
+    return np.array(values, dtype=np.float64)
+
+
+Row = Annotated[Array, _Numbers(rows=False)]
+"""Shape (n,)."""
+Rows = Annotated[Array, _Numbers(rows=True)]
+"""Shape (m, n)."""

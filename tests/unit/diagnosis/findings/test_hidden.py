@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
 from diagnosis import diagnose
 from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.findings import hidden
 from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients, possible_answers
-from diagnosis.findings.hidden import Hidden, hidden_effects
+from diagnosis.findings.hidden import hidden_effects
 from diagnosis.findings.sections import printed
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
@@ -22,6 +21,7 @@ from tests.support.rendered import hidden_line, hidden_table
 from tests.support.scattered_runs import SCATTERED, scattered
 from tests.unit.diagnosis.noise.test_colour import colour, with_zero
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from, known_effects
+from tunnel_sim.files.writing import as_json
 
 
 def found_beside(data, *names):
@@ -165,7 +165,7 @@ def test_an_effect_without_a_confirmed_limit_is_listed_as_not_determined(monkeyp
     assert not found[names[1]].size.determined
     assert found[names[1]].moves == {}
 
-    both = [TypeAdapter(Hidden).dump_python(one, mode="json") for one in (found[names[1]], found[names[0]])]
+    both = [as_json(found[name]) for name in reversed(names)]
     given = findings_of(document() | {"hidden": both})
     assert [one.size.determined for one in given.hidden] == [False, True]
     drift, lag = hidden_table(given).rows

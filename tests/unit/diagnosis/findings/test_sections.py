@@ -379,8 +379,9 @@ def _all(values: Any) -> set[float]:
 
 
 def test_a_line_cannot_hold_more_than_all() -> None:
-    line = {"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}
-    assert tables.lines_table(findings_of({"gap": {}, "maps": {"lines": [line]}})).rows[0][-1] == "100 %"
+    given = document()
+    given["maps"]["lines"] = [{"run": "alpha", "frequency_hz": 50.0, "amplitude_rad": 1e-3, "share": 1.3}]
+    assert tables.lines_table(findings_of(given)).rows[0][-1] == "100 %"
     assert tables.lines_table(findings_of({"maps": None})).rows == ()
 
 

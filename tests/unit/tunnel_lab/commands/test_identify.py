@@ -131,7 +131,9 @@ def test_an_unknown_unit_or_a_lost_field_of_a_diagnosis_is_one_line(tunnel: Tunn
     spoilt[2]["coefficients"]["after"]["cn_beta"]["unit"] = "furlong"
     del spoilt[3]["maps"]["traces"][0]["time_s"]
     for given, field in zip(
-        spoilt, ("'x' is no unit of a reading",) * 2 + ("'furlong'", "cannot be drawn"), strict=True
+        spoilt,
+        ("'x' is no unit of a reading",) * 2 + ("'furlong'", "maps.traces.0.time_s: Field required"),
+        strict=True,
     ):
         (tmp_path / "answer.json").write_text(json.dumps(given))
         status, _, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "figures")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.misfit import run_labels
+from diagnosis.where.maps import RunMap
 from tests.support.diagnosis_document import IDS, findings_of
 from tunnel_lab.report.charts import charts
 
@@ -24,7 +25,7 @@ def test_the_spectrum_of_all_runs_and_of_each(given: Document) -> None:
     centres = [0.7071, 2.0, 8.0]  # Hz, √(0.5 · 1), √(1 · 4), √(4 · 16)
     whole, *each = chart["views"]
     assert [view["run"] for view in each] == list(IDS)
-    assert [view["label"] for view in each] == run_labels(given["maps"])
+    assert [view["label"] for view in each] == run_labels([RunMap(**run) for run in given["maps"]["runs"]])
     frequency, low, high, before, after = whole["data"]
     assert frequency == centres
     assert low == pytest.approx([1.0 - 3.0 * 0.051, 1.0 - 3.0 * 0.052, 0.3])  # the last below the axis

@@ -13,6 +13,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from diagnosis.findings.misfit import run_labels
+from diagnosis.where.maps import RunMap
 from identification.show.style import styled
 from tests.support import rendered
 from tests.support.diagnosis_document import CONDITIONS, IDS, document, findings_of, rms, scattering_document
@@ -20,6 +21,11 @@ from tests.support.rendered import backbone_figure, friction_figure, law_figure
 from tests.support.shown_numbers import numbers
 
 Document = dict[str, Any]
+
+
+def shown_runs(runs: list[Document]) -> list[RunMap]:
+    """The runs of the maps as values."""
+    return [RunMap(**run) for run in runs]
 
 
 def curve(line: Any) -> list[tuple[float, float]]:
@@ -113,7 +119,7 @@ def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> No
     else:
         assert [label.get_text() for label in axes.get_xticklabels()] == ["off", "13.5", "21.5"]
     assert mesh.get_clim() == pytest.approx((0.0, rms(9.25)))
-    del given["maps"]["grid"]
+    given["maps"] = None
     assert rendered.place_figure(findings_of(given)) is None
 
 
@@ -236,7 +242,7 @@ def test_backbones(given: Document) -> None:
                 assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
         assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
     labels = [line.get_label() for line in damping.lines[:2]]
-    named = run_labels(given["maps"])
+    named = run_labels(shown_runs(given["maps"]["runs"]))
     assert labels == [named[0], named[2]]
 
 
@@ -300,14 +306,16 @@ def test_no_phase_plane_no_figure(given: Document) -> None:
 
 
 def test_the_label_of_a_run_holds_its_conditions(given: Document) -> None:
-    for label, (spring, speed, *_) in zip(run_labels(given["maps"]), CONDITIONS, strict=True):
+    for label, (spring, speed, *_) in zip(
+        run_labels(shown_runs(given["maps"]["runs"])), CONDITIONS, strict=True
+    ):
         assert [n.value for n in numbers(label)] == [v for v in (spring, speed) if v]
 
 
 def test_no_label_speaks_of_wind_where_no_run_had_any(given: Document) -> None:
-    still = {"runs": [run | {"wind_speed": 0.0} for run in given["maps"]["runs"]]}
-    still["runs"][0]["spring_stiffness"] = 0.0
-    labels = run_labels(still)
+    still = [run | {"wind_speed": 0.0} for run in given["maps"]["runs"]]
+    still[0]["spring_stiffness"] = 0.0
+    labels = run_labels(shown_runs(still))
     assert labels[0] == IDS[0]
     assert not any("wind" in label for label in labels)
 
@@ -359,7 +367,7 @@ def test_friction_is_drawn_with_its_band_and_the_points_with_their_errors(given:
     assert axes.get_ylim()[0] == 0.0
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("rate [rad/s]", "coulomb friction [N m]")
     (other,) = friction_figure(
-        findings_of(given | {"maps": {"friction": found | {"unit": "rad/s2", "points": []}}})
+        findings_of(given | {"maps": given["maps"] | {"friction": found | {"unit": "rad/s2", "points": []}}})
     ).axes
     assert other.get_ylabel() == "coulomb friction [rad/s², over inertia]"
 

@@ -91,9 +91,6 @@ def test_the_unit_is_that_of_the_readings(given: Document, unit: str, shown: str
 def test_no_maps_no_fit(given: Document) -> None:
     assert fit_figure(findings_of(given | {"maps": None})) is None
     assert fit_charts(findings_of(given | {"maps": None})) == {}
-    for trace in given["maps"]["traces"]:
-        del trace["reading_rad"]  # a document of an earlier version
-    assert fit_charts(findings_of(given)) == {}
 
 
 def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ() -> None:
@@ -107,18 +104,20 @@ def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ()
     for trace in maps.traces:
         record = records[trace.id]
         since = record.time_s - record.time_s[0]
-        reading = np.interp(trace.time, since, record.yaw_rad)
+        reading = np.interp(trace.time_s, since, record.yaw_rad)
         swing = float(np.ptp(record.yaw_rad))
-        assert float(np.max(np.abs(trace.reading - reading))) < 0.05 * swing  # means over a part of a cycle
-        assert trace.after is not None
-        assert float(np.mean(trace.after**2)) < float(np.mean(trace.before**2))
-        low, high = trace.differ
-        frequency = next(run.frequency for run in maps.runs if run.id == trace.id)
+        assert (
+            float(np.max(np.abs(trace.reading_rad - reading))) < 0.05 * swing
+        )  # means over a part of a cycle
+        assert trace.after_rad is not None
+        assert float(np.mean(trace.after_rad**2)) < float(np.mean(trace.before_rad**2))
+        low, high = trace.differ_s
+        frequency = next(run.frequency_hz for run in maps.runs if run.id == trace.id)
         assert (high - low) * frequency == pytest.approx(6.0, rel=1e-6)
-        energy = (trace.before - trace.after) ** 2
-        inside = (trace.time >= low) & (trace.time <= high)
+        energy = (trace.before_rad - trace.after_rad) ** 2
+        inside = (trace.time_s >= low) & (trace.time_s <= high)
         elsewhere = [
-            float(energy[(trace.time >= start) & (trace.time <= start + high - low)].sum())
-            for start in trace.time[trace.time <= trace.time[-1] - (high - low)]
+            float(energy[(trace.time_s >= start) & (trace.time_s <= start + high - low)].sum())
+            for start in trace.time_s[trace.time_s <= trace.time_s[-1] - (high - low)]
         ]
         assert float(energy[inside].sum()) >= (1.0 - 1e-9) * max(elsewhere)
