@@ -249,7 +249,8 @@ def _within(
     outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
     moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
     by_chance = own_gain(start.problem) - own_gain(fit.problem)
-    return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0), max(-float(lowest), 0.0))
+    # zero first: of two equal numbers max takes the first, and this one is not negative
+    return _Size(outermost * size, moved, max(0.0, -lowest - by_chance), max(0.0, -float(lowest)))
 
 
 def _real_roots(polynomial: Array) -> list[float]:

@@ -11,7 +11,7 @@ from diagnosis.findings.finding import Answered, Finding, Picture
 from diagnosis.findings.judged import Judged
 from identification.show.blocks import Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
-from identification.show.numbers import estimated, listed
+from identification.show.numbers import estimated, listed, significant, with_std
 from identification.show.quantity import Quantity
 from identification.show.style import INTERVAL, figure, grid, styled
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -46,7 +46,7 @@ class WhatItCosts(Finding):
         moments: of the coefficients that the runs determine.
     """
 
-    after: ClassVar[str] = "coefficients-section"
+    after: ClassVar[str] = "uncertainty"
 
     wind_speed: float
     moments: tuple[AirMoment, ...]
@@ -128,10 +128,19 @@ def _said(one: AirMoment) -> str:
 
 
 def _error(one: AirMoment) -> str:
-    """The error of the nominal model as a share of the moment with the causes; empty where one is at a bound."""
-    if one.before.bound or one.after.bound or not one.after.value:
+    """The error of the nominal model in per cent of the moment with the causes; empty where one is at a bound.
+
+    ± spans the 95 % interval, as if the two estimates were independent.
+    """
+    before, after = one.before, one.after
+    if before.bound or after.bound or not after.value:
         return ""
-    return f"{100.0 * (one.before.value / one.after.value - 1.0):+.2g} %"
+    ratio, std = before.value / after.value, None
+    if before.std is not None and after.std is not None:
+        std = 100.0 * INTERVAL * math.hypot(before.std / after.value, ratio * after.std / after.value)
+    error = 100.0 * (ratio - 1.0)
+    shown = significant(error, 2) if std is None else with_std(error, std)
+    return f"{'+' if error > 0.0 else ''}{shown} %"
 
 
 @styled

@@ -190,3 +190,17 @@ def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant
     (drift,) = (one for one in found.hidden if one.effect == "sensor_drift")
     assert drift.significance > 5.0
     assert abs(drift.size.value) > 1.5e-3
+
+
+def test_an_effect_of_one_sign_that_the_runs_pull_below_zero_has_a_significance_of_zero():
+    one_sided = (
+        "free_play",
+        "sensor_hysteresis",
+        "coulomb_friction",
+        "structural_damping",
+        "quadratic_damping",
+    )
+    _, found = found_beside(campaign(), *one_sided)
+    none = [one for one in found.values() if one.size.determined and one.significance == 0.0]
+    assert none
+    assert [str(one.significance) for one in none] == ["0.0"] * len(none)

@@ -73,7 +73,8 @@ def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_error() -> None:
     assert isinstance(words, Paragraph)
     assert isinstance(table, TextTable)
     assert "yaw rate. Here ± spans the 95 % interval." in words.text
-    assert table.rows[0][-1] == "+25 %"
+    error = 196.0 * math.hypot(0.01 / 0.4, 0.5 * 0.002 / 0.4**2)  # of a ratio, by its two parts
+    assert table.rows[0][-1] == f"+25.0 ± {error:.1f} %"
     assert table.rows[1][-1] == "–"
     assert "(at its lower bound)" in table.rows[1][1]
 
@@ -86,7 +87,7 @@ def test_every_face_and_the_document_have_it() -> None:
     jsonschema.Draft202012Validator(schema_of("diagnosis")).validate(written)
     assert Diagnosis.from_json_dict(written).costs == costs
     keys = [section.key for section in sections(answer)]
-    assert keys.index("costs") == keys.index("coefficients-section") + 1
+    assert keys.index("costs") == keys.index("uncertainty") + 1
     assert "At 21.5 m/s the moment of the air is" in str(answer)
     assert answer.plot("costs").axes
     assert "costs" not in [section.key for section in sections(given)]
