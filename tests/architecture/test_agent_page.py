@@ -10,7 +10,7 @@ import pytest
 from docs.studies.campaign_agent import fill
 from docs.studies.learning_curves import curves, from_csv
 from docs.studies.learning_curves import fill as filled_with_curves
-from tests.architecture.test_tutorials import printed, steps
+from docs.studies.quotes import printed, quotes
 from tunnel_lab.envs.policies import packaged_agent
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -61,17 +61,18 @@ def test_the_curves_are_drawn() -> None:
 
 def test_the_first_example_prints_what_is_shown(tmp_path: Path) -> None:
     """And an agent read from a file, here the packaged one, chooses the same runs."""
-    (code, text), (reading, _), *_ = steps(PAGE)
+    first, reading, *_ = quotes(PAGE.read_text("utf-8"))
     own = packaged_agent()
     (tmp_path / "agent.safetensors").write_bytes(own.to_bytes())
-    assert printed([code, reading], tmp_path) == [text, "7 runs, 6.5 nats\n"]
-    assert "trained: 7 runs, " in text
+    assert printed([first.source, reading.source], tmp_path) == [first.shown, "7 runs, 6.5 nats\n"]
+    assert "trained: 7 runs, " in first.shown
 
 
 @pytest.mark.slow
 def test_the_bridge_of_the_page_runs(tmp_path: Path) -> None:
     """With so few steps that it takes seconds."""
-    code, text = steps(PAGE)[2]
+    bridge = quotes(PAGE.read_text("utf-8"))[2]
+    code, text = bridge.source, bridge.shown
     assert code.count("STEPS = 80_000") == 1
     (said,) = printed([code.replace("80_000", "6_400")], tmp_path)
     assert said.splitlines()[0] == text.splitlines()[0]

@@ -6,11 +6,7 @@ import inspect
 import re
 from pathlib import Path
 
-import pytest
-
 from tests.architecture.test_env_pages import rows
-from tests.architecture.test_readme import assert_same
-from tests.architecture.test_tutorials import printed, steps
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "reference" / "envs" / "campaign.md"
@@ -20,16 +16,6 @@ TEXT = PAGE.read_text(encoding="utf-8")
 def test_the_page_has_every_section() -> None:
     wanted = ["Action", "Observation", "Reward", "Start", "End", "Arguments", "Version history"]
     assert re.findall(r"^## (.*)$", TEXT, re.MULTILINE) == wanted
-
-
-@pytest.mark.slow
-def test_the_code_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
-    shown = steps(PAGE)
-    real = printed([code for code, _ in shown], tmp_path)
-    assert len(shown) == len(real) == 2
-    for (_, text), output in zip(shown, real, strict=True):
-        assert text.strip()
-        assert_same(text.splitlines(), output.splitlines())
 
 
 def test_the_arguments_are_those_of_the_code() -> None:

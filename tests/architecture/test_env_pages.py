@@ -7,11 +7,6 @@ from dataclasses import fields
 from math import pi
 from pathlib import Path
 
-import pytest
-
-from tests.architecture.test_readme import assert_same
-from tests.architecture.test_tutorials import printed, steps
-
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "envs" / "free-decay.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 
@@ -27,24 +22,6 @@ def test_the_page_has_every_section() -> None:
     found = re.findall(r"^## (.*)$", TEXT, re.MULTILINE)
     wanted = ["Action", "Observation", "Reward", "Start", "End", "Arguments", "Version history"]
     assert [heading for heading in found if heading in wanted] == wanted
-
-
-@pytest.mark.slow
-def test_the_code_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
-    shown = [(code, text) for code, text in steps(PAGE) if "diagnosis" not in code]
-    real = printed([code for code, _ in shown], tmp_path)
-    assert len(shown) == len(real) == 5
-    for (_, text), output in zip(shown, real, strict=True):
-        assert_same(text.splitlines(), output.splitlines())
-
-
-@pytest.mark.slow
-def test_the_diagnosis_is_what_is_shown(tmp_path: Path) -> None:
-    every = steps(PAGE)
-    last = next(place for place, (code, _) in enumerate(every) if "diagnose" in code)
-    shown = every[: last + 1]
-    real = printed([code for code, _ in shown], tmp_path)
-    assert_same(shown[-1][1].splitlines(), real[-1].splitlines())
 
 
 def test_the_arguments_are_those_of_the_code() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import typer.main
 
-from tests.architecture.test_readme import BLOCK, script_output
+from docs.studies.quotes import BLOCK, printed
 from tunnel_lab.cli import app
 
 ROOT = Path(__file__).parents[2]
@@ -59,7 +59,7 @@ def test_the_code_of_the_first_page_runs(tmp_path: Path) -> None:
     (code,) = [
         text for kind, text in BLOCK.findall((DOCS / "index.md").read_text("utf-8")) if kind == "python"
     ]
-    assert script_output(code, tmp_path) == ""
+    assert printed([code], tmp_path) == [""]
 
 
 def test_the_gallery_has_every_figure_that_a_page_shows() -> None:

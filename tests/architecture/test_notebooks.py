@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.architecture.test_readme import assert_same
+from docs.studies.quotes import difference
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -60,4 +60,4 @@ def test_the_stored_outputs_are_those_of_a_run(path: Path) -> None:
 
     fresh = [cell for cell in executed(path)["cells"] if cell["cell_type"] == "code"]
     for stored, real in zip(printed(code_cells(path)), printed(fresh), strict=True):
-        assert_same(stored, real)
+        assert difference(stored, real) == "", f"run: python -m docs.studies.notebooks {path.stem}"
