@@ -24,7 +24,8 @@ def diagnosis_schema() -> Schema:
     for name, rearrange in _REARRANGED.items():
         rearrange(found["$defs"][name])
     fields = found["properties"]
-    del fields["data"], fields["decision"], fields["waterfall"], fields["friction"]
+    del fields["data"], fields["decision"], fields["waterfall"]
+    found["$defs"]["Maps"]["properties"]["friction"] = fields.pop("friction")
     fields |= {"schema_version": {"const": SCHEMA_VERSION}}
     fields |= _decision(found["$defs"].pop("Decision")) | _waterfall(found["$defs"].pop("Waterfall"))
     found["required"] = sorted(fields)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from diagnosis.findings import answers, closure, coefficients, place, remainder, symbols
+from diagnosis.findings import answers, closure, coefficients, place, place_figures, remainder, symbols
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
 
@@ -143,4 +143,4 @@ repeatability_figure, runs_figure, profiles_figure = (
 )
 spectrum_figure, backbone_figure = drawn("where-spectrum"), drawn("where-backbones")
 phase_plane_figure, moment_figure = drawn("where-phase-plane"), drawn("where-moment")
-place_figure = place.place_figure
+place_figure = place_figures.place_figure

@@ -228,7 +228,7 @@ class ShownAnswer:
         """The figures of the report's summary."""
 
         def drawings() -> list[str]:
-            from diagnosis.findings.place import runs_figure
+            from diagnosis.findings.place_figures import runs_figure
             from identification.show.drawing import inline_svg
             from tunnel_lab.report.page import descriptions
 

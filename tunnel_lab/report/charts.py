@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.findings.misfit import run_labels
-from diagnosis.findings.place import ANGLE, LEAST_POWER, RATE, TIME, plane_cells, run_cells, spectrum_axis
+from diagnosis.findings.place_figures import (
+    ANGLE,
+    LEAST_POWER,
+    RATE,
+    TIME,
+    plane_cells,
+    run_cells,
+    spectrum_axis,
+)
 from diagnosis.findings.whole import Findings
 from identification.show.drawing import (
     AFTER,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.finding import Picture
-from diagnosis.findings.place import place_figure
+from diagnosis.findings.place_figures import place_figure
 from diagnosis.findings.whole import Findings
 from tunnel_lab.report import charts
 
