@@ -179,21 +179,28 @@ def _run(words: Sequence[str], folder: Path) -> str:
     )
     if done.returncode:
         raise RuntimeError(f"{' '.join(words)[:80]}: {done.stderr}")
-    return done.stdout
+    return "".join(f"{line.rstrip()}\n" for line in done.stdout.splitlines())
 
 
 def main() -> None:
     """Refresh the named pages, or all."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", help="pages without .md; default: all")
+    failed = 0
     for name in parser.parse_args().names or pages():
         path = path_of(name)
         page = path.read_text("utf-8")
-        with tempfile.TemporaryDirectory() as folder:
-            new = refreshed(page, outputs(page, Path(folder)))
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                new = refreshed(page, outputs(page, Path(folder)))
+        except RuntimeError as error:
+            failed += 1
+            print(f"Failed: {path}: {error}", flush=True)
+            continue
         if new != page:
             path.write_text(new, "utf-8")
         print(f"{'Written' if new != page else 'Unchanged'}: {path}", flush=True)
+    sys.exit(failed > 0)
 
 
 if __name__ == "__main__":
