@@ -44,7 +44,7 @@ from tunnel_sim.files.from_json import UNWRITTEN
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 SCHEMA_VERSION = 1
 _LAST = (
@@ -291,11 +291,12 @@ class Findings:
         """
         check_shape(data, where, remedy)
         with as_described("is not a diagnosis", where, remedy):
-            found = cast(
-                Self, _adapter(cast(Any, cls)).validate_json(json.dumps(_by_field(data)), strict=True)
-            )
-        for place in _unknown_keys(data, found.to_json_dict()):
-            raise TunnelError(f"is not a diagnosis ({place}: unknown key)", where=where, remedy=remedy)
+            adapter = _adapter(cast(Any, cls))
+            found = cast(Self, adapter.validate_json(json.dumps(_by_field(data)), strict=True))
+            unknown = next(_unknown_keys(data, found.to_json_dict()), "")
+        if unknown:
+            what = f"is not a diagnosis ({one_line(unknown, 60)}: unknown key)"
+            raise TunnelError(what, where=where, remedy=remedy)
         return found
 
 
