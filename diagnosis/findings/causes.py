@@ -84,18 +84,15 @@ class NamedCauses:
         said = {info.unit: given[info.name].unit for info in kind.parameters() if info.name in given}
 
         def text(value: float, std: float | None, unit: str) -> str:
-            return for_people(
-                value, std, said.get(unit, unit)
-            )  # moments are per unit inertia where no inertia is stated
+            # moments are per unit inertia where no inertia is stated
+            return for_people(value, std, said.get(unit, unit))
 
         return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
 
     def advice(self, name: str) -> str:
         """What to do about a cause, with the values that it names, without a full stop."""
-        robot = self.robot
-        said = {kind.name: (robot and kind.advice_for_joint) or kind.advice for kind in known_effects()}.get(
-            name
-        )
+        kind = {kind.name: kind for kind in known_effects()}.get(name)
+        said = "" if kind is None else (self.robot and kind.advice_for_joint) or kind.advice
         if not said:
             return f"Repair or model the cause of {plain(name)}"
         values = _parameters(self.candidates[0], name)
@@ -107,7 +104,7 @@ class NamedCauses:
     def _parted(self, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
         """Effects common to all likely answers, and the further effects of each answer with its probability.
 
-        Causes detected in the records before the fits are part of every self.
+        Causes detected in the records before the fits are part of every answer.
         """
         least = self.rivals_from
         first, *others = self.candidates
