@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import (
     EQUATION,
@@ -22,7 +22,7 @@ from tunnel_sim.effects.parameters import (
     ramp,
     settling,
 )
-from tunnel_sim.physics.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings, Series
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
@@ -205,7 +205,7 @@ class WindSpeedOffset(Effect):
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """An offset that leaves at least half of the slowest wind: without wind no derivative can be fitted."""
-        at_most = 0.5 * campaign.slowest_wind
+        at_most = 0.5 * min(campaign.wind_speeds, default=0.0)
         return [dataclasses.replace(trial, at_most=at_most) for trial in super().trials(campaign)]
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
