@@ -399,7 +399,13 @@ class NominalModel:
             found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
             found.append(
-                "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
+                "a lag, a wind-speed offset or a dependence of Cnβ on the speed: there is one wind speed only, and "
+                "Cnβ and Cnr absorb them"
+            )
+        elif len(speeds) == _TOLD_BY:
+            found.append(
+                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
+                "two wind speeds only"
             )
         if self.windy and all(run.wind_on for run in data.runs):
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
