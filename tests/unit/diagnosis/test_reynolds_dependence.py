@@ -1,4 +1,4 @@
-"""A coefficient that depends on the speed. Truth: MuJoCo campaigns of chosen k, and the definition of the effect."""
+"""A coefficient that depends on the speed. Truth: MuJoCo campaigns with chosen k, and the definition."""
 
 from __future__ import annotations
 
