@@ -44,6 +44,7 @@ class Form:
         draw: draws secondary parameters, including random seeds.
         limits: least and greatest magnitude of the severity parameter.
         driven: whether it acts on driven runs only.
+        edition: of the catalogue in which it joined; a published set is drawn from the catalogue of its time.
     """
 
     family: str
@@ -56,6 +57,7 @@ class Form:
     draw: Draw = nothing
     limits: tuple[float, float] = (1e-9, 1e9)
     driven: bool = False
+    edition: int = 1
 
 
 def spread(value: float | Array, conditions: TrueConditions) -> Array:

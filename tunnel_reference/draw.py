@@ -10,7 +10,7 @@ import numpy as np
 from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.departures import draw_departures
 from tunnel_reference.driven_inputs import draw_inputs
-from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
+from tunnel_reference.forms import EDITION, FAMILIES, families, forms_of
 from tunnel_reference.forms_actuators import ACTUATORS
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.scatter_draws import MIXED, ScatterDraw, draw_scatter
@@ -155,6 +155,7 @@ class Mixture:
         level: of these differences, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
         normal: probability that they are normally distributed; ``rare`` is the probability of a rare other form.
+        edition: of the catalogue of forms.
     """
 
     textbook: float = 0.5
@@ -168,11 +169,12 @@ class Mixture:
     level: str = MIXED
     stated: float = 0.5
     normal: float = 0.5
+    edition: int = EDITION
 
     @property
     def families(self) -> tuple[str, ...]:
         """The families from which effects are drawn."""
-        return DRIVEN_FAMILIES if self.driven else FAMILIES
+        return families(driven=self.driven, edition=self.edition)
 
 
 def draw_campaign(
@@ -248,7 +250,8 @@ def draw_families(
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
     """The common or the rare forms, as drawn from the mixture; not empty unless there are none at all."""
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
-    other, known = Group.COMMON, [f for f in forms if mixture.driven or not f.driven]
+    other = Group.COMMON
+    known = [f for f in forms if f.edition <= mixture.edition and (mixture.driven or not f.driven)]
     return [f for f in known if f.group is group] or [f for f in known if f.group is other]
 
 

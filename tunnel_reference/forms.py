@@ -14,9 +14,24 @@ _MODULES = [
     if module.name.startswith("forms_")
 ]
 FORMS: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
-FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS if not form.driven}))
-DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
-"""Forms for driven runs."""
+EDITION = max(form.edition for form in FORMS)
+"""The latest edition of the catalogue."""
+
+
+def families(*, driven: bool, edition: int = EDITION) -> tuple[str, ...]:
+    """The families of an edition, in the order of the alphabet.
+
+    Args:
+        driven: whether to include families that act on driven runs only.
+    """
+    named = {form.family for form in FORMS if form.edition <= edition and (driven or not form.driven)}
+    return tuple(sorted(named))
+
+
+FAMILIES = families(driven=False)
+"""The families of free decays."""
+DRIVEN_FAMILIES = families(driven=True)
+"""The families of driven runs."""
 
 
 def forms_of(family: str) -> tuple[Form, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tunnel_reference import moments as m
@@ -50,6 +52,12 @@ def _wagner(p: float, e: Extra, c: TrueConditions) -> dict[str, float | Array]:
     return {"w1": e["w1"], "w2": 1.0 - e["w1"], "tau1": lag_time(p, c), "tau2": lag_time(p * e["ratio"], c)}
 
 
+def _e_folds(c: TrueConditions) -> Array:
+    """ln(V/V0) of every run, with the mean stated speed V0 of the runs with the wind on; 0 in still air."""
+    mean = float(np.mean(c.wind_speed[c.wind_on])) if np.any(c.wind_on) else 1.0
+    return np.log(np.where(c.wind_on, c.wind_speed, mean) / mean)
+
+
 _SPEED = (
     Form("unsteady_aero_lag", "lag", T, "a, l/V", 0.2,
          moving(m.lag_one, Phase.ANGLE, lambda p, _e, c: {"w1": 1.0, "tau1": lag_time(p, c)}, states=1)),
@@ -75,6 +83,16 @@ _SPEED = (
          draw=lambda _g, _c: {"exponent": 0.0}),
     Form("wind_speed_offset", "falling", C, "ΔV, m/s", 0.03, calibration(speed_offset), _BOTH,
          draw=lambda g, _c: {"exponent": g.uniform(0.2, 0.5)}),
+    Form("reynolds_dependence", "logarithmic", T, "k", 0.01,
+         calibration(lambda p, _e, c: replace(c, cn_beta_scale=1.0 + p * _e_folds(c))), _BOTH,
+         limits=(1e-5, 1.0), edition=3),
+    Form("reynolds_dependence", "power", C, "k", 0.01,
+         calibration(lambda p, _e, c: replace(c, cn_beta_scale=np.exp(p * _e_folds(c)))), _BOTH,
+         limits=(1e-5, 1.0), edition=3),
+    Form("reynolds_dependence", "critical", R, "k", 0.01,
+         calibration(lambda p, e, c: replace(
+             c, cn_beta_scale=1.0 + p * e["width"] * np.tanh(_e_folds(c) / e["width"]))), _BOTH,
+         draw=lambda g, _c: {"width": g.uniform(0.3, 1.0)}, limits=(1e-5, 1.0), edition=3),
     Form("flow_misalignment", "steady", T, "βf, rad", 0.01,
          moving(m.steady_moment, Phase.MOMENT, lambda p, _e, c: {"moment": c.air_stiffness * p}), _BOTH),
     Form("flow_misalignment", "speed_dependent", C, "βf, rad", 0.01,

@@ -115,6 +115,7 @@ class TrueConditions:
         sample_rate: Hz.
         stiffness_scale: true over stated stiffness.
         speed_offset: true minus stated speed where the wind is on, m/s.
+        cn_beta_scale: Cnβ of the run over the campaign's.
         rod: the flexible rod; None where it is rigid.
         noise_corner: corner frequency of the coloured part of the noise, Hz.
         coloured_share: share of the noise's variance that is coloured.
@@ -156,6 +157,7 @@ class TrueConditions:
     sample_rate: float = 1000.0
     stiffness_scale: Array = field(default_factory=lambda: np.ones(1))
     speed_offset: Array = field(default_factory=lambda: np.zeros(1))
+    cn_beta_scale: Array = field(default_factory=lambda: np.ones(1))
     rod: TwistingRod | None = None
     noise_corner: float = 10.0
     coloured_share: float = 0.0
@@ -238,7 +240,7 @@ class TrueConditions:
     @property
     def air_stiffness(self) -> Array:
         """Ka = ½ρV²Al Cnβ, N m/rad, shape (runs,)."""
-        return self.reference_moment * self.cn_beta
+        return self.reference_moment * self.cn_beta * self.cn_beta_scale
 
     @property
     def air_damping(self) -> Array:

@@ -16,6 +16,7 @@ from tunnel_reference.scatter_draws import MIXED
 REAL = "real"
 _ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
 _RANDOM = ("buffeting", "vortex_shedding")
+_CATALOGUE = 1  # edition of the forms of the reference simulator when the sets were drawn
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
         level=track.level,
         stated=track.stated,
         normal=track.normal,
+        edition=_CATALOGUE,
     )
     draws = []
     for index, kind in enumerate(plan_kinds(count, dict(track.kinds))):

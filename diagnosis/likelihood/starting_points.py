@@ -20,6 +20,7 @@ from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
+from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.record import Array
 
 _HELD = 1e18  # precision of fixed deviations
@@ -300,7 +301,7 @@ def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]
 def _circumstances(base: Fit) -> Circumstances:
     data = base.problem.data
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
-    slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
+    speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
     moment, rate = 0.0, 0.0
     for run, own in zip(data.runs, base.point.per_run, strict=True):
         if run.drive is not None and run.drive.through_actuator:
@@ -308,7 +309,7 @@ def _circumstances(base: Fit) -> Circumstances:
             assert drive is not None
             own_moment, own_rate = drive.greatest
             moment, rate = max(moment, own_moment), max(rate, own_rate)
-    return Circumstances(data.springs, greatest, data.model.per_inertia, slowest, moment, rate)
+    return Circumstances(data.springs, greatest, data.model.per_inertia, tuple(sorted(speeds)), moment, rate)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:

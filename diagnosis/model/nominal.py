@@ -21,9 +21,9 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign, speed_groups
+from tunnel_sim.vocabulary.campaign import Campaign, mean_wind_speed, speed_groups
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
@@ -54,11 +54,13 @@ class NominalModel:
 
     Args:
         windy: whether the wind is on in any run of the campaign.
+        mean_speed: of the campaign's runs with the wind on, m/s.
         own_zeros: whether every run has a zero of the sensor of its own.
         unknown_gain: whether a run of the campaign has an input whose gain is fitted.
     """
 
     windy: bool = False
+    mean_speed: float = REFERENCE_SPEED
     own_zeros: bool = False
     unknown_gain: bool = False
 
@@ -86,6 +88,7 @@ class NominalModel:
         return dataclasses.replace(
             self,
             windy=any(run.wind_on for run in campaign.runs),
+            mean_speed=mean_wind_speed((run.wind_speed for run in campaign.runs), REFERENCE_SPEED),
             own_zeros=campaign.sensor.zero == "per_run" and self.restored and "zero" not in self.held,
             unknown_gain=any(run.drive is not None and self.fits_gain(run.drive) for run in campaign.runs),
         )
@@ -222,6 +225,7 @@ class NominalModel:
             "yaw_inertia": values.get("yaw_inertia", 1.0),
             "wind_speed": [run.wind_speed for run in runs],
             "air_density": [run.air_density for run in runs],
+            "mean_speed": self.mean_speed,
             "duration": [run.duration for run in runs],
             **{name: values[name] for name in ("mechanical_damping", "release_angle", "release_rate")},
             **{name: values[name] for name in ("cn_beta", "cn_r") if name in values},
@@ -395,7 +399,13 @@ class NominalModel:
             found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
             found.append(
-                "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
+                "a lag, a wind-speed offset or a dependence of Cnβ on the speed: there is one wind speed only, and "
+                "Cnβ and Cnr absorb them"
+            )
+        elif len(speeds) == _TOLD_BY:
+            found.append(
+                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
+                "two wind speeds only"
             )
         if self.windy and all(run.wind_on for run in data.runs):
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
@@ -442,6 +452,9 @@ def _program(text: str, spring: float) -> tuple[float, ...]:
 
 
 _OF_A_DECAY = 2  # numbers that a run determines: its frequency and its damping
+_TOLD_BY = (
+    2  # wind speeds: an offset of the speed and a coefficient that depends on it both fit two stiffnesses
+)
 _PHASES = 64  # of a cycle, for its mean
 ALWAYS_BLIND = (
     "a constant sensor lag or filter: it only shifts the release",

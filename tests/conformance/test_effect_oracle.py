@@ -95,6 +95,7 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("sensor_drift", {"drift": -0.01}, RUN),
     ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
     ("wind_speed_offset", {"offset": -1.5}, RUN),
+    ("reynolds_dependence", {"per_e_fold": -0.3}, replace(RUN, speed=8.0)),
     ("stiffness_scatter", {"spread": 0.05}, replace(RUN, speed=0.0)),
     ("damping_scatter", {"spread": 0.1}, replace(RUN, speed=0.0)),
 ]

@@ -43,6 +43,7 @@ def settings(run: Setting) -> RunSettings:
         oracle.DAMPING,
         wind_speed=run.speed,
         air_density=oracle.DENSITY,
+        mean_speed=oracle.MEAN_SPEED,
         release_angle=run.release,
         duration=run.duration,
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import exp, hypot, pi, sin, sqrt, tanh
+from math import exp, hypot, log, pi, sin, sqrt, tanh
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from tests.reference.linear_rig import response
 AREA, LENGTH, WIDTH = 0.036, 0.625, 0.225  # m2, m, m: Table I
 INERTIA, DAMPING = 0.1014, 0.018  # kg m2, N m s/rad
 CN_BETA, CN_R, DENSITY = 0.4719, -0.1033, 1.204  # 1/rad, 1/rad, kg/m3
+MEAN_SPEED = 15.0  # m/s, of the runs of the campaign
 ROD_DAMPING_RATIO = 0.01
 
 Parameters = Mapping[str, float]
@@ -158,6 +159,9 @@ ADDED: dict[str, Callable[[Parameters, Setting, float], Moment]] = {
     "nonlinear_yaw_moment": lambda p, run, _: lambda _t, b, _r: _ka(run) * p["coefficient"] * b**3,
     "nonlinear_yaw_damping": lambda p, run, _: (
         lambda _t, b, r: air_damping(run.speed) * p["coefficient"] * b**2 * r
+    ),
+    "reynolds_dependence": lambda p, run, _: (
+        lambda _t, b, _r: _ka(run) * p["per_e_fold"] * log(run.speed / MEAN_SPEED) * b
     ),
     "flow_misalignment": lambda p, run, _: lambda _t, _b, _r: _ka(run) * p["angle"],
     "vortex_shedding": _shedding,

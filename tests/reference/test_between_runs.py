@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import fields, replace
 
 import numpy as np
@@ -176,3 +179,22 @@ def test_effects_are_sized_without_the_scatter(monkeypatch):
     assert not np.any(plain.draw.conditions.speed_deviation)
     assert np.any(other.draw.conditions.speed_deviation)
     assert plain.draw.effects[0].value == other.draw.effects[0].value
+
+
+def test_no_hash_decides_the_order_of_draws():
+    """Sets of names are iterated in another order in every process; the draws must not be."""
+    program = (
+        "import numpy as np; from tunnel_reference.scatter_draws import FORMS, USUAL\n"
+        "for name, (_, draw) in FORMS.items():\n"
+        "    found = draw(np.random.default_rng(1), USUAL, 3)\n"
+        "    print(name, sorted((of, values.tolist()) for of, values in found.items()))"
+    )
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for seed in (0, 1, 2, 5)
+    }  # fmt: skip
+    assert len(said) == 1

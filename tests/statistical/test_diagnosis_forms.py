@@ -31,6 +31,7 @@ CASES = {
     "sensor_nonlinearity": ("sine", {}, -1, 0.2),
     "sensor_drift": ("warming", {"part": 0.5}, 1, 0.004),
     "wind_speed_offset": ("falling", {"exponent": 0.3}, 1, 0.3),
+    "reynolds_dependence": ("power", {}, 1, 0.05),
 }
 
 

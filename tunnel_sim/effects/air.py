@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import log, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
+from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import (
     EQUATION,
@@ -22,7 +22,7 @@ from tunnel_sim.effects.parameters import (
     ramp,
     settling,
 )
-from tunnel_sim.physics.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings, Series
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
@@ -141,6 +141,58 @@ class UnsteadyAeroLag(Effect):
 
 
 @dataclass(frozen=True)
+class ReynoldsDependence(Effect):
+    """A yaw moment coefficient that depends on the wind speed."""
+
+    name = "reynolds_dependence"
+    place = 34
+    channel = "stiffness"
+    condition = "wind_on"
+    size = "a Cnβ that changes by {per_e_fold} per e-fold of the wind speed"
+    advice = "State Cnβ for every wind speed, or measure at the Reynolds number of interest"
+    equation = "Cnβ (1 + k ln(V/V0)) instead of Cnβ; V0: mean wind speed of the campaign's wind-on runs"
+    signature = (
+        "The aerodynamic stiffness is not proportional to the square of the speed, and the damping is as "
+        "without it."
+    )
+    references = (
+        "Schewe, J. Wind Eng. Ind. Aerodyn. 89 (2001) 1267",
+        "Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",
+    )
+    example = (0.2,)
+    caveat = "Cnβ is the value at the mean wind speed of the runs with the wind on."
+
+    per_e_fold: float = parameter(
+        "k", "1", "relative change of Cnβ per e-fold of the wind speed",
+        scale=0.05, lower=-5.0, upper=5.0, relative=True,
+    )  # fmt: skip
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """None with one wind speed, whose Cnβ it leaves as it is."""
+        return super().trials(campaign) if len(campaign.wind_speeds) > 1 else ()
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Use the coefficient at the stated speed."""
+        del drawn
+        if stated.wind_speed <= 0.0:
+            return run
+        factor = 1.0 + self.per_e_fold * log(stated.wind_speed / stated.mean_speed)
+        changed = dataclasses.replace(run.derivatives, cn_beta=factor * run.derivatives.cn_beta)
+        return dataclasses.replace(run, derivatives=changed)
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Use the coefficients at the stated speeds."""
+        del drawn
+        on = stated.wind_speed > 0.0
+        share = np.where(on, stated.wind_speed, 1.0) / np.where(on, stated["mean_speed"], 1.0)
+        runs["cn_beta"][:] *= 1.0 + cls.column(effects, "per_e_fold") * np.log(share)
+
+
+@dataclass(frozen=True)
 class FlowMisalignment(Effect):
     """Flow at an angle to the rig's axis, which gives a steady yaw moment."""
 
@@ -205,7 +257,7 @@ class WindSpeedOffset(Effect):
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """An offset that leaves at least half of the slowest wind: without wind no derivative can be fitted."""
-        at_most = 0.5 * campaign.slowest_wind
+        at_most = 0.5 * min(campaign.wind_speeds, default=0.0)
         return [dataclasses.replace(trial, at_most=at_most) for trial in super().trials(campaign)]
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:

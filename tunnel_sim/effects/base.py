@@ -19,9 +19,6 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 
-REFERENCE_SPEED = 20.0
-"""Wind speed at which a speed-dependent form equals the textbook form, m/s."""
-
 SPRING_TOLERANCE = 1e-6
 """Relative difference below which two stiffnesses belong to the same spring."""
 

@@ -164,7 +164,7 @@ class Circumstances:
 
     Args:
         greatest_reading: greatest absolute reading of any run, rad.
-        slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
+        wind_speeds: settings of the wind, m/s, the slowest first; empty without wind.
         greatest_moment: greatest demand of an input, N m, from the fit without the effect; 0 if none moves the
             body.
         fastest_moment: greatest demanded rate of change of an input, N m/s, from sample to sample.
@@ -173,7 +173,7 @@ class Circumstances:
     springs: tuple[float, ...]
     greatest_reading: float
     normalised: bool
-    slowest_wind: float
+    wind_speeds: tuple[float, ...]
     greatest_moment: float = 0.0
     fastest_moment: float = 0.0
 

@@ -37,7 +37,7 @@ INTEGRATION_TOLERANCE = 2e-5
 SENSOR = SensorModel(zero=0.003)
 WIND_ON = RunSettings(
     16.12, AeroDerivatives(0.47, -0.3), 0.1014, 0.018,
-    wind_speed=20.0, air_density=1.204, release_angle=0.35, duration=1.0,
+    wind_speed=20.0, air_density=1.204, mean_speed=15.0, release_angle=0.35, duration=1.0,
 )  # fmt: skip
 WIND_OFF = replace(WIND_ON, wind_speed=0.0)
 _TIME = np.arange(0.0, WIND_ON.duration, 1.0 / SENSOR.sample_rate)

@@ -18,9 +18,9 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.drive import DriveMoment
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings
 from tunnel_sim.vocabulary.between_runs import along, between_runs, together
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties, mean_wind_speed
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
@@ -126,10 +126,11 @@ def _drawn(plan: CampaignPlan) -> list[_Drawn]:
     runs = len(plan.conditions)
     seeds = np.random.SeedSequence(plan.seed).spawn(runs)
     deviations = plan.scatter.deviations(between_runs(np.random.SeedSequence(plan.seed)), along(runs))
+    speed = mean_wind_speed((condition.wind_speed for condition in plan.conditions), REFERENCE_SPEED)
     found = []
     for condition, seed, own in zip(plan.conditions, seeds, deviations, strict=True):
         rng, zero = np.random.default_rng(seed), own.pop("zero", 0.0)
-        stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
+        stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate, mean_speed=speed)
         chain = replace(EffectChain.draw(stated, effects, rng), deviations=own)
         found.append(_Drawn(rng, chain, replace(plan.sensor, zero=plan.sensor.zero + zero)))
     return found
@@ -148,11 +149,18 @@ def stated_run(condition: Condition, record: Record) -> Run:
     )
 
 
-def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | None = None) -> RunSettings:
+def run_settings(
+    truth: Truth,
+    condition: Condition,
+    *,
+    sample_rate: float | None = None,
+    mean_speed: float = REFERENCE_SPEED,
+) -> RunSettings:
     """The stated physics of one run.
 
     Args:
         sample_rate: of the input of a driven run, Hz; not used for a free decay.
+        mean_speed: of the campaign, m/s, as in `RunSettings`.
     """
     given, moment = condition.drive, None
     if given is not None:
@@ -172,6 +180,7 @@ def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | Non
         mechanical_damping=truth.mechanical_damping,
         wind_speed=condition.wind_speed,
         air_density=condition.air_density,
+        mean_speed=mean_speed,
         release_angle=condition.release_angle,
         duration=condition.duration,
         drive=moment,

@@ -27,6 +27,9 @@ from tunnel_sim.vocabulary.quantities import (
 from tunnel_sim.vocabulary.record import read_only
 from tunnel_sim.vocabulary.rig import Rig
 
+REFERENCE_SPEED = 20.0
+"""Wind speed at which a speed-dependent form equals the textbook form, m/s."""
+
 _OWNED = frozenset(
     {
         "air_density", "frontal_area", "reference_length", "width", "cn_beta", "cn_r",
@@ -121,6 +124,7 @@ class RunSettings:
         mechanical_damping: Cr, N m s/rad.
         wind_speed: V, m/s; ignored where ``series`` gives it.
         air_density: ρ, kg/m³.
+        mean_speed: mean stated speed of the campaign's runs with the wind on, m/s.
         release_angle: rad, of the body.
         release_rate: rad/s; the rig itself releases from rest.
         duration, timestep: of the run, and of an integration step, s.
@@ -137,6 +141,7 @@ class RunSettings:
     mechanical_damping: float
     wind_speed: float = 0.0
     air_density: float = 0.0
+    mean_speed: float = REFERENCE_SPEED
     release_angle: float = 0.0
     release_rate: float = 0.0
     duration: float = 10.0
@@ -149,7 +154,7 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         """Check names and numbers. The plugin checks the bounds of the law's parameters."""
-        for name in ("yaw_inertia", "duration", "timestep"):
+        for name in ("yaw_inertia", "mean_speed", "duration", "timestep"):
             _check(name, getattr(self, name), above=0.0)
         for name in ("spring_stiffness", "wind_speed", "air_density"):
             _check(name, getattr(self, name), least=0.0)

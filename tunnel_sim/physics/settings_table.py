@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.quantities import Laws, PerRun, SpeedPerRun, StiffnessPerRun
 from tunnel_sim.vocabulary.record import Array
 
-_BESIDE = ("wind_speed", "release_angle", "release_rate", "duration")
+_BESIDE = ("wind_speed", "mean_speed", "release_angle", "release_rate", "duration")
 _FIELDS = (
     "air_density", "spring_stiffness", "mechanical_damping", "yaw_inertia", *_BESIDE,
 )  # fmt: skip
@@ -61,7 +61,7 @@ class SettingsTable:
 
     @classmethod
     def empty(cls, count: int) -> SettingsTable:
-        """A table of this many runs whose numbers are 0."""
+        """A table of this many runs whose numbers are 0, until they are set."""
         numbers = np.zeros((count, len(column_places())))
         return cls(numbers, [{}] * count, [None] * count, [()] * count, [None] * count)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
+from statistics import fmean
 from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
@@ -167,6 +168,17 @@ def speed_groups(speeds: Iterable[float]) -> dict[float, float]:
             groups.append([speed])
     named = [(min(group, key=lambda one: (len(f"{one:g}"), len(repr(one)))), group) for group in groups]
     return {speed: name for name, group in named for speed in group}
+
+
+def mean_wind_speed(speeds: Iterable[float], otherwise: float) -> float:
+    """The mean wind speed of the runs with the wind on.
+
+    Args:
+        speeds: of all runs as stated, m/s; 0: wind off.
+        otherwise: the value where no run has the wind on, m/s.
+    """
+    windy = [speed for speed in speeds if speed > 0.0]
+    return fmean(windy) if windy else otherwise
 
 
 def needs_density(wind_speed: float, *scales: float | None) -> bool:

@@ -84,6 +84,7 @@ SMOOTH = {
     "vortex_shedding": {"amplitude": 0.02, "strouhal_number": 0.12},
     "sensor_nonlinearity": {"coefficient": 0.05},
     "wind_speed_offset": {"offset": 0.4},
+    "reynolds_dependence": {"per_e_fold": 0.1},
 }
 
 

@@ -1,0 +1,77 @@
+"""A coefficient that depends on the speed. Truth: MuJoCo campaigns with chosen k, and the definition."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import log, radians
+
+import pytest
+
+from diagnosis import diagnose
+from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects.parameters import Circumstances
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, simulate_campaign
+from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
+
+pytestmark = pytest.mark.usefixtures("unexamined")
+KINDS = [
+    effect_class(name)
+    for name in ("reynolds_dependence", "wind_speed_offset", "wind_speed_drift", "gravity_stiffness")
+]
+TRUTH = Truth(0.47, -0.12, 0.1014, 0.018)
+
+
+def plan(speeds, name="reynolds_dependence", **values):
+    conditions = tuple(
+        Condition(f"s{spring:g}-v{speed:g}", spring, speed, 1.204, radians(12.0), 10.0)
+        for spring, speed in product((16.12, 44.84), speeds)
+    )
+    effects = (EffectSetting(name, values),) if values else ()
+    return CampaignPlan("speeds", 3, TRUTH, conditions, SensorModel(sample_rate=250.0), effects=effects)
+
+
+def answer(*case, **values):
+    return diagnose(simulate_campaign(plan(*case, **values)), kinds=KINDS)
+
+
+def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed():
+    found = answer((0.0, 12.0, 18.0, 25.0), per_e_fold=0.05)
+    assert found.causes == ("reynolds_dependence",)
+    size = found.candidates[0].parameters["per_e_fold"]
+    assert abs(size.value - 0.05) < 4.0 * size.std
+    after = found.coefficients.after["cn_beta"]
+    assert abs(after.value - TRUTH.cn_beta) < 4.0 * after.std
+
+
+def test_three_speeds_tell_it_from_an_offset_of_the_speed():
+    found = answer((0.0, 12.0, 18.0, 25.0), "wind_speed_offset", offset=0.3)
+    assert found.causes == ("wind_speed_offset",)
+
+
+def test_two_speeds_are_said_to_tell_them_apart_by_the_damping_alone():
+    (said,) = [
+        one for one in answer((0.0, 15.0, 25.0), per_e_fold=0.05).blind_spots if "two wind speeds" in one
+    ]
+    assert "offset as opposed to a dependence" in said
+
+
+def test_the_mean_is_over_the_runs_with_the_wind_on():
+    campaign = plan((0.0, 10.0, 30.0), per_e_fold=0.5)
+    (effect,) = plan_effects(campaign)
+    for condition in campaign.conditions:
+        stated = run_settings(TRUTH, condition, mean_speed=20.0)
+        seen = effect.on_run(stated, stated, None).derivatives
+        speed = condition.wind_speed
+        factor = 1.0 + 0.5 * log(speed / 20.0) if speed else 1.0
+        assert seen.cn_beta == pytest.approx(factor * TRUTH.cn_beta, rel=1e-15)
+        assert seen.cn_r == TRUTH.cn_r
+
+
+@pytest.mark.parametrize("speeds", [(), (20.0,)])
+def test_one_speed_cannot_show_it(speeds):
+    assert (
+        effect_from("reynolds_dependence", {"per_e_fold": 0.1}).trials(
+            Circumstances((16.12,), 0.3, False, speeds)
+        )
+        == ()
+    )
