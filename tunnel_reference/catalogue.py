@@ -45,6 +45,7 @@ class Form:
         limits: least and greatest magnitude of the severity parameter.
         driven: whether it acts on driven runs only.
         edition: of the catalogue in which it joined; a published set is drawn from the catalogue of its time.
+        until: last edition of the catalogue with it; None: it is in the latest one.
     """
 
     family: str
@@ -58,6 +59,7 @@ class Form:
     limits: tuple[float, float] = (1e-9, 1e9)
     driven: bool = False
     edition: int = 1
+    until: int | None = None
 
 
 def spread(value: float | Array, conditions: TrueConditions) -> Array:

@@ -211,7 +211,7 @@ def draw_campaign(
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
     effects = []
     for name in (*names, *small):
-        forms, textbook = forms_of(name), rng.random() < mixture.textbook
+        forms, textbook = forms_of(name, mixture.edition), rng.random() < mixture.textbook
         others = _pool(forms, rng, mixture)
         form = forms[0] if textbook or not others else others[int(rng.integers(len(others)))]
         effects.append(_draw_effect(rng, form, conditions, small=name in small))
@@ -251,7 +251,7 @@ def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> 
     """The common or the rare forms, as drawn from the mixture; not empty unless there are none at all."""
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
     other = Group.COMMON
-    known = [f for f in forms if f.edition <= mixture.edition and (mixture.driven or not f.driven)]
+    known = [f for f in forms if mixture.driven or not f.driven]
     return [f for f in known if f.group is group] or [f for f in known if f.group is other]
 
 

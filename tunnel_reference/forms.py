@@ -13,9 +13,17 @@ _MODULES = [
     for module in iter_modules(tunnel_reference.__path__)
     if module.name.startswith("forms_")
 ]
-FORMS: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
-EDITION = max(form.edition for form in FORMS)
+_EVERY: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
+
+
+def _of_edition(edition: int) -> tuple[Form, ...]:
+    """The forms of an edition of the catalogue."""
+    return tuple(f for f in _EVERY if f.edition <= edition and (f.until is None or edition <= f.until))
+
+
+EDITION = max(form.edition for form in _EVERY)
 """The latest edition of the catalogue."""
+FORMS = _of_edition(EDITION)
 
 
 def families(*, driven: bool, edition: int = EDITION) -> tuple[str, ...]:
@@ -24,8 +32,7 @@ def families(*, driven: bool, edition: int = EDITION) -> tuple[str, ...]:
     Args:
         driven: whether to include families that act on driven runs only.
     """
-    named = {form.family for form in FORMS if form.edition <= edition and (driven or not form.driven)}
-    return tuple(sorted(named))
+    return tuple(sorted({form.family for form in _of_edition(edition) if driven or not form.driven}))
 
 
 FAMILIES = families(driven=False)
@@ -34,6 +41,6 @@ DRIVEN_FAMILIES = families(driven=True)
 """The families of driven runs."""
 
 
-def forms_of(family: str) -> tuple[Form, ...]:
-    """All forms of one family, the textbook form first."""
-    return tuple(form for form in FORMS if form.family == family)
+def forms_of(family: str, edition: int = EDITION) -> tuple[Form, ...]:
+    """All forms of one family in an edition, the textbook form first."""
+    return tuple(form for form in _of_edition(edition) if form.family == family)

@@ -47,15 +47,15 @@ def _rate(p: float, _e: Extra, c: TrueConditions) -> TrueConditions:
 
 FORMS = (
     Form("actuator_lag", "first_order", Group.TEXTBOOK, "τ, s", 5e-3, calibration(_lag), limits=(1e-4, 0.5),
-         driven=True, edition=2),
+         driven=True, edition=3),
     Form("actuator_lag", "two_lags", Group.COMMON, "τ, s", 5e-3, calibration(_two_lags), limits=(1e-4, 0.5),
-         driven=True, edition=2),
+         driven=True, edition=3),
     Form("actuator_saturation", "hard", Group.TEXTBOOK, "1 − M/greatest moment", 0.3, calibration(_limit),
-         limits=(1e-3, 0.9), driven=True, edition=2),
+         limits=(1e-3, 0.9), driven=True, edition=3),
     Form("actuator_saturation", "soft", Group.COMMON, "greatest moment/M", 0.3, calibration(_soft_limit),
-         limits=(1e-2, 10.0), driven=True, edition=2),
+         limits=(1e-2, 10.0), driven=True, edition=3),
     Form("actuator_rate_limit", "hard", Group.TEXTBOOK, "root mean square of the moment/R, s", 0.05,
-         calibration(_rate), limits=(1e-4, 5.0), driven=True, edition=2),
+         calibration(_rate), limits=(1e-4, 5.0), driven=True, edition=3),
 )  # fmt: skip
 
 ACTUATORS = frozenset(form.family for form in FORMS)

@@ -61,10 +61,10 @@ def _later(p: float, e: Extra, c: TrueConditions) -> TrueConditions:
 
 FORMS = (
     Form("input_delay", "constant", Group.TEXTBOOK, "τ, s", 5e-4, calibration(_later), _BOTH,
-         draw=lambda _g, _c: {"seed": 0.0, "spread": 0.0}, limits=(1e-6, 0.05), driven=True),
+         draw=lambda _g, _c: {"seed": 0.0, "spread": 0.0}, limits=(1e-6, 0.05), driven=True, edition=2),
     Form("input_delay", "by_run", Group.COMMON, "τ, s", 5e-4, calibration(_later), _BOTH,
          draw=lambda g, _c: {"seed": float(g.integers(0, 2**31)), "spread": 0.1}, limits=(1e-6, 0.05),
-         driven=True),
+         driven=True, edition=2),
     Form("dropped_samples", "one_instant", Group.TEXTBOOK, "τ, s", 0.005, _lost(1), draw=_drawn,
          limits=(1e-3, 0.9 * _LONGEST)),
     Form("dropped_samples", "three_instants", Group.COMMON, "τ, s", 0.005, _lost(3), draw=_drawn,

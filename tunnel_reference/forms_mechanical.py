@@ -43,14 +43,14 @@ _FRICTION = (
     Form("coulomb_friction", "sublinear", C, "Tc, N m", 0.003,
          moving(m.sublinear_level, Phase.FRICTION,
                 lambda p, e, _c: {"moment": p, "exponent": e["exponent"]}),
-         draw=lambda g, _c: {"exponent": g.uniform(0.15, 0.6)}, edition=2),
+         draw=lambda g, _c: {"exponent": g.uniform(0.15, 0.6)}, edition=3),
     Form("coulomb_friction", "dahl", R, "Tc, N m", 0.003,
          moving(m.dahl_friction, Phase.MOMENT, lambda p, e, _c: {"moment": p, "slide": e["slide"]},
                 states=1, at_release=False),
          draw=lambda g, _c: {"slide": g.uniform(0.005, 0.012)}),
     Form("coulomb_friction", "loaded", R, "Tc, N m", 0.003,
          moving(m.loaded_level, Phase.FRICTION, lambda p, e, _c: {"moment": p, "share": e["share"]}),
-         draw=lambda g, _c: {"share": g.uniform(0.02, 0.2)}, driven=True, edition=2),
+         draw=lambda g, _c: {"share": g.uniform(0.02, 0.2)}, driven=True, edition=3),
 )  # fmt: skip
 
 _DAMPING = (

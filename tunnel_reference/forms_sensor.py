@@ -162,16 +162,29 @@ def _hum_draw(third: float) -> Draw:
     return draw
 
 
+def _hum_at_50(off: float, third: float) -> Draw:
+    """As `_hum_draw`, within ``off`` of 50 Hz."""
+    return lambda g, c: {"seed": float(g.integers(0, 2**31)),
+                         "frequency": (50.0 + g.uniform(-off, off)) * c.time_scale,
+                         "third": g.uniform(0.3, 1.0) * third}  # fmt: skip
+
+
 _HUM = (
-    Form("mains_hum", "line", T, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum), draw=_hum_draw(0.0)),
+    Form("mains_hum", "line", T, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum), draw=_hum_at_50(0.0, 0.0),
+         until=1),
     Form("mains_hum", "third_harmonic", C, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum),
-         draw=_hum_draw(0.3)),
-    Form("mains_hum", "second_harmonic", C, "a, rad", 0.001, reading(r.hum_harmonic, Order.ADDED, _hum),
-         draw=_hum_draw(0.0)),
+         draw=_hum_at_50(0.03, 0.3), until=1),
     Form("mains_hum", "bursts", R, "a, rad", 0.001, reading(r.hum_bursts, Order.ADDED, _hum),
-         draw=_hum_draw(0.0)),
+         draw=_hum_at_50(0.05, 0.0), until=1),
+    Form("mains_hum", "line", T, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum), draw=_hum_draw(0.0), edition=2),
+    Form("mains_hum", "third_harmonic", C, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum),
+         draw=_hum_draw(0.3), edition=2),
+    Form("mains_hum", "second_harmonic", C, "a, rad", 0.001, reading(r.hum_harmonic, Order.ADDED, _hum),
+         draw=_hum_draw(0.0), edition=2),
+    Form("mains_hum", "bursts", R, "a, rad", 0.001, reading(r.hum_bursts, Order.ADDED, _hum),
+         draw=_hum_draw(0.0), edition=2),
     Form("mains_hum", "wandering", R, "a, rad", 0.001, reading(r.hum_wandering, Order.ADDED, _hum),
-         draw=_hum_draw(0.0)),
+         draw=_hum_draw(0.0), edition=2),
 )  # fmt: skip
 
 

@@ -32,14 +32,14 @@ def _seeded(scale: tuple[float, float], ratio: tuple[float, float] = (1.0, 1.0))
 
 FORMS: tuple[Form, ...] = (
     Form("ambient_vibration", "flat", T, "s, N m", 0.01, moving(m.tabled_moment, Phase.MOMENT, _shaken("flat")),
-         draw=_seeded((15.0, 60.0)), edition=2),
+         draw=_seeded((15.0, 60.0)), edition=3),
     Form("ambient_vibration", "draught", C, "s, N m", 0.01,
-         moving(m.tabled_moment, Phase.MOMENT, _shaken("corner")), draw=_seeded((0.5, 5.0)), edition=2),
+         moving(m.tabled_moment, Phase.MOMENT, _shaken("corner")), draw=_seeded((0.5, 5.0)), edition=3),
     Form("ambient_vibration", "floor", C, "s, N m", 0.01, moving(m.tabled_moment, Phase.MOMENT, _shaken("floor")),
-         draw=_seeded((4.0, 15.0), (0.02, 0.1)), edition=2),
+         draw=_seeded((4.0, 15.0), (0.02, 0.1)), edition=3),
     Form("ambient_vibration", "octave", R, "s, N m", 0.01,
-         moving(m.tabled_moment, Phase.MOMENT, _shaken("octave")), draw=_seeded((3.0, 8.0)), edition=2),
+         moving(m.tabled_moment, Phase.MOMENT, _shaken("octave")), draw=_seeded((3.0, 8.0)), edition=3),
     Form("ambient_vibration", "traffic", R, "s, N m", 0.01,
          moving(m.tabled_moment, Phase.MOMENT, _shaken("traffic")),
-         draw=_seeded((15.0, 60.0), (0.2, 0.5)), edition=2),
+         draw=_seeded((15.0, 60.0), (0.2, 0.5)), edition=3),
 )  # fmt: skip

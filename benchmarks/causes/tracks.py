@@ -16,7 +16,6 @@ from tunnel_reference.scatter_draws import MIXED
 REAL = "real"
 _ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
 _RANDOM = ("buffeting", "vortex_shedding")
-_CATALOGUE = 1  # edition of the forms of the reference simulator when the sets were drawn
 
 
 @dataclass(frozen=True)
@@ -86,11 +85,13 @@ class Edition:
         seed: of all random numbers.
         tracks: by name.
         real: whether the set includes the packaged measured records.
+        catalogue: edition of the reference simulator's forms when the set was drawn.
     """
 
     seed: int
     tracks: Mapping[str, Track]
     real: bool
+    catalogue: int
 
     @property
     def counts(self) -> dict[str, int]:
@@ -100,8 +101,8 @@ class Edition:
 
 VERSION = 1
 EDITIONS: Mapping[int, Edition] = {
-    VERSION: Edition(20271001, TRACKS, True),
-    2: Edition(20281001, _SCATTERING, False),
+    VERSION: Edition(20271001, TRACKS, True, 1),
+    2: Edition(20281001, _SCATTERING, False, 2),
 }
 """The sets: version 1, and beside it version 2, of runs that do not repeat exactly."""
 
@@ -134,13 +135,15 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[TrackDraw]:
     Returns:
         The campaigns by name, tracks mixed.
     """
-    drawn = [(track, draw) for track, count in counts.items() for draw in _track(seed, track, count)]
-    of = next(edition.tracks for edition in EDITIONS.values() if set(counts) <= set(edition.tracks))
-    order = np.random.default_rng([seed, len(of)]).permutation(len(drawn))
+    of = next(edition for edition in EDITIONS.values() if set(counts) <= set(edition.tracks))
+    drawn = [
+        (track, draw) for track, count in counts.items() for draw in _track(seed, track, count, of.catalogue)
+    ]
+    order = np.random.default_rng([seed, len(of.tracks)]).permutation(len(drawn))
     return [TrackDraw(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
 
 
-def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
+def _track(seed: int, name: str, count: int, catalogue: int) -> list[CampaignDraw]:
     """The campaigns of a track; families alternate, so their frequencies differ by at most one."""
     track, number = _ALL[name], list(_ALL).index(name)
     rng = np.random.default_rng([seed, number])
@@ -153,7 +156,7 @@ def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
         level=track.level,
         stated=track.stated,
         normal=track.normal,
-        edition=_CATALOGUE,
+        edition=catalogue,
     )
     draws = []
     for index, kind in enumerate(plan_kinds(count, dict(track.kinds))):
