@@ -334,7 +334,7 @@ def show_closure(closure: Closure, answer: Diagnosis) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.findings.verdict import next_steps, rival_lines, run_to_make, unplannable
+    from diagnosis.findings.next_steps import next_steps, rival_lines, run_to_make, unplannable
 
     answer = read_diagnosis(session)
     assert answer is not None  # else the stage is closed

@@ -41,11 +41,7 @@ Chart = dict[str, Any]
 
 _COLUMNS = 2  # runs in a figure
 _HEIGHT = 5.4  # inches
-_SHEETS = {
-    "fit": _HEIGHT, "fit-whole-2": 4.9, "fit-whole-3": 4.4, "fit-whole-4": 4.0,
-    "fit-near-1": 3.6, "fit-near-2": 3.2, "fit-near-3": 2.8, "fit-near-4": 2.5, "fit-near-5": 2.25,
-}  # fmt: skip
-"""Heights in inches; ``near`` leaves the whole record out."""
+_LOW = 3.4  # inches: without the whole record
 _MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 
 
@@ -181,14 +177,10 @@ def fit_pages(answer: Findings, ids: Sequence[str] = ()) -> list[Figure]:
     return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
 
 
-def fit_sheets(answer: Findings) -> dict[str, Figure]:
-    """The fit over the data of the two runs with the largest gap, in several heights to fill a printed page.
-
-    The highest comes first; lower ones omit the whole record and show the cycles where the models differ most.
-    """
+def fit_near(answer: Findings) -> Figure | None:
+    """As `fit_figure`, without the whole record; None without runs."""
     runs = fitted_runs(answer)[:_COLUMNS]
-    sheets = _SHEETS.items() if runs else ()
-    return {name: _drawn(runs, height, whole="near" not in name) for name, height in sheets}
+    return _drawn(runs, _LOW, whole=False) if runs else None
 
 
 @styled

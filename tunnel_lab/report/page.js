@@ -39,7 +39,7 @@
 
   function lines(spec, width, group) {
     return {
-      width, height: spec.height || 260,
+      width, height: Math.min(spec.height || 260, Math.max(150, (spec.height || 260) * width / 600)),
       scales: { x: scale(spec.x), y: scale(spec.y) },
       axes: [axis(spec.x, { size: 34 }), axis(spec.y, { size: 54 })],
       series: [
@@ -237,6 +237,22 @@
     });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+
+  // Printed, each sheet is one page: it shrinks until it fits the narrower A4 and the lower Letter, without margins.
+  const paper = document.getElementById("paper"), sheets = [...document.querySelectorAll(".sheet")];
+  const [width, height] = [186, 255].map((mm) => (mm / 25.4) * 96);
+  const opened = () => document.querySelector("section:not(.printed) > details[open]");
+  const fit = (sheet) => {
+    for (let scale = 0.98; scale > 0.4 && sheet.getBoundingClientRect().height > height; scale -= 0.02) sheet.style.zoom = scale;
+  };
+  if (paper) addEventListener("beforeprint", () => {
+    paper.media = "all";
+    document.body.style.width = `${width}px`;
+    sheets.forEach((sheet, i) => { sheet.style.zoom = ""; if (!i || !opened()) fit(sheet); });
+    document.body.style.width = "";
+    paper.media = "print";
+  });
+  addEventListener("afterprint", () => sheets.forEach((sheet) => { sheet.style.zoom = ""; }));
 
   const fold = document.getElementById("fold"), parts = [...document.querySelectorAll("details")];
   if (fold) {

@@ -19,7 +19,8 @@ from diagnosis.findings import sections
 from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
 from diagnosis.findings.decision import decision
 from diagnosis.findings.next_run import NextRun
-from diagnosis.findings.verdict import headline, next_steps, undecided_words
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import left_over, probability

@@ -11,9 +11,9 @@ from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, size_note
 from diagnosis.findings.decision import decision
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.place import REASONS, reason
 from diagnosis.findings.terms import KINDS
-from diagnosis.findings.verdict import next_steps
 from diagnosis.findings.whole import Found
 from diagnosis.findings.written import sentences
 from diagnosis.model.fact import Fact, Noted

@@ -14,9 +14,10 @@ from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Nearly, immaterial, nearly
+from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.reported import held_out_totals
 from diagnosis.findings.sections import diagnosis_brief
-from diagnosis.findings.verdict import headline, next_steps, rival_lines, undecided_words, verdict
+from diagnosis.findings.verdict import headline, undecided_words, verdict
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.settings import Settings

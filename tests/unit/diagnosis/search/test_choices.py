@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.spring_choices import spring_choices
-from diagnosis.findings.verdict import next_steps, verdict
+from diagnosis.findings.verdict import verdict
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_noise import WhiteNoise

@@ -14,7 +14,8 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.by_hand import ByHand
 from diagnosis.diagnosable import choose
-from diagnosis.findings.verdict import headline, next_steps, verdict
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline, verdict
 from diagnosis.search import disturbed as disturbed_runs
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import beyond_the_others, disturbances, undisturbed

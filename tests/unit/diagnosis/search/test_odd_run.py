@@ -13,7 +13,8 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from diagnosis import diagnose
-from diagnosis.findings.verdict import headline, next_steps
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline
 from diagnosis.result import Diagnosis
 from diagnosis.search.disturbed import undisturbed
 from diagnosis.search.investigate import investigate, nominal_study

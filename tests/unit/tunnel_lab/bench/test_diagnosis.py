@@ -15,7 +15,7 @@ import pytest
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from diagnosis.findings.verdict import next_steps, run_to_make
+from diagnosis.findings.next_steps import next_steps, run_to_make
 from identification.show.blocks import TextTable
 from tests.support.diagnosis_document import document, findings_of
 from tests.support.import_files import decay

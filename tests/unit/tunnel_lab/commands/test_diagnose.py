@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.findings.verdict import next_steps
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.result import Diagnosis
 from tests.reference.free_decays import Setting, campaign
 from tests.support.command import Tunnel
