@@ -97,14 +97,13 @@ def _what(answer: Findings) -> str:
         return f"No gap: the model agrees with the runs{odd}"
     if not answer.decision.decided:
         known = without_scatter(answer.decision.effects)
-        if known:
-            return f"A gap of undecided cause: {plain(*known)}, and perhaps more{odd}"
-        two = [_joined(effect) for effect, _ in answer.decision.credible[:2]]
-        return f"A gap of undecided cause: {' or '.join(two)}{odd}"
+        part = f": {plain(*known)}, and perhaps more" if known else ""
+        return f"A gap of undecided cause{part}{odd}"
     if causes == UNKNOWN:
         return f"A gap that no known effect explains{_place(answer)}{odd}"
     parts, most = shares_of_gap(answer), _MOST_SIZED
-    certain, alternatives = without_scatter(causes), []
+    certain: list[str] = without_scatter(causes)
+    alternatives: list[tuple[str, float]] = []
     if answer.ambiguous_with:
         certain, alternatives = answer.named_causes.certain_and_open(sized=False)
     certain = sorted(certain, key=lambda name: -parts.get(name, (0.0, ""))[0])
@@ -127,6 +126,11 @@ def _sized(answer: Findings, name: str) -> str:
     return plain(name) if not size or explained_in(size) else size.partition(" (")[0]
 
 
+def _called(answer: Findings, name: str) -> str:
+    """A cause as in the first line, without its size."""
+    return _sized(answer, name).partition(" of ")[0]
+
+
 def _scatter(answer: Findings) -> str:
     systematic = answer.repeated.systematic(answer)
     return "the runs differ from each other" + (", and not by chance alone" if systematic else " by chance")
@@ -144,9 +148,9 @@ def _place(answer: Findings) -> str:
 def _likeliest(answer: Findings) -> list[str]:
     """The two likeliest answers with their probabilities, and the number of the others."""
     credible = answer.decision.credible
-    shown = [f"{_joined(effect)} ({probability(value)})" for effect, value in credible[:2]]
-    more = len(credible) - 2
-    return shown + ([f"one of {more} others"] if more > 1 else ["one other"] * (more == 1))
+    shown = [f"{probability(value)} {_joined(effect)}" for effect, value in credible[:2]]
+    rest = sum(value for _, value in credible[2:])
+    return shown + ([f"{probability(rest)} one of {len(credible) - 2} more"] if len(credible) > 2 else [])
 
 
 def _joined(effect: str) -> str:
@@ -171,15 +175,14 @@ def _sure(answer: Findings) -> str:
             f"Nothing beyond chance (p {p_text(answer.gap.p_value)}; false alarms in {alarms} of campaigns)"
         )
     if not answer.decision.decided:
-        together = probability(sum(value for _, value in answer.decision.credible))
-        return f"Not decided: {' or '.join(_likeliest(answer))}; {together} in all"
+        return f"Not yet: {'; '.join(_likeliest(answer))}"
     rest = ""
     if answer.rest_is_material and answer.names_effects:
         rest = f"; {misfit_shown(answer, answer.gap.excess_after)} of misfit remains"
     if answer.ambiguous_with:
         certain, alternatives = answer.named_causes.certain_and_open(sized=False)
-        known = [f"{plain(name)} {answer.named_causes.included(name)}" for name in certain]
-        several = [f"{text} {probability(value)}" for text, value in alternatives]
+        known = [f"{answer.named_causes.included(name)} for {_called(answer, name)}" for name in certain]
+        several = [f"{probability(value)} for {text}" for text, value in alternatives]
         return "; ".join([*known, " or ".join(several)]) + rest
     first, *others = answer.candidates
     others = sorted((one for one in others if one.probability >= _COUNTS), key=lambda one: -one.probability)
@@ -221,7 +224,9 @@ def _costs(answer: Findings) -> str:
         parts.append(f"{listed(open_ones)} not determined")
     if not parts:
         return "These runs give no coefficients"
-    stated = f"{'; '.join(parts)} (95 %)"
+    per = "per rad, " if any(one.unit == "1/rad" for one in after.values()) else ""
+    lines = ";\n".join(parts)
+    stated = f"{lines} ({per}95 %)"
     if not causes:
         return f"Nothing: {stated}"
     if causes == UNKNOWN:
@@ -254,7 +259,7 @@ def _further(answer: Findings) -> str:
     moves = [
         f"{COEFFICIENTS.get(name, name)} by {percent_of(one.relative)}"
         for name, one in answer.rest.moves.items()
-        if one.material and math.isfinite(one.relative)
+        if one.material and one.relative is not None and math.isfinite(one.relative)
     ]
     return f"; the gap that remains could change {listed(moves)}" if moves else ""
 

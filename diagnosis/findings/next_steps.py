@@ -42,6 +42,7 @@ def steps(answer: Findings) -> list[NextStep]:
         return [*runs, NextStep("Diagnose again", "no coefficients are given until then")]
     if not causes:
         use = NextStep("Use the coefficients as they are, within their intervals", "they need no correction")
+        runs += model_steps(answer.model, answer)
         return [*runs, *([use] if answer.coefficients.after else []), *_narrowing(answer)] or [_NOTHING]
     if answer.cycling:
         return runs or [
@@ -103,7 +104,7 @@ def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> s
     if name in SCATTERS:
         spread = next((one for one in answer.repeated.spreads if one.effect == name), None)
         width = "" if spread is None else f"; now they scatter by {width_text(spread)}"
-        return f"the runs then repeat in {plain(SCATTERS[name])}{width}"
+        return f"the runs then repeat in {_REPEATED[SCATTERS[name]]}{width}"
     if name not in parts:
         return ""
     part, beside = parts[name]
@@ -111,6 +112,9 @@ def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> s
     gap = f"{'the whole gap' if whole else f'{share(max(part, 1e-9))} of the gap'}{beside}"
     alone = len(without_scatter(answer.causes)) == 1
     return f"removes {listed([gap, *(_errors(answer) if alone else [])])}"
+
+
+_REPEATED = {"wind_speed": "wind speed", "spring_stiffness": "stiffness", "mechanical_damping": "damping"}
 
 
 def _errors(answer: Findings) -> Iterator[str]:
@@ -204,7 +208,7 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
     run = run_to_make(answer)
     if run is not None and answer.ambiguous_with:
         yield NextStep(
-            f"Make one more run, {run.words(robot=answer.found.robot)}", f"settles which it is{gain}"
+            f"Make one more run: {run.conditions(robot=answer.found.robot)}", f"settles which it is{gain}"
         )
     yield from choice_steps(answer.found.choices)
 
@@ -219,7 +223,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
     run, robot = run_to_make(answer), answer.found.robot
     if run is not None:
         yield NextStep(
-            f"Make one more run, {run.words(robot=robot)}",
+            f"Make one more run: {run.conditions(robot=robot)}",
             f"decides between the likely answers{_narrower(answer, 'rivals')}",
         )
         return

@@ -315,8 +315,7 @@ def diagnosis_brief(answer: Findings) -> str:
 
 
 CAPTIONS: Mapping[str, str] = {
-    "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "
-    "residuals. The first view shows the cycles in which the models differ most.",
+    "fit": "The cycles in which the models, fitted to all runs, differ most. Below: measured minus model.",
     "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
     "and unknown.",
 }

@@ -259,10 +259,9 @@ def size_change(before: float, after: float) -> str:
 
 def changed_by(change: Share) -> str:
     """A relative change, such as ``+3.3 %``, ``less than 0.01 %`` or ``+210 %``: never a power of ten."""
-    if abs(change) < _NO_CHANGE:
+    if 0.0 < abs(change) < _NO_CHANGE:
         return f"less than {100.0 * _NO_CHANGE:g} %"
-    digits = max(1 - _exponent(100.0 * change, 2), 0)
-    return f"{round(100.0 * change, digits):+.{digits}f} %"
+    return f"{100.0 * change:{'+.2g' if abs(change) < 0.995 else '+.0f'}} %" if change else "0 %"
 
 
 _NO_CHANGE = 1e-4

@@ -42,7 +42,7 @@ Chart = dict[str, Any]
 _COLUMNS = 2  # runs in a figure
 _HEIGHT = 5.4  # inches
 _LOW = 3.4  # inches: without the whole record
-_MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
+_MEASURED, _NOMINAL, _CAUSES = "measured", "model", "model with the causes"
 
 
 def charts(answer: Findings) -> dict[str, list[Chart]]:
@@ -80,8 +80,8 @@ def charts(answer: Findings) -> dict[str, list[Chart]]:
         "series": [
             {"label": "noise −3σ", "role": "quiet"},
             {"label": "noise +3σ", "role": "quiet"},
-            {"label": "nominal model", "role": "before"},
-            {"label": "with the causes", "role": "after"},
+            {"label": _NOMINAL, "role": "before"},
+            {"label": _CAUSES, "role": "after"},
         ],
         "band": [2, 1],
         "views": views,
@@ -238,14 +238,14 @@ def fit_charts(answer: Findings) -> dict[str, list[Chart]]:
                 "kind": "lines",
                 "title": title,
                 "height": height,
-                "x": {"label": TIME, "log": False},
+                "x": {"label": TIME if title == "Residual" else "", "log": False},
                 "y": {"label": f"{title.lower()} [{runs[0].unit}]", "log": False},
                 "series": series,
                 "views": views,
             }
             for title, height, series, views in (
-                ("Reading", 300, [measured, *models], fits),
-                ("Residual", 200, models, residuals),
+                ("Reading", 260, [measured, *models], fits),
+                ("Residual", 170, models, residuals),
             )
         ]
     }

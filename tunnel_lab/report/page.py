@@ -6,6 +6,7 @@ import base64
 import hashlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -80,7 +81,10 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
         blocks = section.blocks
         if section.key == "patch" and byline.patch and section.blocks:
             blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
-        if html := as_html(blocks, drawn, titled=section.key != "head"):
+        html = as_html(blocks, drawn, titled=section.key != "head")
+        if section.key == "head":  # large letters: no line ends within a value
+            html = re.sub(r"(?<=\d) (?=%)|(?<=\bN) (?=m\b)", "\u00a0", html)
+        if html:
             parts[section.key] = {"title": section.title, "html": Markup(html)}
     folded = [key for key in parts if key not in (*_OPEN, *_PRINTED)]
     context = {

@@ -428,7 +428,8 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
     )
     assert headline(findings_of(one)) == (words, "open")
     assert f"The gap is explained by {words}. The misfit" in verdict(findings_of(one), "")
-    assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(findings_of(one))
+    measure = "Measure the stiffness of the spring of 16.12 N m/rad again: if it is this one."
+    assert next_steps(findings_of(one))[2] == measure  # after the run that tells
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
     springs = (
         "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by "
@@ -494,7 +495,7 @@ def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
         "runs."
     )
     assert next_steps(findings_of(given))[0] == (
-        "Correct these values in arm.xml; --patch FILE writes a model with them."
+        "Correct joint armature in arm.xml; --patch FILE writes a model with these values."
     )
     for fits in (
         of_model(0.0107, "inertia"),  # less than 1 % of the inertia
@@ -504,7 +505,7 @@ def test_no_gap_is_not_said_of_the_values_in_the_models_file() -> None:
         answer_of(),
     ):
         assert "as given" not in verdict(findings_of(fits), "")
-        assert not any("Correct these" in step for step in next_steps(findings_of(fits)))
+        assert not any("Correct joint" in step for step in next_steps(findings_of(fits)))
 
 
 def test_what_to_do_about_runs_is_said_once() -> None:
