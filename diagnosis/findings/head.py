@@ -149,8 +149,9 @@ def _likeliest(answer: Findings) -> list[str]:
     """The two likeliest answers with their probabilities, and the number of the others."""
     credible = answer.decision.credible
     shown = [f"{probability(value)} {_joined(effect)}" for effect, value in credible[:2]]
-    rest = sum(value for _, value in credible[2:])
-    return shown + ([f"{probability(rest)} one of {len(credible) - 2} more"] if len(credible) > 2 else [])
+    rest, more = sum(value for _, value in credible[2:]), len(credible) - 2
+    others = "another" if more == 1 else f"one of {more} more"
+    return shown + ([f"{probability(rest)} {others}"] if more > 0 else [])
 
 
 def _joined(effect: str) -> str:

@@ -7,7 +7,7 @@ import ast
 from tests.support.sources import ROOT, parsed
 
 COMPOSITIONS = {"cards", "head", "next_steps", "schema", "sections", "verdict", "written"}
-"""They join several findings: the verdict, the head, the next steps, cards and sections, text fields and the schema."""
+"""They join several findings: the verdict, the head, next steps, cards, sections, text fields and the schema."""
 FINDINGS = ROOT / "diagnosis" / "findings"
 
 

@@ -16,14 +16,15 @@ import numpy as np
 import pytest
 
 from diagnosis.findings import sections
-from diagnosis.findings.cards import cause_cards, effect_cards, key_figures
+from diagnosis.findings.cards import cause_cards, effect_cards
 from diagnosis.findings.decision import decision
+from diagnosis.findings.head import Head
 from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import headline, undecided_words
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
-from identification.show.numbers import left_over, probability
+from identification.show.numbers import probability
 from tests.support import rendered as tables
 from tests.support.diagnosis_document import (
     CAUSE,
@@ -73,40 +74,6 @@ def test_every_number_of_a_table_has_a_unit_and_an_estimate_its_uncertainty(answ
         assert_units(table)
 
 
-def test_the_head_of_the_page(given: Document) -> None:
-    gap = given["gap"]
-    before, after, share, probability = key_figures(findings_of(given))
-    for fact, excess in ((before, gap["excess_before"]), (after, gap["excess_after"])):
-        degrees, excess = both(excess)
-        assert_shows(fact.value, [degrees])
-        assert_shows(fact.note, [100 * degrees / np.degrees(gap["misfit"]["swing"]), excess])
-    assert before.value.endswith("°")
-    assert before.note.startswith("root mean square; ")
-    assert_shows(share.value, [100 * gap["closed"]])
-    assert share.note == gap["closed_on"]
-    assert probability.value == "91 %"
-    calm = key_figures(findings_of(given | {"rest": given["rest"] | {"significant": False}}))[1]
-    assert calm.value == "within the noise"
-    assert_shows(calm.note, [gap["excess_after"]])
-    none = key_figures(findings_of(given | {"causes": []}))[0]
-    assert none.value == "within the noise"
-    assert_shows(none.note, [(1.0 + gap["excess_before"]) ** 0.5])
-    assert key_figures(findings_of(given | {"causes": [], "gap": gap | {"excess_before": -0.694}}))[
-        0
-    ].note == ("residual 0.553 times the noise, root mean square")
-    unknown = given | {"gap": gap | {"misfit": None}}
-    assert_shows(key_figures(findings_of(unknown))[0].value, [gap["excess_before"]])
-
-
-@pytest.mark.parametrize("value", [-0.002, 0.0004, 0.00496, 0.1478, 9.456, 38.123, 974.88])
-def test_what_is_left_has_one_form_in_a_tile(given: Document, value: float) -> None:
-    given = copy.deepcopy(given)
-    given["gap"]["excess_after"] = value
-    assert key_figures(findings_of(given))[1].note.endswith(f"; {left_over(value)}")
-    calm = given | {"rest": given["rest"] | {"significant": False}}
-    assert key_figures(findings_of(calm))[1].note == left_over(value)
-
-
 @pytest.mark.parametrize(("value", "text"), [(0.9634, "96 %"), (0.9951, "> 99 %"), (0.5712, "57 %")])
 def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
     given: Document, value: float, text: str
@@ -116,7 +83,7 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
     assert undecided_words(
         findings_of(decision([("quadratic_damping", value)], Settings().answer).to_json_dict())
     ).endswith(f": quadratic damping ({text}).")
-    assert key_figures(findings_of(given))[-1].value == text
+    assert f"{text}; " in Head.of(findings_of(given | {"ambiguous_with": []})).sure
     assert tables.candidates_table(findings_of(given)).rows[0][1] == text
     drawn = tables.candidates_figure(findings_of(given))
     assert drawn is not None
@@ -368,8 +335,7 @@ def test_no_number_of_the_page_comes_from_elsewhere(given: Document, answer: Ans
     counts = {1.0, 2.0, 3.0, 4.0, 0.5, 1.5, 2.5, 3.5, 0.0}  # lines, runs, answers; edges of the bands
     shown = {both(v)[0] for v in values} | {100.0 * both(v)[0] / np.degrees(0.0815) for v in values}
     known = values | shown | {1e2 * v for v in values} | set(np.degrees([*values])) | ends | counts
-    head = " ".join(f"{one.value} {one.note}" for one in key_figures(findings_of(given)))
-    for shown in (head, text(answer["how-far-section"]), text(answer["provenance"])):
+    for shown in (text(answer["how-far-section"]), text(answer["provenance"])):
         assert_known(re.sub(r"95 %|10⁻³|SHA-256", "", shown).replace("1/s", ""), known)
 
 
@@ -400,8 +366,7 @@ def test_a_line_cannot_hold_more_than_all() -> None:
 )
 def test_the_kind_of_the_answer(given: Document, changes: Document, kind: str) -> None:
     assert headline(findings_of(given | changes))[1] == kind
-    facts = [fact.value for fact in key_figures(findings_of(given | changes))]
-    assert ("98.8 %" in facts) == (kind in ("open", "found"))
+    assert Head.of(findings_of(given | changes)).kind == kind
 
 
 def test_what_is_known_is_stated_of_the_vocabulary_only(given: Document) -> None:

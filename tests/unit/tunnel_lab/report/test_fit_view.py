@@ -25,8 +25,8 @@ CAUSE = "quadratic_damping"
 
 def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:
     fits, residuals = fit_charts(findings_of(given))["fit"]
-    assert [one["label"] for one in fits["series"]] == ["measured", "nominal model", "with the causes"]
-    assert [one["label"] for one in residuals["series"]] == ["nominal model", "with the causes"]
+    assert [one["label"] for one in fits["series"]] == ["measured", "model", "model with the causes"]
+    assert [one["label"] for one in residuals["series"]] == ["model", "model with the causes"]
     for over, below, trace in zip(fits["views"], residuals["views"], given["maps"]["traces"], strict=True):
         assert over["run"] == below["run"] == trace["id"]
         assert over["label"].startswith(trace["id"])
