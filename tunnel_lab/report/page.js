@@ -242,7 +242,7 @@
 
   // Printed, each sheet is one page: it shrinks until it fits the narrower A4 and the lower Letter, without margins.
   const paper = document.getElementById("paper"), sheets = [...document.querySelectorAll(".sheet")];
-  const [width, height] = [186, 255].map((mm) => (mm / 25.4) * 96);
+  const [width, height] = [186, 253].map((mm) => (mm / 25.4) * 96);
   const opened = () => document.querySelector("section:not(.printed) > details[open]");
   const fit = (sheet) => {
     for (let scale = 0.98; scale > 0.4 && sheet.getBoundingClientRect().height > height; scale -= 0.02) sheet.style.zoom = scale;

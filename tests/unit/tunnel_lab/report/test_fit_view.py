@@ -45,7 +45,7 @@ def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(
             assert over["data"][3] == pytest.approx(reading - after, abs=1e-3)
             assert below["data"][2] == pytest.approx(after, rel=1e-4)
     assert (fits["y"]["label"], residuals["y"]["label"]) == ("reading [°]", "residual [°]")
-    assert fits["x"] == residuals["x"]
+    assert (fits["x"]["label"], residuals["x"]["label"]) == ("", "time since the start of the record [s]")
 
 
 def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Document) -> None:

@@ -14,6 +14,7 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, R
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import decision
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
+from diagnosis.findings.judged import Misfit
 from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit
@@ -68,6 +69,7 @@ def document(data):
         gap=GapSummary(
             True, base.excess, best.excess, 0.987, ON_RUNS,
             tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},
+            Misfit(4e-4, 0.08, "rad"),
         ),
         where=replace(where, words="The damping of all runs shows it."),
         candidates=(
