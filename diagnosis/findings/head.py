@@ -169,7 +169,7 @@ _NAMES = {"unknown": "an unknown cause", "none": "no gap"}
 
 def _sure(answer: Findings) -> str:
     if answer.cycling:
-        return ""
+        return "Every run is in a limit cycle"
     if not answer.causes:
         alarms = percent_of(answer.gap.false_alarm_rate)
         return (
@@ -260,7 +260,10 @@ def _further(answer: Findings) -> str:
     moves = [
         f"{COEFFICIENTS.get(name, name)} by {percent_of(one.relative)}"
         for name, one in answer.rest.moves.items()
-        if one.material and one.relative is not None and math.isfinite(one.relative)
+        if name != "moment_offset"
+        and one.material
+        and one.relative is not None
+        and math.isfinite(one.relative)
     ]
     return f"; the gap that remains could change {listed(moves)}" if moves else ""
 
@@ -275,5 +278,5 @@ def _warnings(answer: Findings) -> Iterator[str]:
             yield said(CAUTIONS, fact, unit_of(answer))
 
 
-_CHANGES = {"not followed", "not confirmed", "only one run", "more noise than stated", "zeros apart"}
+_CHANGES = {"not followed", "only one run", "more noise than stated", "zeros apart"}
 """Kinds of caveats that may change the answer."""

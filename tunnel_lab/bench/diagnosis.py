@@ -224,7 +224,7 @@ class ShownAnswer:
             ByHandPart(session, answer)
 
     async def _draw(self, answer: Diagnosis) -> None:
-        """The figures of the report's summary."""
+        """The figures of the report's first page."""
 
         def drawings() -> list[str]:
             from diagnosis.findings.place_figures import runs_figure

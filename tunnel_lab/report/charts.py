@@ -139,6 +139,11 @@ class Curves:
     after: Array
     differ: tuple[float, float]
 
+    @property
+    def residuals(self) -> tuple[Array, Array]:
+        """Residuals of the nominal model and with the causes, in ``unit``, shape (n,) each."""
+        return self.before, self.after
+
 
 def fitted_runs(answer: Findings, ids: Sequence[str] = ()) -> list[Curves]:
     """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
@@ -228,10 +233,13 @@ def fit_charts(answer: Findings) -> dict[str, list[Chart]]:
     runs = fitted_runs(answer)
     if not runs:
         return {}
-    models = [{"label": _NOMINAL, "role": "before"}, {"label": _CAUSES, "role": "after"}]
+    named = any(np.isfinite(run.after).any() for run in runs)
+    models = [{"label": _NOMINAL, "role": "before"}, *[{"label": _CAUSES, "role": "after"}] * named]
     measured = {"label": _MEASURED, "role": "quiet", "width": 6}
-    fits = [_view(run, run.reading, run.reading - run.before, run.reading - run.after) for run in runs]
-    residuals = [_view(run, run.before, run.after) for run in runs]
+    fits = [
+        _view(run, run.reading, *(run.reading - one for one in run.residuals[: 1 + named])) for run in runs
+    ]
+    residuals = [_view(run, *run.residuals[: 1 + named]) for run in runs]
     return {
         "fit": [
             {
