@@ -1,68 +1,22 @@
-"""The head of a page: key figures and a card for each cause, and the vocabulary's description of effects."""
+"""A card for each cause, and the vocabulary's description of effects."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 from diagnosis.findings.closure import WITHIN_THE_NOISE
-from diagnosis.findings.misfit import misfit_of, misfit_shown, of_swing, rms_shown, unit_of
+from diagnosis.findings.misfit import misfit_shown, unit_of
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
 from diagnosis.findings.whole import Findings
-from diagnosis.search.weigh import UNKNOWN
 from identification.show.blocks import Card, Heading, Paragraph
-from identification.show.numbers import beside_noise, left_over, plain, probability, share, times_noise
+from identification.show.numbers import plain
 from tunnel_sim.effects import known_effects
-
-
-@dataclass(frozen=True)
-class KeyFigure:
-    """A figure at the head of a page."""
-
-    label: str
-    value: str
-    note: str = ""
-
-
-def key_figures(answer: Findings) -> list[KeyFigure]:
-    """The figures at the head of a page, each in the form in which the verdict states it."""
-    gap, causes = answer.gap, answer.causes
-    decided = answer.decision.decided
-    before, after = gap.excess_before, gap.excess_after
-    label = "Misfit of the nominal model"
-    if causes:
-        shown = [_misfit_figure(answer, label, before, times_noise(before))]
-    else:
-        shown = [KeyFigure(label, WITHIN_THE_NOISE, f"residual {beside_noise(before)}, root mean square")]
-    if causes and causes != UNKNOWN:
-        label = f"With {'the causes' if decided else f'the {answer.set_out}'} added"
-        if _calm(answer):
-            shown.append(KeyFigure(label, WITHIN_THE_NOISE, left_over(after)))
-        else:
-            shown.append(_misfit_figure(answer, label, after, left_over(after)))
-        shown.append(KeyFigure("Share of the gap explained", share(gap.closed), gap.closed_on))
-    if answer.candidates:
-        rivals = decided and answer.ambiguous_with
-        whose = "likeliest of these sets" if rivals else answer.set_out
-        first = answer.candidates[0].probability
-        shown.append(KeyFigure(f"Probability of the {whose}", probability(first)))
-    return shown
 
 
 def _calm(answer: Findings) -> bool:
     """Whether the residual gap is stated to be within the noise."""
     return answer.rest is not None and not answer.rest.significant
-
-
-def _misfit_figure(answer: Findings, label: str, value: float, powers: str) -> KeyFigure:
-    """A gap in customary units, with its power."""
-    misfit = misfit_of(answer)
-    if misfit is None:
-        return KeyFigure(label, powers)
-    return KeyFigure(
-        label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}"
-    )
 
 
 def effect_cards(answer: Findings) -> list[Card]:

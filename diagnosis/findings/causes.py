@@ -53,10 +53,12 @@ class NamedCauses:
             Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
             stated (59 %) or gravity stiffness (40 %)``.
         """
-        certain, alternatives = self._parted(sized)
+        certain, alternatives = self.certain_and_open(sized=sized)
         scatter = [BETWEEN_RUNS] if scattering(self.causes) else []
         known = (
-            listed([*(f"{plain(name)} ({self._of(name)})" for name in certain), *scatter]) if certain else ""
+            listed([*(f"{plain(name)} ({self.included(name)})" for name in certain), *scatter])
+            if certain
+            else ""
         )
         if known and len(alternatives) == 1:
             return known
@@ -67,12 +69,13 @@ class NamedCauses:
             one_of = f"one of these: {', '.join(several[:-1])} or {several[-1]}"
         return f"{known}, and {one_of}" if known else one_of
 
-    def said_size(self, candidate: Candidate, name: str) -> str:
+    def said_size(self, candidate: Candidate, name: str, *, deviations: bool = True) -> str:
         """The size of an effect of an answer in words; empty for an effect without a phrase.
 
         Args:
             candidate: the answer.
             name: of the effect.
+            deviations: whether standard deviations are stated.
         """
         kind = {kind.name: kind for kind in known_effects()}.get(name)
         given = _parameters(candidate, name)
@@ -87,7 +90,8 @@ class NamedCauses:
             # moments are per unit inertia where no inertia is stated
             return for_people(value, std, said.get(unit, unit))
 
-        return kind.phrase(values, {full: one.std for full, one in given.items()}, text)
+        stds = {full: one.std if deviations else None for full, one in given.items()}
+        return kind.phrase(values, stds, text)
 
     def advice(self, name: str) -> str:
         """What to do about a cause, with the values that it names, without a full stop."""
@@ -101,7 +105,7 @@ class NamedCauses:
             said = said.replace(f"{{{full}}}", text)
         return said
 
-    def _parted(self, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
+    def certain_and_open(self, *, sized: bool = True) -> tuple[list[str], list[tuple[str, float]]]:
         """Effects common to all likely answers, and the further effects of each answer with its probability.
 
         Causes detected in the records before the fits are part of every answer.
@@ -131,7 +135,7 @@ class NamedCauses:
             return f"an error of one of the {count_of_springs(self.choices)} springs{each}"
         return self.said_size(candidate, name).partition(" (")[0] or plain(name)
 
-    def _of(self, name: str) -> str:
+    def included(self, name: str) -> str:
         """The probability that an effect is among the causes, in any combination."""
         return probability(self.inclusion.get(name, self.candidates[0].probability))
 

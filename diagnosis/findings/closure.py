@@ -201,7 +201,7 @@ def waterfall_table(waterfall: Waterfall, judged: Judged) -> TextTable:
     rows = []
     for step in steps if len(steps) > 1 else ():
         alone = misfit_text(judged, without[step.effect]) if step.effect and step.effect in without else ""
-        name = answer_name(step.effect) if step.effect else "nominal model"
+        name = answer_name(step.effect) if step.effect else "without the causes"
         rows.append((name, misfit_text(judged, step.excess), alone))
     title = f"Gap {waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
     heads = ("cause added", "residual gap", "without this cause")
@@ -261,8 +261,7 @@ def closure_pictures(gap: GapSummary, waterfall: Waterfall, judged: Judged) -> t
     """The residual gap as the causes are added, where some are, and run by run."""
     by_cause = Picture(
         "waterfall",
-        "The residual misfit as the causes are added, the largest contribution first, "
-        f"{waterfall.held_out}. Open circles: the misfit without this cause, the others refitted.",
+        "What the model misses, as the causes are added one after another. Open circles: without this cause alone.",
         "The residual gap as the causes are added one after another.",
         partial(waterfall_figure, waterfall, judged),
     )
@@ -301,7 +300,7 @@ def waterfall_figure(waterfall: Waterfall, judged: Judged) -> Figure:
         label = "without this cause alone"
         axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
     names = [textwrap.fill(f"+ {plain(answer_name(step.effect or ''))}", _STEP_LABEL) for step in steps[1:]]
-    axes.set_yticks(rows, ["nominal model", *names, "the rest"])
+    axes.set_yticks(rows, ["without the causes", *names, "the rest"])
     axes.set(ylim=(misfits.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
     axes.locator_params(axis="x", nbins=6)
     axes.spines["left"].set_visible(False)

@@ -93,7 +93,8 @@ def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
         rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
     causes = "with the causes" if judged.decided else f"with the {judged.set_out}"
     detail = () if skewed else ("95 % interval",)
-    heads = ("coefficient", "nominal model", *[causes] * named, *detail, *["change of size"] * named)
+    first = "without the causes" if named else "estimate"
+    heads = ("coefficient", first, *[causes] * named, *detail, *["change of size"] * named)
     title = "Coefficients ± one standard deviation" + " (95 % interval)" * skewed
     return TextTable(title, heads, tuple(rows), right=heads[1:], detail=detail)
 

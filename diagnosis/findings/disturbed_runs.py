@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnosis.findings.next_step import NextStep
 from diagnosis.search.disturbance import Disturbance
 
 
@@ -27,13 +28,16 @@ def disturbed_words(found: Disturbance, *, no_gap: bool) -> str:
     return f"Run {run} was disturbed at {at:.4g} s; {unused}."
 
 
-def disturbed_step(found: Disturbance) -> str:
+def disturbed_step(found: Disturbance) -> NextStep:
     """What to do about a disturbed run."""
+    again = "all its readings then count"
     if found.at_s is not None:
-        return f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s."
+        return NextStep(f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s", again)
     if found.kept_from_s is not None:
-        return f"Look at the release of run {found.run}: its free motion begins at {found.kept_from_s:.4g} s."
-    return (
+        begins = f"whose free motion begins only at {found.kept_from_s:.4g} s"
+        return NextStep(f"Look at the release of run {found.run}, {begins}", again)
+    return NextStep(
         f"Repeat run {found.run}, which differs from the others, or look at its release, its unit, its gain "
-        "and its filter."
+        "and its filter",
+        again,
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.findings.next_step import NextStep
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
@@ -93,11 +94,12 @@ def hold_words(found: OtherHold | None) -> str:
     )
 
 
-def hold_step(found: OtherHold | None) -> str:
-    """How to distinguish a delay of the input from a wrong hold, without a full stop; empty where not needed."""
+def hold_steps(found: OtherHold | None) -> list[NextStep]:
+    """How to distinguish a delay of the input from a wrong hold; none where not needed."""
     if found is None:
-        return ""
+        return []
     other, how = ("zero", "is held") if found.taken == "linear" else ("linear", "is linear")
-    return (
+    what = (
         f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
     )
+    return [NextStep(what, "no delay is then needed")]

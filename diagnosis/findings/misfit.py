@@ -47,10 +47,17 @@ def misfit_text(answer: Judged, excess: float) -> str:
         excess: in noise variances, a ratio.
 
     Returns:
-        Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``.
+        Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``. None below the noise.
     """
+    if excess < _NONE:
+        return NO_MISFIT
     misfit, times = misfit_of(answer), held_out_excess(excess)
     return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
+
+
+NO_MISFIT = "none (within the noise)"
+"""A gap that is smaller than what chance adds to the noise."""
+_NONE = 5e-4  # noise variances: shown as 0.000
 
 
 def misfit_shown(answer: Judged, value: float) -> str:
@@ -59,6 +66,8 @@ def misfit_shown(answer: Judged, value: float) -> str:
     Args:
         value: the gap as an excess, in noise variances, a ratio.
     """
+    if value < _NONE:
+        return NO_MISFIT
     misfit = misfit_of(answer)
     return times_noise(value) if misfit is None else rms_shown(misfit, value)
 

@@ -94,8 +94,8 @@ class NextRun:
             f"they differ by {self.separation:.1f} standard deviations of the noise."
         )
 
-    def words(self, *, robot: bool = False) -> str:
-        """The run to make, in words.
+    def conditions(self, *, robot: bool = False) -> str:
+        """The conditions of the run, in words.
 
         Args:
             robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
@@ -103,10 +103,11 @@ class NextRun:
         wind = "wind off" if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s"
         rig = "" if robot else f"spring of {self.spring_stiffness:g} N m/rad, {wind}, "
         angle = reading_shown(self.release_angle, 2)
-        return (
-            f"{rig}release at {angle}{' from the rest' if robot else ''}, "
-            f"duration {self.duration:g} s (the answers differ by {self.separation:.0f} standard deviations)"
-        )
+        return f"{rig}release at {angle}{' from the rest' if robot else ''}, duration {self.duration:g} s"
+
+    def words(self, *, robot: bool = False) -> str:
+        """The run to make, in words: arguments as in `conditions`."""
+        return f"{self.conditions(robot=robot)} (the answers differ by {self.separation:.0f} standard deviations)"
 
 
 OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"

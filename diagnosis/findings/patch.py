@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.findings.judged import Judged
+from diagnosis.findings.next_step import NextStep
 from diagnosis.patch.written_model import PatchedModel, WrittenAttribute
 from identification.show.blocks import TextTable
-from identification.show.numbers import reading_shown, significant, unit_mark, with_std
+from identification.show.numbers import listed, reading_shown, significant, unit_mark, with_std
 from tunnel_sim.vocabulary.dimensions import beside
 
 #: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
@@ -50,11 +51,12 @@ def model_words(model: PatchedModel | None, judged: Judged) -> str:
     return "" if model is None or not said else f"{model.file} does not fit: {'; '.join(said)}."
 
 
-def model_step(model: PatchedModel | None, judged: Judged) -> str:
-    """What to do where the values in the model's file do not fit, without a full stop; empty where they fit."""
+def model_steps(model: PatchedModel | None, judged: Judged) -> list[NextStep]:
+    """What to do where the values in the model's file do not fit; none where they fit."""
     if model is None or not corrected(model, judged):
-        return ""
-    return f"Correct these values in {model.file}; --patch FILE writes a model with them"
+        return []
+    names = listed([one.name for one, _ in corrected(model, judged)])
+    return [NextStep(f"Correct {names} in {model.file}; --patch FILE writes a model with these values")]
 
 
 def patch_line(model: PatchedModel | None, judged: Judged) -> str:

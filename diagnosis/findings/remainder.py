@@ -239,13 +239,14 @@ def _with_values(law: Law) -> str:
 _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
 
 
-def formula_step(found: Closable | None) -> str:
-    """How to try the formula of the remainder, without a full stop; empty where there is none."""
+def formula_line(found: Closable | None, judged: Judged) -> str:
+    """How to try the formula of the remainder, or an effect that one suspects; empty where there is neither."""
     if found is None or found.law is None:
-        return ""
+        suspect = "State the suspected effect in a file, and diagnose again with --effects-file."
+        return suspect if judged.causes == UNKNOWN and not judged.cycling else ""
     return (
         "Write the formula as an effect with --propose FILE, and diagnose again with --effects-file FILE: its "
-        "probability among the known effects tells whether it is the cause"
+        "probability among the known effects tells whether it is the cause."
     )
 
 

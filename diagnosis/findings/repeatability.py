@@ -12,6 +12,7 @@ import numpy as np
 from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread, Trend
 from diagnosis.findings.finding import Picture, Pictured
 from diagnosis.findings.judged import Judged
+from diagnosis.findings.next_step import NextStep
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.weigh import UNKNOWN
@@ -209,18 +210,25 @@ class RunRepeatability(Pictured):
             return f"Without it no known effect explains the gap ({known})."
         return f"Without it the answer is {plain(*causes)} ({known})."
 
-    def steps(self, judged: Judged) -> list[str]:
+    def steps(self, judged: Judged) -> list[NextStep]:
         """Next steps for a run that deviates far beyond the others, and for poorly distinguished quantities."""
         run = self.outlier
         steps = (
-            [f"Repeat run {run}, or look for a disturbance: it deviates far beyond the others."]
+            [
+                NextStep(
+                    f"Repeat run {run}, which deviates far beyond the others, or look for a disturbance",
+                    "shows whether the run or the rig is at fault",
+                )
+            ]
             if run
             else []
         )
         poorly = _told_apart(self.spreads, judged.settings.words)
         named = {SCATTERS[name] for name in scattering(judged.causes)}
         if poorly and "wind_speed" not in named:  # whose advice includes this
-            steps.append("Log the wind speed of every run: the runs do not distinguish it from the spring.")
+            steps.append(
+                NextStep("Log the wind speed of every run", "tells its scatter from that of the spring")
+            )
         return steps
 
     def line(self, judged: Judged) -> str:

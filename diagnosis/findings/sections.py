@@ -18,13 +18,14 @@ from diagnosis.findings.coefficients import (
     hidden_line,
     hidden_table,
 )
+from diagnosis.findings.head import Head
 from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, windy
+from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.patch import patch_line, patch_table
 from diagnosis.findings.place import lines_table, place_rows
-from diagnosis.findings.remainder import closable_line, closable_table
+from diagnosis.findings.remainder import closable_line, closable_table, formula_line
 from diagnosis.findings.symbols import symbol_rows
 from diagnosis.findings.terms import named_answer
-from diagnosis.findings.verdict import next_steps, rival_lines
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
 from identification.printing import COEFFICIENTS, trade_off_line
 from identification.show.blocks import (
@@ -51,6 +52,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
     """
     blown = any(run.wind_on for run in campaign.runs) if campaign else windy(answer)
     listed = (
+        Head.of(answer).section,
         Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),
         _where(answer),
         _which(answer),
@@ -64,7 +66,11 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
         _coefficients(answer),
         _uncertainty(answer, blown),
         _patch(answer),
-        Section("cautions", "Caveats", (Listing(tuple(_caveats(answer)), "Caveats"),), opened=True),
+        Section(
+            "cautions",
+            "Caveats",
+            (Listing(tuple(_caveats(answer)), "Caveats"),),
+        ),
         Section(
             "blind",
             "What these runs cannot show",
@@ -162,6 +168,7 @@ def _closable(answer: Findings) -> Section:
         (
             Paragraph(closable_line(answer.closable, answer.rest, answer)),
             closable_table(answer.closable, answer),
+            Paragraph(formula_line(answer.closable, answer)),
             *drawn,
         ),
     )
@@ -308,8 +315,7 @@ def diagnosis_brief(answer: Findings) -> str:
 
 
 CAPTIONS: Mapping[str, str] = {
-    "fit": "Above: the measured readings and the predictions of the models fitted to all runs. Below: the "
-    "residuals. The first view shows the cycles in which the models differ most.",
+    "fit": "The cycles in which the models, fitted to all runs, differ most. Below: measured minus model.",
     "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
     "and unknown.",
 }

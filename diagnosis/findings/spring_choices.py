@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from diagnosis.findings.next_step import NextStep
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
 from identification.show.numbers import for_people, listed, plain, probability
@@ -52,7 +53,7 @@ def choice_words(found: Sequence[SpringError]) -> str:
     )
 
 
-def choice_steps(found: Sequence[SpringError]) -> list[str]:
+def choice_steps(found: Sequence[SpringError]) -> list[NextStep]:
     """How to tell which spring is off; none where the runs tell."""
     stiffness = sorted(one.stiffness for one in found)
     if not stiffness:
@@ -60,8 +61,10 @@ def choice_steps(found: Sequence[SpringError]) -> list[str]:
     further, which = ("third", "both springs") if len(stiffness) == 2 else ("further", "these springs")
     springs = listed([f"{one:.4g}" for one in stiffness])
     return [
-        f"Add runs with a {further} spring, or measure the stiffness of {which} again ({springs} N m/rad): these "
-        "runs do not show which of them is off."
+        NextStep(
+            f"Measure the stiffness of {which} again ({springs} N m/rad), or add runs with a {further} spring",
+            "shows which of them is off",
+        )
     ]
 
 

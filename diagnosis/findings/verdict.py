@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.findings.coefficients import consequence
-from diagnosis.findings.disturbed_runs import disturbed_step, disturbed_words
-from diagnosis.findings.input_hold import hold_step, hold_words
-from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of, windy
-from diagnosis.findings.next_run import OTHER_INPUT, NextRun
+from diagnosis.findings.disturbed_runs import disturbed_words
+from diagnosis.findings.input_hold import hold_words
+from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of
 from diagnosis.findings.other_motions import second_mode_words
-from diagnosis.findings.patch import model_step, model_words
-from diagnosis.findings.remainder import formula_step
-from diagnosis.findings.spring_choices import choice_steps, choice_words, two_springs_words
+from diagnosis.findings.patch import model_words
+from diagnosis.findings.spring_choices import choice_words, two_springs_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -34,7 +32,6 @@ from identification.show.numbers import (
     share,
     times_noise,
 )
-from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 
 
@@ -46,12 +43,16 @@ def headline(answer: Findings) -> tuple[str, str]:
         words = words.replace(delay, f"{delay} or wrong hold")
     if kind == "found" and not without_scatter(answer.causes) and answer.repeated.systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
-    found = answer.disturbed
-    disturbed = [one.run for one in found if one.at_s is not None]
-    odd = [one.run for one in found if one.at_s is None]
+    return words + odd_runs(answer), kind
+
+
+def odd_runs(answer: Findings) -> str:
+    """Disturbed runs and runs that differ from the others, after a semicolon; empty without any."""
+    disturbed = [one.run for one in answer.disturbed if one.at_s is not None]
+    odd = [one.run for one in answer.disturbed if one.at_s is None]
     said = f"; {_runs(disturbed)} disturbed" if disturbed else ""
     differ = "differ from the others" if len(odd) > 1 else "differs from the others"
-    return words + said + (f"; {_runs(odd)} {differ}" if odd else ""), kind
+    return said + (f"; {_runs(odd)} {differ}" if odd else "")
 
 
 def _runs(names: Sequence[str]) -> str:
@@ -165,7 +166,6 @@ def _explain(subjects: Sequence[str]) -> str:
 def undecided_words(answer: Findings) -> str:
     """Sentences on an undecided diagnosis: the common part of its answers and the alternatives."""
     decision, credible = answer.decision, answer.decision.credible
-    most_named = answer.settings.words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
     effects = {name: decision.effects[name] for name in without_scatter(decision.effects)}
     named = {channels[name] for name in effects}
@@ -175,20 +175,28 @@ def undecided_words(answer: Findings) -> str:
         if name not in named:
             parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts)}. " if parts else ""
-    answers = []
-    for effect, value in credible[:most_named]:
-        answers.append(f"{_among_answers(effect)} ({probability(value)})")
-    if len(credible) > most_named:
-        answers.append(f"{len(credible) - most_named} more")
-    most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
+    most = likeliest(answer, answer.settings.words.answers_named)
     together = probability(sum(value for _, value in credible))
     if answer.decision.unpredictive:
-        best = _among_answers(answer.decision.unpredictive).capitalize()
+        best = among_answers(answer.decision.unpredictive).capitalize()
         doubts = [one.words for one in answer.decision.doubts]
         fit = "fits" if len(without_scatter(answer.decision.unpredictive.split(" + "))) == 1 else "fit"
         said += f"{best} {fit} best, but {' and '.join(doubts)}"
-        said += f": look at {_places(answer)} there first. " if in_doubt_of_place(answer) else ". "
+        said += f": look at {runs_of_the_gap(answer)} there first. " if in_doubt_of_place(answer) else ". "
     return f"{said}The answer is one of these, with a total probability of {together}: {most}."
+
+
+def likeliest(answer: Findings, count: int = 2) -> str:
+    """The likely answers of an undecided diagnosis with their probabilities, most probable first.
+
+    Args:
+        count: most that are named.
+    """
+    credible = answer.decision.credible
+    answers = [f"{among_answers(effect)} ({probability(value)})" for effect, value in credible[:count]]
+    if len(credible) > count:
+        answers.append(f"{len(credible) - count} more")
+    return answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
 
 
 def in_doubt_of_place(answer: Findings) -> bool:
@@ -196,13 +204,13 @@ def in_doubt_of_place(answer: Findings) -> bool:
     return any(one.kind == "elsewhere" for one in answer.decision.doubts)
 
 
-def _places(answer: Findings) -> str:
+def runs_of_the_gap(answer: Findings) -> str:
     """The runs that show the gap, by name where not all do."""
     runs, place = answer.where.runs, answer.found.place
     return _runs(runs) if place is not None and 0 < len(runs) < place.runs else "the runs"
 
 
-def _among_answers(effect: str) -> str:
+def among_answers(effect: str) -> str:
     """An answer by name, without scatter between runs, which is stated for all answers together."""
     names = effect.split(" + ")
     proper = without_scatter(names)
@@ -238,110 +246,3 @@ RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "stated": lambda found: str(found["words"]),
 }
 """Sentences on a rival that is not an effect of the vocabulary, by kind."""
-
-
-def run_to_make(answer: Findings) -> NextRun | None:
-    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
-    run = answer.next_run
-    return run if run is not None and run.distinguishes(answer.settings.answer) else None
-
-
-def unplannable(answer: Findings) -> str:
-    """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
-    known = answer.coefficients.before
-    if answer.found.driven:
-        return f"No run is planned for driven runs: {OTHER_INPUT}."
-    if not known:
-        return "No run can be planned: the nominal model was not fitted to any run."
-    if "omega_n" in known:
-        return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
-    return ""
-
-
-def rival_lines(answer: Findings) -> list[str]:
-    """Effects that the runs cannot distinguish from the causes, and the run that could; none without a rival."""
-    decided = answer.decision.decided
-    rivals, run = answer.ambiguous_with if decided else (), answer.next_run
-    lines = []
-    if rivals:
-        lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
-    if run is not None and run_to_make(answer) is None:
-        lines.append(run.too_close())
-    elif run is not None:
-        which = (
-            "A run that would distinguish them"
-            if decided
-            else "A run that would distinguish the likely answers"
-        )
-        lines.append(f"{which}: {run.words(robot=answer.found.robot)}.")
-    elif rivals and answer.found.driven:
-        lines.append(f"To distinguish them, {OTHER_INPUT}.")
-    elif rivals:
-        lines.append(
-            "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
-        )
-    return lines
-
-
-def _remedies(remarks: Sequence[Remark]) -> list[str]:
-    """What to do about runs that are left out or refused, or whose units are wrong, each remedy once.
-
-    A cut run is used and needs nothing.
-    """
-    runs: dict[str, list[str]] = {}
-    for remark in remarks:
-        if remark.outcome in (Outcome.LEFT_OUT, Outcome.REFUSED) or remark.withholds:
-            runs.setdefault(remark.remedy, []).extend(remark.runs)
-    return [f"{', '.join(names) or 'The campaign'}: {remedy}." for remedy, names in runs.items()]
-
-
-_SUSPECT = "State the suspected effect in a file, and diagnose again with --effects-file"
-
-
-def next_steps(answer: Findings) -> list[str]:
-    """What to do next, in the order in which to do it."""
-    causes = answer.causes
-    steps = [disturbed_step(one) for one in answer.disturbed]
-    steps += _remedies(answer.remarks)
-    steps += answer.repeated.steps(answer)
-    if causes != UNKNOWN and answer.decision.decided:
-        steps += choice_steps(answer.found.choices)
-    if (run := run_to_make(answer)) is not None and answer.ambiguous_with:
-        words = f"Make the run that distinguishes the answers: {run.words(robot=answer.found.robot)}."
-        steps.append(f"{words} Add it to the campaign and diagnose again.")
-    if step := model_step(answer.model, answer):
-        steps.append(f"{step}.")
-    if not causes and any(remark.withholds for remark in answer.remarks):
-        return [*steps, "Diagnose again: no coefficients are given."]
-    if not causes:
-        return [*steps, "Use the coefficients of the nominal model, within their intervals."]
-    if not answer.decision.decided:
-        robot, driven = answer.found.robot, answer.found.driven
-        # stated, and can be chosen
-        springs = not robot and not unplannable(answer) and answer.model is None
-        kinds = ["springs"] * springs + ["wind speeds"] * windy(answer)
-        kinds += ["inputs" if driven else "release angles"]
-        if in_doubt_of_place(answer):
-            steps.append(f"Look at {_places(answer)} where the residuals point (Where), before any cause.")
-        steps += [
-            f"Add runs with other {plain(*kinds)}, and diagnose again: these runs leave the answer undecided.",
-            "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
-        ]
-    elif causes == UNKNOWN:
-        steps += [
-            "Read where the model departs from the runs, and examine the rig there.",
-            f"{formula_step(answer.closable) or _SUSPECT}.",
-        ]
-    else:
-        of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
-        to_mend = [name for name in causes if name not in of_spring or not answer.found.choices]
-        steps += [
-            *(f"{step}." for step in [hold_step(answer.found.hold)] if step),
-            *(f"{answer.named_causes.advice(name)}." for name in to_mend),
-            *(f"{step}." for step in [formula_step(answer.closable)] if step),
-            "Measure again, and compare the two diagnoses (tunnel compare).",
-            "Until then use the coefficients with the causes, not those of the nominal model.",
-        ]
-    if answer.rest_is_material:
-        steps.append("Do not trust the coefficients beyond their intervals: the residual gap changes them.")
-    return steps

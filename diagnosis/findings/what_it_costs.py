@@ -139,8 +139,13 @@ def _error(one: AirMoment) -> str:
     if before.std is not None and after.std is not None:
         std = 100.0 * INTERVAL * math.hypot(before.std / after.value, ratio * after.std / after.value)
     error = 100.0 * (ratio - 1.0)
+    if max(abs(error), std or 0.0) < _NO_ERROR:
+        return f"less than {_NO_ERROR:g} %"
     shown = significant(error, 2) if std is None else with_std(error, std)
     return f"{'+' if error > 0.0 else ''}{shown} %"
+
+
+_NO_ERROR = 0.01  # %: a smaller one is stated as this
 
 
 @styled

@@ -131,13 +131,11 @@ class Section:
     Args:
         key: the id of the section on a page.
         title: on a page; other faces show no titles.
-        opened: whether a page shows the blocks at first.
     """
 
     key: str
     title: str
     blocks: tuple[Block, ...]
-    opened: bool = False
 
 
 def brief(blocks: Iterable[Block]) -> tuple[Block, ...]:

@@ -232,6 +232,11 @@ def explained(units: Iterable[str]) -> str:
     return f" ({'; '.join(said)})" if said else ""
 
 
+def explained_in(text: str) -> bool:
+    """Whether a text has a unit that only this field uses."""
+    return any(re.search(rf"{re.escape(unit)}\b", text) for unit in _UNITS)
+
+
 def rounded_up(value: float) -> str:
     """Two significant digits, never below the value."""
     if value <= 0.0:
@@ -249,8 +254,24 @@ def size_change(before: float, after: float) -> str:
     """
     if before * after < 0.0:
         return "other sign"
-    change = 100.0 * (abs(after) / abs(before) - 1.0)
-    return f"{change:+.2g} %" if change else "0 %"
+    return changed_by(abs(after) / abs(before) - 1.0)
+
+
+def changed_by(change: Share) -> str:
+    """A relative change, such as ``+3.3 %``, ``less than 0.01 %`` or ``+210 %``: never a power of ten."""
+    if 0.0 < abs(change) < _NO_CHANGE:
+        return f"less than {100.0 * _NO_CHANGE:g} %"
+    return f"{100.0 * change:{'+.2g' if abs(change) < 0.995 else '+.0f'}} %" if change else "0 %"
+
+
+_NO_CHANGE = 1e-4
+
+
+def within(reach: Share) -> str:
+    """Half an interval as a share of its middle, such as ``± 5 %``."""
+    return (
+        f"± {significant(100.0 * reach, 2 if reach >= 0.01 else 1)} %" if reach > _NO_CHANGE else "± 0.01 %"
+    )
 
 
 def change_up_to(size: float, given: Quantity) -> str:
@@ -305,6 +326,37 @@ def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
 def held_out_excess(value: float) -> str:
     """An excess in noise variances, a ratio: three decimals where it is small, or four significant digits."""
     return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
+
+
+def to_interval(given: Quantity) -> tuple[str, int]:
+    """An estimate with its 95 % interval, to four digits at most, and the number of its decimals.
+
+    Returns:
+        Text such as ``0.432 ± 0.013``, or ``0.43 (0.41 to 0.46)`` for an interval that is not symmetric.
+    """
+    low, high = given.interval or (
+        given.value - 1.96 * (given.std or 0.0),
+        given.value + 1.96 * (given.std or 0.0),
+    )
+    reach = 0.5 * (high - low)
+    last = (
+        max(_exponent(reach, 2) - 1, _exponent(given.value, 4) - 3)
+        if reach
+        else _exponent(given.value, 3) - 2
+    )
+    places, least = max(-last, 0), 10.0**last
+
+    def text(value: float) -> str:
+        return f"{round(value, -last) + 0.0:.{places}f}"
+
+    if given.interval is not None and reach > least:
+        return f"{text(given.value)} ({text(low)} to {text(high)})", places
+    return text(given.value) + (f" ± {text(max(reach, least))}" if reach else ""), places
+
+
+def sentence_case(words: str) -> str:
+    """The words with a capital at the start; a Greek letter is a symbol."""
+    return words[:1].upper() + words[1:] if words[:1].isascii() else words
 
 
 def plain(*names: str) -> str:

@@ -6,8 +6,8 @@ import ast
 
 from tests.support.sources import ROOT, parsed
 
-COMPOSITIONS = {"cards", "schema", "sections", "verdict", "written"}
-"""The verdict, the head of a page, its sections, the text fields and the schema join several findings."""
+COMPOSITIONS = {"cards", "head", "next_steps", "schema", "sections", "verdict", "written"}
+"""They join several findings: the verdict, the head, next steps, cards, sections, text fields and the schema."""
 FINDINGS = ROOT / "diagnosis" / "findings"
 
 

@@ -198,15 +198,15 @@ class ShownAnswer:
     """The answer in words and figures, and fits with causes chosen by hand."""
 
     def __init__(self, session: Session, answer: Diagnosis) -> None:
-        from diagnosis.findings.cards import key_figures
         from diagnosis.findings.sections import sections
         from diagnosis.findings.verdict import headline
 
         words, kind = headline(answer)
+        parts = {section.key: section.blocks for section in sections(answer)}
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
             ui.label(words).classes("answer")
+            show_blocks(parts.pop("head"))
             ui.label(answer.verdict)
-            show_facts((typeset(one.value), one.label, typeset(one.note)) for one in key_figures(answer))
         if answer.maps:
             heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
@@ -215,7 +215,6 @@ class ShownAnswer:
             )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(answer), once=True)
-        parts = {section.key: section.blocks for section in sections(answer)}
         for keys in _FIRST:
             show_blocks(block for key in keys for block in parts.pop(key))
         with ui.expansion("Residual gap, runs and caveats"):
@@ -225,7 +224,7 @@ class ShownAnswer:
             ByHandPart(session, answer)
 
     async def _draw(self, answer: Diagnosis) -> None:
-        """The figures of the report's summary."""
+        """The figures of the report's first page."""
 
         def drawings() -> list[str]:
             from diagnosis.findings.place_figures import runs_figure
@@ -334,7 +333,7 @@ def show_closure(closure: Closure, answer: Diagnosis) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.findings.verdict import next_steps, rival_lines, run_to_make, unplannable
+    from diagnosis.findings.next_steps import next_steps, rival_lines, run_to_make, unplannable
 
     answer = read_diagnosis(session)
     assert answer is not None  # else the stage is closed

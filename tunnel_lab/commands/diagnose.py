@@ -56,9 +56,11 @@ class AnswerFiles:
     report: Annotated[
         Path | None, _written("--report", ".html", ".htm", help="Write a report, one HTML page.")
     ] = None
-    summary: Annotated[
+    pdf: Annotated[
         Path | None,
-        _written("--summary", ".pdf", help="Write the report's summary, one printed page; needs Chromium."),
+        _written(
+            "--pdf", ".pdf", help="Write the report as two printed pages, A4 or Letter; needs Chromium."
+        ),
     ] = None
     author: Annotated[
         str, _output("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
@@ -75,26 +77,26 @@ class AnswerFiles:
         return self.json is not None and str(self.json) == "-"
 
     def refuse_unwritable(self, patch: Path | None) -> None:
-        """Refuse a file that cannot be written, or a summary without a browser, before the work is done."""
+        """Refuse a file that cannot be written, or a PDF without a browser, before the work is done."""
         json = None if self.to_stdout else self.json
-        refuse_unwritable_files(json, self.report, self.summary, patch, self.propose)
-        if self.summary is not None:
+        refuse_unwritable_files(json, self.report, self.pdf, patch, self.propose)
+        if self.pdf is not None:
             from tunnel_lab.report import find_browser
 
             find_browser()
 
     def write_pages(self, answer: Diagnosis, patch: Path | None) -> None:
-        """Write the report and its summary, where they are asked for."""
-        if answer.data is None or not (self.report or self.summary):
+        """Write the report and its PDF, where they are asked for."""
+        if answer.data is None or not (self.report or self.pdf):
             return
-        from tunnel_lab.report import Byline, write_report, write_summary
+        from tunnel_lab.report import Byline, write_pdf, write_report
 
         today = datetime.now().astimezone().date().isoformat()
         byline = Byline(today, self.author, self.notes, "" if patch is None else patch.name)
         if self.report is not None:
             write_report(answer, answer.data, self.report, byline)
-        if self.summary is not None:
-            write_summary(answer, answer.data, self.summary, byline)
+        if self.pdf is not None:
+            write_pdf(answer, answer.data, self.pdf, byline)
 
 
 @dataclass(frozen=True)
@@ -217,7 +219,7 @@ def diagnose(
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
       tunnel diagnose my-campaign --json answer.json --report report.html --author "A. Smith"
-      tunnel diagnose my-campaign --summary report.pdf
+      tunnel diagnose my-campaign --pdf report.pdf
       tunnel diagnose my-campaign --leave-out r07
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
@@ -256,7 +258,7 @@ def diagnose(
     if files.propose is not None and proposed is None:
         nothing = "no residual gap is significant, a random moment is a cause, or the body has no spring"
         say(f"No formula is proposed: {'none is supported' if answer.closable else nothing}")
-    say_written(files.json, files.report, files.summary, own.patch, proposed)
+    say_written(files.json, files.report, files.pdf, own.patch, proposed)
 
 
 def write_proposal(path: Path, answer: Diagnosis) -> Path | None:

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
         render_fit,
         render_report,
         security_policy,
+        write_pdf,
         write_report,
-        write_summary,
     )
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            ".page": "Byline draw find_browser render_fit render_report security_policy write_report write_summary",
+            ".page": "Byline draw find_browser render_fit render_report security_policy write_pdf write_report",
         },
     )
 
@@ -33,6 +33,6 @@ __all__ = [
     "render_fit",
     "render_report",
     "security_policy",
+    "write_pdf",
     "write_report",
-    "write_summary",
 ]

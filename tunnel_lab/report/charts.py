@@ -41,12 +41,8 @@ Chart = dict[str, Any]
 
 _COLUMNS = 2  # runs in a figure
 _HEIGHT = 5.4  # inches
-_SHEETS = {
-    "fit": _HEIGHT, "fit-whole-2": 4.9, "fit-whole-3": 4.4, "fit-whole-4": 4.0,
-    "fit-near-1": 3.6, "fit-near-2": 3.2, "fit-near-3": 2.8, "fit-near-4": 2.5, "fit-near-5": 2.25,
-}  # fmt: skip
-"""Heights in inches; ``near`` leaves the whole record out."""
-_MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
+_LOW = 3.4  # inches: without the whole record
+_MEASURED, _NOMINAL, _CAUSES = "measured", "model", "model with the causes"
 
 
 def charts(answer: Findings) -> dict[str, list[Chart]]:
@@ -84,8 +80,8 @@ def charts(answer: Findings) -> dict[str, list[Chart]]:
         "series": [
             {"label": "noise −3σ", "role": "quiet"},
             {"label": "noise +3σ", "role": "quiet"},
-            {"label": "nominal model", "role": "before"},
-            {"label": "with the causes", "role": "after"},
+            {"label": _NOMINAL, "role": "before"},
+            {"label": _CAUSES, "role": "after"},
         ],
         "band": [2, 1],
         "views": views,
@@ -143,6 +139,11 @@ class Curves:
     after: Array
     differ: tuple[float, float]
 
+    @property
+    def residuals(self) -> tuple[Array, Array]:
+        """Residuals of the nominal model and with the causes, in ``unit``, shape (n,) each."""
+        return self.before, self.after
+
 
 def fitted_runs(answer: Findings, ids: Sequence[str] = ()) -> list[Curves]:
     """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
@@ -181,14 +182,10 @@ def fit_pages(answer: Findings, ids: Sequence[str] = ()) -> list[Figure]:
     return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
 
 
-def fit_sheets(answer: Findings) -> dict[str, Figure]:
-    """The fit over the data of the two runs with the largest gap, in several heights to fill a printed page.
-
-    The highest comes first; lower ones omit the whole record and show the cycles where the models differ most.
-    """
+def fit_near(answer: Findings) -> Figure | None:
+    """As `fit_figure`, without the whole record; None without runs."""
     runs = fitted_runs(answer)[:_COLUMNS]
-    sheets = _SHEETS.items() if runs else ()
-    return {name: _drawn(runs, height, whole="near" not in name) for name, height in sheets}
+    return _drawn(runs, _LOW, whole=False) if runs else None
 
 
 @styled
@@ -236,24 +233,27 @@ def fit_charts(answer: Findings) -> dict[str, list[Chart]]:
     runs = fitted_runs(answer)
     if not runs:
         return {}
-    models = [{"label": _NOMINAL, "role": "before"}, {"label": _CAUSES, "role": "after"}]
+    named = any(np.isfinite(run.after).any() for run in runs)
+    models = [{"label": _NOMINAL, "role": "before"}, *[{"label": _CAUSES, "role": "after"}] * named]
     measured = {"label": _MEASURED, "role": "quiet", "width": 6}
-    fits = [_view(run, run.reading, run.reading - run.before, run.reading - run.after) for run in runs]
-    residuals = [_view(run, run.before, run.after) for run in runs]
+    fits = [
+        _view(run, run.reading, *(run.reading - one for one in run.residuals[: 1 + named])) for run in runs
+    ]
+    residuals = [_view(run, *run.residuals[: 1 + named]) for run in runs]
     return {
         "fit": [
             {
                 "kind": "lines",
                 "title": title,
                 "height": height,
-                "x": {"label": TIME, "log": False},
+                "x": {"label": TIME if title == "Residual" else "", "log": False},
                 "y": {"label": f"{title.lower()} [{runs[0].unit}]", "log": False},
                 "series": series,
                 "views": views,
             }
             for title, height, series, views in (
-                ("Reading", 300, [measured, *models], fits),
-                ("Residual", 200, models, residuals),
+                ("Reading", 260, [measured, *models], fits),
+                ("Residual", 170, models, residuals),
             )
         ]
     }

@@ -8,15 +8,11 @@ from typing import TYPE_CHECKING
 
 from diagnosis.findings.answers import candidates_figure
 from diagnosis.findings.finding import Picture
-from diagnosis.findings.place_figures import place_figure
 from diagnosis.findings.whole import Findings
 from tunnel_lab.report import charts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-_LOW = 2.1  # inches: a map on the printed summary
 
 
 def diagnosis_figures(answer: Findings) -> dict[str, Figure]:
@@ -33,7 +29,7 @@ def diagnosis_figure(answer: Findings, name: str) -> Figure | None:
 
 def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     """By name, in the order of the report, what draws each figure, or finds that there is none."""
-    makers: dict[str, Callable[[Findings], Figure | None]] = {"fit": charts.fit_figure} if answer.maps else {}
+    makers: dict[str, Callable[[Findings], Figure | None]] = {"fit": charts.fit_near} if answer.maps else {}
     makers["which"] = lambda whole: candidates_figure(whole.candidates, whole)
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return dict(sorted(makers.items(), key=lambda one: _place_of(one[0])))
@@ -45,19 +41,9 @@ def _place_of(name: str) -> int:
 
 
 _ORDER = (
-    "place", "waterfall", "fit", "where", "which", "friction", "repeatability", "how-far", "law", "coefficients",
+    "fit", "waterfall", "coefficients", "place", "where", "which", "friction", "repeatability", "how-far", "law",
 )  # fmt: skip
 
 
 def _drawn(picture: Picture, _: Findings) -> Figure | None:
     return picture.draw()
-
-
-def summary_figures(answer: Findings) -> dict[str, Figure]:
-    """The figures of the printed summary; the fit over the data in several heights, one of which is shown."""
-    located = answer.maps and answer.causes
-    place = place_figure(answer, _LOW) if located else None
-    figures = {"place": place, "waterfall": diagnosis_figure(answer, "waterfall")}
-    return {name: figure for name, figure in figures.items() if figure is not None} | charts.fit_sheets(
-        answer
-    )

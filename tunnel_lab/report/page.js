@@ -25,6 +25,8 @@
     return (large ? shown.toExponential().replace(/e\+(\d+)$/, (_, p) => ` × 10${raised(p)}`) : String(shown)).replace("-", "−");
   };
 
+  const shown = (value) => (value == null ? "" : number(value)); // no value where no pointer is
+
   const axis = (given, extra = {}) => ({
     label: given.label, labelSize: 18, font: "11px system-ui", labelFont: "12px system-ui",
     stroke: colour("ink"), grid: { stroke: colour("line"), width: 1, ...(given.log && { filter: decades }) },
@@ -39,14 +41,14 @@
 
   function lines(spec, width, group) {
     return {
-      width, height: spec.height || 260,
+      width, height: Math.max(0.6 * (spec.height || 260), Math.min(spec.height || 260, (spec.height || 260) * width / 600)),
       scales: { x: scale(spec.x), y: scale(spec.y) },
       axes: [axis(spec.x, { size: 34 }), axis(spec.y, { size: 54 })],
       series: [
-        { label: spec.x.label, value: (_, v) => number(v) },
+        { label: spec.x.label, value: (_, v) => shown(v) },
         ...spec.series.map((one) => ({
           label: one.label, stroke: one.width ? pale(one.role) : colour(one.role), width: one.width || 1.3,
-          spanGaps: false, points: { show: false }, value: (_, v) => number(v),
+          spanGaps: false, points: { show: false }, value: (_, v) => shown(v),
         })),
       ],
       bands: spec.band ? [{ series: spec.band, fill: colour("noise") }] : [],
@@ -200,10 +202,9 @@
       help: "Drag to zoom, double-click for the whole chart." + (rows ? " Click a run to show its spectrum and its fit." : ""),
     };
     figure.classList.add("live");
-    tools(one);
     one.places = specs.map((spec) => {
       const part = element(box, "div", "", { className: "chart" });
-      element(part, "h4", spec.title);
+      if (spec.kind === "cells" || !spec.y.label) element(part, "h4", spec.title);
       if (spec.kind === "cells") {
         const key = element(part, "div", "", { className: "key" });
         element(key, "span", number(spec.range[0]));
@@ -212,6 +213,7 @@
       }
       return part;
     });
+    tools(one);
     one.hint = element(box, "p", one.help, { className: "small" });
     drawn.push(one);
     let width = 0; // a chart in a closed part has none, and is drawn when the part is opened
@@ -237,6 +239,22 @@
     });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+
+  // Printed, each sheet is one page: it shrinks until it fits the narrower A4 and the lower Letter, without margins.
+  const paper = document.getElementById("paper"), sheets = [...document.querySelectorAll(".sheet")];
+  const [width, height] = [186, 253].map((mm) => (mm / 25.4) * 96);
+  const opened = () => document.querySelector("section:not(.printed) > details[open]");
+  const fit = (sheet) => {
+    for (let scale = 0.98; scale > 0.4 && sheet.getBoundingClientRect().height > height; scale -= 0.02) sheet.style.zoom = scale;
+  };
+  if (paper) addEventListener("beforeprint", () => {
+    paper.media = "all";
+    document.body.style.width = `${width}px`;
+    sheets.forEach((sheet, i) => { sheet.style.zoom = ""; if (!i || !opened()) fit(sheet); });
+    document.body.style.width = "";
+    paper.media = "print";
+  });
+  addEventListener("afterprint", () => sheets.forEach((sheet) => { sheet.style.zoom = ""; }));
 
   const fold = document.getElementById("fold"), parts = [...document.querySelectorAll("details")];
   if (fold) {

@@ -1,4 +1,4 @@
-"""The report of a diagnosis as one HTML page, its provenance, and its summary on one printed page."""
+"""The report of a diagnosis as one HTML page, and as a PDF of two printed pages."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import base64
 import hashlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.findings.cards import key_figures
 from diagnosis.findings.sections import captioned, sections
 from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
-from identification.show.blocks import Block, Detail, Figure, Paragraph, as_html, typeset
+from identification.show.blocks import Paragraph, as_html
 from identification.show.drawing import inline_svg, shown_text
 from tunnel_lab.report.charts import Chart, charts, fit_charts, fit_figure
-from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures, summary_figures
+from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -67,56 +67,43 @@ def write_report(answer: Findings, campaign: Campaign, path: Path, byline: Bylin
     return write_encoded(path, lambda stream: stream.write(render_report(answer, campaign, byline).encode()))
 
 
-def render_report(
-    answer: Findings, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
-) -> str:
+def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = None) -> str:
     """The page as HTML that needs no other file and no network; the same for the same document and byline.
 
-    With ``summary`` the page is limited to one printed page.
+    It begins with the answer in short. Printed, it is two pages, the first complete in itself.
     """
     from markupsafe import Markup
 
     byline, (words, kind) = byline or Byline(), headline(answer)
-    if summary:
-        drawings = summary_figures(answer)
-        page = _page(answer, drawings, {}, ["style.css", "summary.css"], "summary.js")
-    else:
-        page = _page(answer, diagnosis_figures(answer), fit_charts(answer) | charts(answer))
+    page = _page(answer, diagnosis_figures(answer), fit_charts(answer) | charts(answer))
     drawn, parts = page.pop("drawn"), {}
     for section in sections(answer, campaign):
         blocks = section.blocks
-        if summary and section.key == "fit":
-            blocks = tuple(_summary_fit(drawn))
         if section.key == "patch" and byline.patch and section.blocks:
             blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
-        if summary:
-            blocks = tuple(block for block in blocks if not isinstance(block, Detail))
-        if html := as_html(blocks, drawn, titled=True):
-            parts[section.key] = {"title": section.title, "html": Markup(html), "opened": section.opened}
+        html = as_html(blocks, drawn, titled=section.key != "head")
+        if section.key == "head":  # large letters: no line ends within a value
+            html = re.sub(r"(?<=\d) (?=%)|(?<=\bN) (?=m\b)", "\u00a0", html)
+        if html:
+            parts[section.key] = {"title": section.title, "html": Markup(html)}
+    folded = [key for key in parts if key not in (*_OPEN, *_PRINTED)]
     context = {
         "document": answer,
         "campaign": campaign,
         "byline": byline,
         "answer": words,
         "kind": kind,
-        "summary": summary,
-        "key_figures": key_figures(answer),
         "parts": parts,
-        "details": {key: part for key, part in parts.items() if key not in _OPEN},
+        "details": {key: parts[key] for key in (*_PRINTED, *folded) if key in parts},
+        "printed": _PRINTED,
     }
-    return _rendered("page.html.j2", context | page)
+    return _rendered("page.html.j2", context | page | {"paper": Markup(_resource("paper.css"))})
 
 
-_OPEN = ("answer", "found", "place", "closes", "coefficients-section", "next", "fit")
-"""Sections above the detail."""
-
-
-def _summary_fit(drawn: Mapping[str, str]) -> Iterator[Block]:
-    """The figures of the fit in several heights, of which a script shows the one that fits the printed page."""
-    for name in (name for name in drawn if name.startswith("fit")):
-        near = "The cycles in which the models differ most."
-        whole = f"The whole record, and below it {near[0].lower()}{near[1:]}"
-        yield Figure(name, near if "near" in name else whole)
+_OPEN = ("head", "fit", "closes", "coefficients-section", "next")
+"""Sections above the fold, which are the first printed page."""
+_PRINTED = ("answer", "found", "place", "costs", "cautions")
+"""Folded sections that are the second printed page."""
 
 
 def render_fit(answer: Findings) -> str:
@@ -154,7 +141,7 @@ def page_of(title: str, body: str) -> str:
     """
     from markupsafe import Markup
 
-    words = {"style": Markup(_resource("style.css")), "script": "", "charts": {}}
+    words = {"style": Markup(_resource("style.css")), "script": "", "charts": {}, "paper": ""}
     return _rendered("plain.html.j2", {"title": title, "body": Markup(body), **words})
 
 
@@ -165,7 +152,6 @@ def _rendered(name: str, context: dict[str, Any]) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         loader=FunctionLoader(_resource),
     )  # fmt: skip
-    environment.filters["typeset"] = typeset
     return environment.get_template(name).render(context)
 
 
@@ -178,29 +164,23 @@ def descriptions(answer: Findings) -> Mapping[str, str]:
     return DESCRIPTIONS | {name: drawn.description for name, drawn in answer.pictures.items()}
 
 
-def _page(
-    answer: Findings,
-    drawings: Mapping[str, Drawing],
-    shown: dict[str, list[Chart]],
-    sheets: Sequence[str] = ("vendor/uPlot.min.css", "style.css"),
-    script: str = "page.js",
-) -> dict[str, Any]:
+def _page(answer: Findings, drawings: Mapping[str, Drawing], shown: dict[str, list[Chart]]) -> dict[str, Any]:
     """The figures as HTML, styles and scripts: text included in the page unchanged."""
     from markupsafe import Markup
 
     drawn, described = {}, descriptions(answer)
     for name, figure in drawings.items():
-        # A figure in another height, such as ``fit-near-1``, has the text of the first. The SVG is already escaped.
-        text = described.get(name) or described[name.partition("-")[0]]
+        text = described[name]
         chart = '<div class="charts"></div>' if name in shown else ""
         drawn[name] = f'{chart}<div class="drawn" tabindex="0">{inline_svg(figure, name, text)}</div>'
     font = font_face(shown_text("".join(drawn.values())))
     return {
         "drawn": drawn,
-        "style": Markup("\n".join([font, *map(_resource, sheets)])),
+        "style": Markup("\n".join([font, *map(_resource, ("vendor/uPlot.min.css", "style.css"))])),
         "library": Markup(_library()),
-        "script": Markup(_resource(script)),
+        "script": Markup(_resource("page.js")),
         "charts": shown,
+        "paper": "",
     }
 
 
@@ -254,22 +234,22 @@ def find_browser() -> str:
     if found is None:
         raise TunnelError(
             "there is no Chromium to print with",
-            where="--summary",
+            where="--pdf",
             remedy="install Chromium, or print the page of --report from a browser",
         )
     return found
 
 
-def write_summary(answer: Findings, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
-    """Write the summary of a diagnosis as a PDF of one page, completely or not at all.
+def write_pdf(answer: Findings, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
+    """Write the report of a diagnosis as a PDF of two pages, completely or not at all.
 
     Raises:
         TunnelError: where there is no Chromium, it fails, or the file cannot be written.
     """
     browser = find_browser()
     with tempfile.TemporaryDirectory() as name:
-        page, printed = Path(name) / "summary.html", Path(name) / "summary.pdf"
-        page.write_text(render_report(answer, campaign, byline, summary=True), encoding="utf-8")
+        page, printed = Path(name) / "report.html", Path(name) / "report.pdf"
+        page.write_text(render_report(answer, campaign, byline).replace(*_SIZED), encoding="utf-8")
         arguments = [
             "--headless", "--disable-gpu", "--no-pdf-header-footer", f"--user-data-dir={name}/profile",
             f"--print-to-pdf={printed}", page.as_uri(),
@@ -282,5 +262,9 @@ def write_summary(answer: Findings, campaign: Campaign, path: Path, byline: Byli
             content = printed.read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
             what, remedy = "Chromium could not print", "print the report"
-            raise TunnelError(what, where="--summary", remedy=remedy) from error
+            raise TunnelError(what, where="--pdf", remedy=remedy) from error
         return write_whole(path, content)
+
+
+_SIZED = ("@page {", "@page { size: 210mm 279mm;")
+"""The page of the PDF is as wide as A4 and as high as Letter, so that it is printed on both without scaling."""

@@ -11,7 +11,8 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.findings.decision import Predictions, decision
-from diagnosis.findings.verdict import headline, next_steps, verdict
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline, verdict
 from diagnosis.settings import Settings
 from diagnosis.where.described import judged
 from diagnosis.where.place import locate

@@ -13,7 +13,8 @@ import pytest
 from scipy.signal import cont2discrete, dlsim
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.findings.verdict import headline, next_steps
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline
 from identification import identify
 from tests.unit.diagnosis.test_input_delay import DELAY, campaign
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign

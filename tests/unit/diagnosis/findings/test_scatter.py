@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.repeatability import Spread, width_text
 from diagnosis.findings.sections import diagnosis_brief
-from diagnosis.findings.verdict import headline, next_steps, undecided_words, verdict
+from diagnosis.findings.verdict import headline, undecided_words, verdict
 from tests.support.diagnosis_document import CAUSE, findings_of, scattering_document
 from tests.support.rendered import (
     candidates_table,

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.next_run import NextRun
+from diagnosis.findings.next_steps import rival_lines
 from diagnosis.findings.sections import printed
-from diagnosis.findings.verdict import rival_lines
 from identification.estimate import Estimate, RunEstimate, WindowEstimate
 from identification.printing import coefficients_table, estimate_blocks, status_lines, windows_table
 from identification.printing import runs_table as estimated_runs

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.spring_choices import spring_choices
-from diagnosis.findings.verdict import next_steps, verdict
+from diagnosis.findings.verdict import verdict
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_noise import WhiteNoise
@@ -82,8 +83,8 @@ def test_the_first_step_is_to_tell_the_springs_apart(study):
     springs = sorted(spring_choices(study), key=lambda one: one.stiffness)
     given["found"] |= {"choices": [asdict(one) | {"probability": 0.5} for one in springs]}
     assert next_steps(findings_of(given))[0] == (
-        "Add runs with a third spring, or measure the stiffness of both springs again (16.12 and 44.84 N m/rad): "
-        "these runs do not show which of them is off."
+        "Measure the stiffness of both springs again (16.12 and 44.84 N m/rad), or add runs with a third spring: "
+        "shows which of them is off."
     )
     assert not any("Measure the stiffness of that spring" in step for step in next_steps(findings_of(given)))
     assert verdict(findings_of(given), "").endswith(

@@ -14,7 +14,8 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.by_hand import ByHand
 from diagnosis.diagnosable import choose
-from diagnosis.findings.verdict import headline, next_steps, verdict
+from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.verdict import headline, verdict
 from diagnosis.search import disturbed as disturbed_runs
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import beyond_the_others, disturbances, undisturbed
@@ -194,7 +195,10 @@ def test_the_causes_beside_a_blow_are_those_planted() -> None:
     assert (found["causes"], found["decided"]) == (["coulomb_friction", "cubic_stiffness"], True)
     assert [one["run"] for one in found["disturbed"]] == ["r07"]
     assert found["verdict"].startswith("Run r07 was disturbed at 5.4")
-    assert next_steps(findings_of(found))[0].startswith("Repeat run r07, which was disturbed at 5.4")
+    cubic, dry, repeat, *_ = next_steps(findings_of(found))  # the causes first
+    assert cubic.startswith("Model the spring's cubic stiffness")
+    assert dry.startswith("Reduce the dry friction")
+    assert repeat.startswith("Repeat run r07, which was disturbed at 5.4")
     truth = {"coulomb_friction.friction_moment": 0.004, "cubic_stiffness.coefficient": 0.03}
     for name, value in truth.items():
         given = found["candidates"][0]["parameters"][name]
@@ -228,9 +232,9 @@ def test_the_words_say_what_is_left_out_and_what_to_do() -> None:
     one = {"run": "run_7", "at_s": 5.04321, "kept_until_s": None, "p_value": 1e-9, "used": False}
     given = document() | {"disturbed": [one, one | {"run": "r8", "kept_until_s": 4.5}]}
     assert headline(findings_of(given))[0].endswith("; runs run_7, r8 disturbed")
-    assert next_steps(findings_of(given))[:2] == [
-        "Repeat run run_7, which was disturbed at 5.043 s.",
-        "Repeat run r8, which was disturbed at 5.043 s.",
+    assert [step for step in next_steps(findings_of(given)) if step.startswith("Repeat")] == [
+        "Repeat run run_7, which was disturbed at 5.043 s: all its readings then count.",
+        "Repeat run r8, which was disturbed at 5.043 s: all its readings then count.",
     ]
 
 

@@ -15,7 +15,7 @@ import pytest
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from diagnosis.findings.verdict import next_steps, run_to_make
+from diagnosis.findings.next_steps import next_steps, run_to_make
 from identification.show.blocks import TextTable
 from tests.support.diagnosis_document import document, findings_of
 from tests.support.import_files import decay
@@ -188,11 +188,11 @@ def test_effects_of_the_wind_are_offered_where_it_blew(tmp_path: Path) -> None:
 
 
 def test_other_runs_differ_in_what_can_be_chosen() -> None:
-    undecided = {"decided": False, "common": {"effects": {}, "channels": {}}}
+    undecided = {"decided": False, "common": {"effects": {}, "channels": {}}, "next_run": None}
     for changes, words in (
-        ({}, "other springs, wind speeds and release angles,"),
-        ({"coefficients": NORMALISED}, "other wind speeds and release angles,"),
-        ({"model": {"file": "a.xml"}}, "other wind speeds and release angles,"),
+        ({}, "other springs, wind speeds and release angles:"),
+        ({"coefficients": NORMALISED}, "other wind speeds and release angles:"),
+        ({"model": {"file": "a.xml"}}, "other wind speeds and release angles:"),
     ):
         steps = next_steps(findings_of(document() | undecided | changes))
         assert any(words in step for step in steps), steps

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.findings.verdict import next_steps
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.result import Diagnosis
 from tests.reference.free_decays import Setting, campaign
 from tests.support.command import Tunnel
@@ -62,7 +62,8 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
     assert all(PROGRESS.match(line) for line in err.splitlines())
     document = json.loads(file.read_text(encoding="utf-8"))
     assert document["causes"] == [CAUSE]
-    assert out.startswith(document["verdict"])
+    assert out.startswith("What: ")
+    assert document["verdict"] in out
     best = document["candidates"][0]
     assert best["effect"] == CAUSE
     assert 0.009 < best["parameters"]["friction_moment"]["value"] < 0.011
@@ -101,7 +102,7 @@ def test_no_gap_is_an_answer_and_no_failure(tunnel: Tunnel, gap_free: Path, tmp_
     document = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
     assert document["causes"] == []
     assert document["candidates"][0]["effect"] == "none"
-    assert out.startswith("No gap")
+    assert out.startswith("What: No gap")
     assert "Gap (× noise variance)" not in out
 
 

@@ -124,7 +124,7 @@ def test_a_number_of_processes_is_called_jobs() -> None:
     ("words", "file", "right"),
     [
         (["diagnose", "c", "--report"], "r.pdf", ".html"),
-        (["diagnose", "c", "--summary"], "r.html", ".pdf"),
+        (["diagnose", "c", "--pdf"], "r.html", ".pdf"),
         (["diagnose", "c", "--json"], "r.html", ".json"),
         (["diagnose", "c", "--model", "m.xml", "--joint", "j", "--patch"], "r.urdf", ".xml"),
         (["diagnose", "c", "--propose"], "law.json", ".toml"),

@@ -18,7 +18,7 @@ import pytest
 from tests.marks import slow
 from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document, findings_of
-from tunnel_lab.report import Byline, render_report, security_policy, write_report, write_summary
+from tunnel_lab.report import Byline, render_report, security_policy, write_pdf, write_report
 
 pytestmark = IN_A_BROWSER
 
@@ -97,7 +97,7 @@ def test_nothing_is_wider_than_the_page_and_every_text_can_be_read(opened: Opene
 
 
 @pytest.mark.parametrize("opened", WIDTHS[:1], indirect=True)
-def test_the_summary_stands_open_and_the_detail_is_folded(opened: Opened) -> None:
+def test_the_first_sheet_stands_open_and_the_detail_is_folded(opened: Opened) -> None:
     assert opened.page.is_visible("text=What to do next")
     assert opened.page.is_visible('figure[data-figure="waterfall"] svg')
     assert not opened.page.is_visible("text=Everywhere.")
@@ -341,30 +341,18 @@ def size_of(printed: bytes) -> tuple[int, int]:
     return round(float(found[0])), round(float(found[1]))
 
 
-A4 = (595, 842)  # pt
-PT = 96.0 / 72.0  # px
-LETTER = 279.4 - 24.0  # mm: what is printed of the less high paper
-SUMMARY = """() => {
-  const seen = (what) => [...document.querySelectorAll(what)].filter((one) => one.checkVisibility());
-  const shown = seen("#fit figure");
-  const svg = shown[0].querySelector("svg");
-  const texts = seen("main text, main p, main td, main li");
-  const size = (one) => one instanceof SVGElement
-    ? Math.hypot(one.getScreenCTM().a, one.getScreenCTM().b) * parseFloat(getComputedStyle(one).fontSize)
-    : parseFloat(getComputedStyle(one).fontSize) * (parseFloat(document.body.style.zoom) || 1);
-  return {
-    drawings: shown.length,
-    width: svg.getBoundingClientRect().width / document.body.getBoundingClientRect().width,
-    least: Math.min(...[...svg.querySelectorAll("text")].map(size)),
-    smallest: Math.min(...texts.map(size)),
-    bottom: svg.getBoundingClientRect().bottom,
-  };
-}"""
+BOTH = (595, 791)  # pt: as wide as A4 and as high as Letter
+MARGINS = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
 
 
 def crowded(given: Any) -> None:
+    """Many causes, long words and many caveats."""
     given["verdict"] = "The gap is explained by quadratic damping. " * 12
     given["waterfall"] += [{"effect": name, "excess": 0.1} for name in ("free_play", "mains_hum")]
+    given["cautions"] = [f"Caveat {number}: the runs differ in their springs. " * 3 for number in range(12)]
+    given["disturbed"] = [
+        {"run": f"r{n}", "at_s": 1.0, "kept_until_s": None, "p_value": 1e-9, "used": False} for n in range(6)
+    ]
 
 
 def without_causes(given: Any) -> None:
@@ -372,42 +360,80 @@ def without_causes(given: Any) -> None:
     given["candidates"][0]["effect"] = "none"
 
 
+def unknown(given: Any) -> None:
+    given["causes"], given["waterfall"], given["without"] = ["unknown"], given["waterfall"][:1], {}
+
+
+def undecided(given: Any) -> None:
+    given["decided"] = False
+
+
 @cache
-def summary(change: Callable[[Any], None]) -> str:
-    """The summary of the document with a change, which takes some seconds to draw."""
+def changed(change: Callable[[Any], None]) -> str:
+    """The report of the document with a change, which takes some seconds to draw."""
     change(given := document())
-    return render_report(findings_of(given), campaign(), summary=True)
+    return render_report(findings_of(given), campaign())
 
 
-@pytest.mark.parametrize("change", [slow(lambda _: None), crowded, slow(without_causes)])
-def test_the_summary_is_one_printed_page_well_filled(browser: Any, tmp_path: Path, change: Any) -> None:
-    (tmp_path / "summary.html").write_text(summary(change), encoding="utf-8")
+KINDS = [lambda _: None, crowded, slow(without_causes), slow(unknown), slow(undecided)]
+FIRST_PAGE = """() => {
+  const [first, second] = document.querySelectorAll(".sheet");
+  return [first.innerText, second.innerText, getComputedStyle(second).breakBefore];
+}"""
+
+
+@pytest.mark.parametrize("change", KINDS)
+def test_the_report_is_printed_on_two_pages_of_either_paper(
+    browser: Any, tmp_path: Path, change: Any
+) -> None:
+    (tmp_path / "report.html").write_text(changed(change), encoding="utf-8")
     page = browser.new_page()
-    page.goto((tmp_path / "summary.html").as_uri())
-    margins = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
-    # Letter is the less high paper, A4 the narrower one, on which more text takes more lines
-    for paper in ("Letter", "A4") if change is crowded else ("Letter",):
-        assert pages(page.pdf(format=paper, margin=margins)) == 1
+    page.goto((tmp_path / "report.html").as_uri())
+    for paper in (
+        "Letter",
+        "A4",
+    ):  # the less high paper, and the narrower one, on which text takes more lines
+        assert pages(page.pdf(format=paper, margin=MARGINS)) == 2
     page.emulate_media(media="print")
-    found = page.evaluate(SUMMARY)
-    assert found["drawings"] == 1
-    assert found["width"] > 0.98
-    assert found["least"] > 7.0 * PT
-    assert found["smallest"] > 5.5 * PT
-    assert 0.9 * LETTER < found["bottom"] * 25.4 / 96.0 < LETTER
-    assert not page.is_visible("text=Tests, noise and provenance")
+    first, second, breaks = page.evaluate(FIRST_PAGE)
+    assert breaks == "page"
+    for words in ("How sure", "Coefficients", "What to do next"):
+        assert words in first
+    assert ("Caveat 11" in second) == (change is crowded)
+    assert "Tests, noise and provenance" not in first + second
     page.close()
 
 
+def test_what_is_opened_is_printed_too(opened: Opened) -> None:
+    assert pages(opened.page.pdf(format="A4", margin=MARGINS)) == 2
+    opened.open_all()
+    assert pages(opened.page.pdf(format="A4", margin=MARGINS)) > 2
+
+
 @pytest.mark.usefixtures("browser")
-def test_the_summary_is_written_as_a_file_of_one_page(
+def test_the_pdf_is_a_file_of_two_pages_for_both_papers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.render_report", lambda *_, **__: summary(crowded))
-    path = write_summary(findings_of(document()), campaign(), tmp_path / "summary.pdf")
+    monkeypatch.setattr("tunnel_lab.report.page.render_report", lambda *_: changed(crowded))
+    path = write_pdf(findings_of(document()), campaign(), tmp_path / "report.pdf")
     assert path.read_bytes().startswith(b"%PDF")
-    assert pages(path.read_bytes()) == 1
-    assert size_of(path.read_bytes()) == A4
+    assert pages(path.read_bytes()) == 2
+    assert size_of(path.read_bytes()) == BOTH
+
+
+PHONE = """() => {
+  const top = (what) => document.querySelector(what).getBoundingClientRect().top + scrollY;
+  const letters = [...document.querySelectorAll("#head dd")].map((one) => getComputedStyle(one).fontSize);
+  return [top("#fit"), top("#coefficients-section"), Math.min(...letters.map(parseFloat))];
+}"""
+
+
+@pytest.mark.parametrize("opened", WIDTHS[:1], indirect=True)
+def test_on_a_phone_the_answer_fills_the_first_screen_in_large_letters(opened: Opened) -> None:
+    fit, coefficients, least = opened.page.evaluate(PHONE)
+    assert fit < 844.0  # px: the height of a common phone
+    assert coefficients < 2.2 * 844.0
+    assert least >= 19.0
 
 
 BREAKS = """(what) => {
@@ -423,9 +449,6 @@ def test_no_printed_page_ends_with_a_heading_or_holds_the_footer_alone(opened: O
         assert opened.page.evaluate(BREAKS, heading)[1] == "avoid", heading
     assert opened.page.evaluate(BREAKS, "summary + *")[0] == "avoid"
     assert opened.page.evaluate(BREAKS, "footer")[0] == "avoid"
-    opened.page.emulate_media(media="screen")
-    assert pages(opened.page.pdf(format="Letter")) <= 7  # the less high of the two papers
-    assert size_of(opened.page.pdf(prefer_css_page_size=True)) == A4
 
 
 SIDE_BY_SIDE = """() => {

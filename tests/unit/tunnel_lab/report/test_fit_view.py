@@ -25,8 +25,8 @@ CAUSE = "quadratic_damping"
 
 def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:
     fits, residuals = fit_charts(findings_of(given))["fit"]
-    assert [one["label"] for one in fits["series"]] == ["measured", "nominal model", "with the causes"]
-    assert [one["label"] for one in residuals["series"]] == ["nominal model", "with the causes"]
+    assert [one["label"] for one in fits["series"]] == ["measured", "model", "model with the causes"]
+    assert [one["label"] for one in residuals["series"]] == ["model", "model with the causes"]
     for over, below, trace in zip(fits["views"], residuals["views"], given["maps"]["traces"], strict=True):
         assert over["run"] == below["run"] == trace["id"]
         assert over["label"].startswith(trace["id"])
@@ -45,7 +45,7 @@ def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(
             assert over["data"][3] == pytest.approx(reading - after, abs=1e-3)
             assert below["data"][2] == pytest.approx(after, rel=1e-4)
     assert (fits["y"]["label"], residuals["y"]["label"]) == ("reading [°]", "residual [°]")
-    assert fits["x"] == residuals["x"]
+    assert (fits["x"]["label"], residuals["x"]["label"]) == ("", "time since the start of the record [s]")
 
 
 def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Document) -> None:

@@ -14,6 +14,7 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, R
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import decision
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
+from diagnosis.findings.judged import Misfit
 from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit
@@ -26,7 +27,7 @@ from identification.show.drawing import THEMED, inline_svg
 from tests.support.diagnosis_document import findings_of, scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tests.support.rendered import waterfall_figure
-from tunnel_lab.report import Byline, render_report, write_report, write_summary
+from tunnel_lab.report import Byline, render_report, write_pdf, write_report
 from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.page import descriptions
 from tunnel_sim.effects import effect_class, effect_from
@@ -68,6 +69,7 @@ def document(data):
         gap=GapSummary(
             True, base.excess, best.excess, 0.987, ON_RUNS,
             tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},
+            Misfit(4e-4, 0.08, "rad"),
         ),
         where=replace(where, words="The damping of all runs shows it."),
         candidates=(
@@ -136,18 +138,41 @@ class Page(HTMLParser):
         return re.sub(r"\s+", " ", " ".join(self.words))
 
 
-def test_the_verdict_comes_first(page, document):
-    text = Page(page.split("</style>", 1)[1]).text
-    places = [
-        text.index(words)
-        for words in (
-            document["verdict"],
-            "Coefficients before",
-            "What to do next",
-            document["where"]["words"],
-        )
-    ]
+ORDER = (
+    "What ", "How sure ", "What it costs ", "Do this first ", "The fit over the data",
+    "How much of the gap is explained", "Coefficients before and after", "What to do next", "Detail",
+)  # fmt: skip
+
+
+def test_the_answer_in_four_lines_comes_first_then_pictures_coefficients_and_steps(page, document):
+    text = Page(page.split("</style>", 2)[2]).text
+    places = [text.index(words) for words in (*ORDER, document["verdict"], document["where"]["words"])]
     assert places == sorted(places)
+
+
+OF_ENGINEERS = (
+    "nominal model", "held-out", "held out", "l/V", "noise variance", "times the noise", "tunnel compare",
+)  # fmt: skip
+
+
+def test_before_the_fold_are_the_words_of_customers(page):
+    before = page.split("</style>", 2)[2].split('class="sheet detail"')[0]
+    shown = Page(re.sub(r'<details class="fold">.*?</details>', "", before)).text
+    assert not [words for words in OF_ENGINEERS if words in shown]
+    assert not [words for words in OF_ENGINEERS[:2] if words in page.partition('id="chart-data"')[2]]
+
+
+def test_all_else_is_folded(page):
+    tags = Page(page.partition('class="sheet detail"')[2]).tags
+    assert not [attrs for tag, attrs in tags if tag == "details" and "open" in attrs]
+    found = Page(page)
+    inside = page.partition('class="sheet detail"')[2]
+    assert {one for one in found.ids if f'id="{one}"' in inside} >= {
+        "answer",
+        "cautions",
+        "where",
+        "provenance",
+    }
 
 
 def test_nothing_is_loaded_from_elsewhere(page):
@@ -261,11 +286,11 @@ def test_no_gap_is_said_so(document, written):
     assert "No gap: all is noise." in text
     assert list(diagnosis_figures(findings_of(calm))) == [
         "waterfall",
+        "coefficients",
         "which",
         "repeatability",
         "how-far",
         "law",
-        "coefficients",
     ]
     assert "Share closed" not in text
 
@@ -278,7 +303,7 @@ def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
 
 def test_every_figure_is_described(document):
     without_maps = diagnosis_figures(findings_of(document | {"maps": None, "repeatability": None}))
-    assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
+    assert list(without_maps) == ["waterfall", "coefficients", "which", "how-far", "law"]
     answer = findings_of(document)
     assert set(diagnosis_figures(answer)) == set(descriptions(answer))
 
@@ -317,16 +342,16 @@ def test_hashes_and_versions_are_on_the_page(document, written):
         assert part in text
 
 
-def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monkeypatch):
+def test_without_a_browser_the_pdf_is_refused(document, data, tmp_path, monkeypatch):
     monkeypatch.setattr("tunnel_lab.report.page.shutil.which", lambda _: None)
     with pytest.raises(TunnelError, match=r"no Chromium to print with.*--report"):
-        write_summary(findings_of(document), data, tmp_path / "summary.pdf")
-    assert not (tmp_path / "summary.pdf").exists()
+        write_pdf(findings_of(document), data, tmp_path / "report.pdf")
+    assert not (tmp_path / "report.pdf").exists()
 
 
 def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypatch):
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
     with pytest.raises(TunnelError, match="Chromium could not print"):
-        write_summary(findings_of(document | {"maps": None}), data, tmp_path / "summary.pdf")
-    assert not (tmp_path / "summary.pdf").exists()
+        write_pdf(findings_of(document | {"maps": None}), data, tmp_path / "report.pdf")
+    assert not (tmp_path / "report.pdf").exists()

@@ -23,7 +23,6 @@ def test_symbols_of_coefficients_and_causes_are_explained(monkeypatch: pytest.Mo
     for symbol, meaning in rows.items():
         assert f"<dt>{symbol}</dt>" in folded
         assert meaning.partition(" [")[0].split("'")[0] in folded
-    assert '<details class="fold">' not in render_report(findings_of(document()), campaign(), summary=True)
 
 
 def test_of_runs_without_a_stated_spring_frequency_and_damping_are_explained() -> None:

@@ -49,7 +49,7 @@ def test_bars_dots_and_texts(given: Document) -> None:
     assert last == ""  # what the last cause leaves is the rest
     assert rest.endswith("°, immaterial")
     labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert labels == ["nominal model", "+ quadratic damping", "+ coulomb friction", "the rest"]
+    assert labels == ["without the causes", "+ quadratic damping", "+ coulomb friction", "the rest"]
     assert np.array(dots(axes)) == pytest.approx(
         np.array([(rms(28.45), 0), (rms(0.1345), 3), (rms(21.85), 1), (rms(2.85), 2)])
     )

@@ -1,0 +1,318 @@
+"""What to do next: steps for the rig, each with its expected gain, ordered by what they buy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from diagnosis.findings.disturbed_runs import disturbed_step
+from diagnosis.findings.input_hold import hold_steps
+from diagnosis.findings.misfit import misfit_shown, windy
+from diagnosis.findings.next_run import OTHER_INPUT, NextRun
+from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.patch import model_steps
+from diagnosis.findings.repeatability import width_text
+from diagnosis.findings.spring_choices import choice_steps
+from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
+from diagnosis.findings.verdict import in_doubt_of_place, runs_of_the_gap
+from diagnosis.findings.whole import Findings
+from diagnosis.search.weigh import UNKNOWN
+from identification.printing import COEFFICIENTS
+from identification.show.numbers import listed, plain, share, within
+from identification.show.quantity import Quantity
+from identification.status import Outcome, Remark
+from tunnel_sim.effects import known_effects
+
+
+def next_steps(answer: Findings) -> list[str]:
+    """What to do next, in the order in which to do it."""
+    return [step.words for step in steps(answer)]
+
+
+def steps(answer: Findings) -> list[NextStep]:
+    """What to do next: the causes by their shares of the gap, then what narrows the answer and the coefficients.
+
+    Without a cause to act on, runs that do not count come first.
+    """
+    causes, decided = answer.causes, answer.decision.decided
+    runs = [*map(disturbed_step, answer.disturbed), *_remedies(answer.remarks)]
+    runs += answer.repeated.steps(answer)
+    if not causes and any(remark.withholds for remark in answer.remarks):
+        return [*runs, NextStep("Diagnose again", "no coefficients are given until then")]
+    if not causes:
+        use = NextStep("Use the coefficients as they are, within their intervals", "they need no correction")
+        runs += model_steps(answer.model, answer)
+        return [*runs, *([use] if answer.coefficients.after else []), *_narrowing(answer)] or [_NOTHING]
+    if answer.cycling:
+        return runs or [
+            NextStep("Record a free decay, or the growth from rest", "a limit cycle shows no derivative")
+        ]
+    if not decided:
+        return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]
+    if causes == UNKNOWN:
+        return [_look(answer), *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
+    last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
+    return [
+        *_mending(answer),
+        *runs,
+        *model_steps(answer.model, answer),
+        *_narrowing(answer),
+        NextStep("Then measure again", _expected(answer)),
+        NextStep("Until then use the coefficients with the causes, not those without"),
+        *(last if answer.rest_is_material else []),
+    ]
+
+
+_NOTHING = NextStep("Leave the rig as it is", "the model agrees with the runs")
+_NO_REPAIR = NextStep(
+    "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause"
+)
+
+
+# ---- causes
+
+
+def _mending(answer: Findings) -> Iterator[NextStep]:
+    """What to do about each cause, and what tells open causes apart, the largest share of the gap first."""
+    parts = shares_of_gap(answer)
+    of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
+    certain = answer.named_causes.certain_and_open()[0] if answer.ambiguous_with else answer.causes
+    names = [name for name in answer.causes if name not in of_spring or not answer.found.choices]
+    found = []
+    for name in (name for name in names if name in certain or name in SCATTERS):
+        step = NextStep(answer.named_causes.advice(name), _gain(answer, name, parts))
+        found.append((name in SCATTERS, _part(parts, [name]), step))
+    open_ones = [name for name in answer.causes if name not in certain and name not in SCATTERS]
+    found += [(False, _part(parts, open_ones or names), step) for step in _telling_apart(answer)]
+    later = [name for name in names if name in open_ones]
+    found += [
+        (False, -1.0, NextStep(answer.named_causes.advice(name), "if it is this one")) for name in later
+    ]
+    yield from hold_steps(answer.found.hold)
+    for _, _, step in sorted(found, key=lambda one: (one[0], -one[1])):
+        yield step
+
+
+def _part(parts: dict[str, tuple[float, str]], names: Sequence[str]) -> float:
+    """The share of the gap of several causes."""
+    return sum(parts[name][0] for name in names if name in parts)
+
+
+def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> str:
+    """What the removal of a cause buys; empty where it is not known."""
+    if name in SCATTERS:
+        spread = next((one for one in answer.repeated.spreads if one.effect == name), None)
+        width = "" if spread is None else f"; now they scatter by {width_text(spread)}"
+        return f"the runs then repeat in {_REPEATED[SCATTERS[name]]}{width}"
+    if name not in parts:
+        return ""
+    part, beside = parts[name]
+    whole = part > 0.9995 and not answer.rest_is_significant
+    gap = f"{'the whole gap' if whole else f'{share(max(part, 1e-9))} of the gap'}{beside}"
+    alone = len(without_scatter(answer.causes)) == 1
+    return f"removes {listed([gap, *(_errors(answer) if alone else [])])}"
+
+
+_REPEATED = {"wind_speed": "wind speed", "spring_stiffness": "stiffness", "mechanical_damping": "damping"}
+
+
+def _errors(answer: Findings) -> Iterator[str]:
+    """The errors of the coefficients that go with the only cause, where they are of a per cent or more."""
+    given = answer.coefficients
+    for name, one in given.before.items():
+        two = {**given.after, **given.in_phase}.get(name)
+        if two is None or not (one.determined and two.determined and two.value):
+            continue
+        error = abs(one.value / two.value - 1.0)
+        if _VISIBLE <= error < 1.0 and abs(one.value - two.value) > reach_of(two):
+            yield f"the {100.0 * error:.0f} % error of {COEFFICIENTS.get(name, name)}"
+
+
+_VISIBLE = 0.01  # of a coefficient: a smaller error is not worth a word
+
+
+def shares_of_gap(answer: Findings) -> dict[str, tuple[float, str]]:
+    """By cause, its share of the gap as the causes are added, and those with which it was added."""
+    found: dict[str, tuple[float, str]] = {}
+    taken = answer.waterfall.steps
+    if not taken or taken[0].excess <= 0.0:
+        return found
+    for before, step in pairwise(taken):
+        names = str(step.effect).split(" + ")
+        part = max(before.excess, 0.0) - max(step.excess, 0.0)
+        for name in names:
+            others = [other for other in names if other != name]
+            found[name] = (part / taken[0].excess, f" together with {plain(*others)}" if others else "")
+    return found
+
+
+def _expected(answer: Findings) -> str:
+    """What a further diagnosis should find."""
+    gap = answer.gap
+    before, after = (misfit_shown(answer, value) for value in (gap.excess_before, gap.excess_after))
+    if answer.rest is None or not answer.rest_is_significant:
+        after = "nothing beyond the noise"
+    return f"the misfit should fall from {before} to {after}"
+
+
+# ---- answers that are not decided
+
+
+def run_to_make(answer: Findings) -> NextRun | None:
+    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
+    run = answer.next_run
+    return run if run is not None and run.distinguishes(answer.settings.answer) else None
+
+
+def unplannable(answer: Findings) -> str:
+    """The reason why no run can be planned from these runs, in a sentence; empty where one can."""
+    known = answer.coefficients.before
+    if answer.found.driven:
+        return f"No run is planned for driven runs: {OTHER_INPUT}."
+    if not known:
+        return "No run can be planned: the nominal model was not fitted to any run."
+    if "omega_n" in known:
+        return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
+    return ""
+
+
+def rival_lines(answer: Findings) -> list[str]:
+    """Effects that the runs cannot distinguish from the causes, and the run that could; none without a rival."""
+    decided = answer.decision.decided
+    rivals, run = answer.ambiguous_with if decided else (), answer.next_run
+    lines = []
+    if rivals:
+        lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
+    if run is not None and run_to_make(answer) is None:
+        lines.append(run.too_close())
+    elif run is not None:
+        which = (
+            "A run that would distinguish them"
+            if decided
+            else "A run that would distinguish the likely answers"
+        )
+        lines.append(f"{which}: {run.words(robot=answer.found.robot)}.")
+    elif rivals and answer.found.driven:
+        lines.append(f"To distinguish them, {OTHER_INPUT}.")
+    elif rivals:
+        lines.append(
+            "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
+        )
+    return lines
+
+
+def _telling_apart(answer: Findings) -> Iterator[NextStep]:
+    """What tells the alternatives of a decided answer apart."""
+    gain = _narrower(answer, "rivals")
+    run = run_to_make(answer)
+    if run is not None and answer.ambiguous_with:
+        yield NextStep(
+            f"Make one more run: {run.conditions(robot=answer.found.robot)}", f"settles which it is{gain}"
+        )
+    yield from choice_steps(answer.found.choices)
+
+
+def _deciding(answer: Findings) -> Iterator[NextStep]:
+    """What decides between the likely answers."""
+    if in_doubt_of_place(answer):
+        yield NextStep(
+            f"Look at {runs_of_the_gap(answer)} where the residuals point (Where), before any cause",
+            "the likeliest cause acts elsewhere",
+        )
+    run, robot = run_to_make(answer), answer.found.robot
+    if run is not None:
+        yield NextStep(
+            f"Make one more run: {run.conditions(robot=robot)}",
+            f"decides between the likely answers{_narrower(answer, 'rivals')}",
+        )
+        return
+    # stated, and can be chosen
+    springs = not robot and not unplannable(answer) and answer.model is None
+    kinds = ["springs"] * springs + ["wind speeds"] * windy(answer)
+    kinds += ["inputs" if answer.found.driven else "release angles"]
+    yield NextStep(f"Add runs with other {plain(*kinds)}", "these runs leave the answer undecided")
+
+
+def _look(answer: Findings) -> NextStep:
+    """Where to look for an unknown cause."""
+    runs, place, channel = answer.where.runs, answer.found.place, answer.where.channel
+    named = f", in {listed(list(runs))}" if place is not None and 0 < len(runs) < min(place.runs, 6) else ""
+    what = "the rig" if channel is None else f"what acts on {CHANNELS[channel]}"
+    wind = f" {CONDITIONS['wind_on']}" if answer.where.condition == "wind_on" else ""
+    size = misfit_shown(answer, answer.gap.excess_before)
+    return NextStep(
+        f"Examine {what}{wind}{named}, where the model departs from the runs",
+        f"the cause makes a misfit of {size}",
+    )
+
+
+# ---- runs, the model and intervals
+
+
+def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
+    """What to do about runs that are left out or refused, or whose units are wrong, each remedy once.
+
+    A cut run is used and needs nothing.
+    """
+    runs: dict[str, list[str]] = {}
+    for remark in remarks:
+        if remark.outcome in (Outcome.LEFT_OUT, Outcome.REFUSED) or remark.withholds:
+            runs.setdefault(remark.remedy, []).extend(remark.runs)
+    return [NextStep(f"{', '.join(names) or 'The campaign'}: {remedy}") for remedy, names in runs.items()]
+
+
+_WIDE = 0.1  # of a coefficient: a 95 % interval that reaches farther is worth a step
+
+
+def _narrowing(answer: Findings) -> Iterator[NextStep]:
+    """For each source of a wide interval, what narrows it, and the interval that would be left."""
+    found: dict[str, list[str]] = {}
+    for name, one in {**answer.coefficients.after, **answer.coefficients.in_phase}.items():
+        known = name != "moment_offset" and one.std and one.value and one.shares
+        if not known or reach_of(one) <= _WIDE * abs(one.value):
+            continue
+        source = max(one.shares, key=lambda each: one.shares[each])
+        if source in _NARROWS:
+            left = _CUT.get(source, 1.0)
+            found.setdefault(source, []).append(_becomes(name, one, left * one.shares[source]))
+    for source, gains in found.items():
+        what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
+        yield NextStep(what, listed(gains))
+
+
+_NARROWS = {
+    "noise": "Repeat every run three times more",
+    "scatter": "Repeat every run three times more",
+    "freed form": "Add runs with other {other}",
+    "air density": "State the air density to one more digit",
+}
+"""What narrows an interval, by the source of most of its variance, where a step on the rig does."""
+_CUT = {"noise": 0.75, "scatter": 0.75}
+"""Share of a source's variance that the step removes: four times the runs leave a quarter. Others: all at most."""
+
+
+def _narrower(answer: Findings, source: str) -> str:
+    """The coefficient that gains most where a source of uncertainty goes; empty where none gains a third."""
+    after = {name: one for name, one in answer.coefficients.after.items() if one.std and one.value}
+    most = max(after, key=lambda name: after[name].shares.get(source, 0.0), default="")
+    if not most or after[most].shares.get(source, 0.0) < _GAINS:
+        return ""
+    return f"; {_becomes(most, after[most], after[most].shares[source])}"
+
+
+_GAINS = 0.55  # of a variance: without it the standard deviation falls by a third
+
+
+def _becomes(name: str, given: Quantity, part: float) -> str:
+    """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``."""
+    now = reach_of(given) / abs(given.value)
+    left = now * math.sqrt(max(1.0 - part, 0.0))
+    return f"{COEFFICIENTS.get(name, name)} becomes {within(left)} (now {within(now)})"
+
+
+def reach_of(given: Quantity) -> float:
+    """Half the width of the 95 % interval, in the coefficient's unit."""
+    if given.interval is not None:
+        return 0.5 * (given.interval[1] - given.interval[0])
+    return 1.96 * (given.std or 0.0)

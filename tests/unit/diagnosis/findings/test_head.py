@@ -1,0 +1,189 @@
+"""The answer in four lines, for every kind of answer, and the next steps in the order of what they buy.
+
+Truth: documents written by hand. A line may state nothing that the verdict does not.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.findings.decision import decision
+from diagnosis.findings.head import Head
+from diagnosis.findings.next_steps import next_steps, shares_of_gap
+from diagnosis.findings.verdict import verdict
+from diagnosis.settings import Settings
+from identification.show.blocks import as_text
+from identification.show.numbers import changed_by, to_interval
+from identification.show.quantity import Quantity
+from tests.support.diagnosis_document import document, findings_of
+from tests.support.shown_numbers import assert_shows
+
+DRY, SPRING = "coulomb_friction", "spring_miscalibration"
+
+
+def two_causes(**changes: Any) -> dict[str, Any]:
+    """Dry friction, and a spring that explains more of the gap, decided."""
+    given = document()
+    effect = f"{DRY} + {SPRING}"
+    parameters = {
+        f"{DRY}.friction_moment": {"value": 0.006, "std": 0.0001, "unit": "N m"},
+        f"{SPRING}.error": {"value": -0.0191, "std": 0.0001, "unit": "1"},
+        f"{SPRING}.spring_stiffness": {"value": 21.02, "std": 0.0, "unit": "N m/rad"},
+    }
+    first = given["candidates"][0] | {"effect": effect, "probability": 0.97, "parameters": parameters}
+    unknown = given["candidates"][2] | {"probability": 0.02}
+    given |= {"causes": [DRY, SPRING], "ambiguous_with": [], "candidates": [first, unknown]}
+    given["waterfall"] = [
+        {"effect": None, "excess": 10.0}, {"effect": SPRING, "excess": 4.0}, {"effect": DRY, "excess": 0.0},
+    ]  # fmt: skip
+    given["rest"] |= {"significant": False, "material": False}
+    given["coefficients"] = {
+        "before": {"cn_beta": {"value": 0.478, "std": 0.02, "unit": "1/rad"},
+                   "cn_r": {"value": -0.19, "std": 0.02, "unit": "1/rad"}},
+        "after": {"cn_beta": {"value": 0.432, "std": 0.0066, "unit": "1/rad"},
+                  "cn_r": {"value": -0.152, "std": 0.0046, "unit": "1/rad"}},
+    }  # fmt: skip
+    return given | changes
+
+
+def test_two_causes_with_their_sizes_the_probability_the_cost_and_the_first_step() -> None:
+    head = Head.of(findings_of(two_causes()))
+    assert head.what == (
+        "A spring of 21.02 N m/rad that is 1.91 % softer than stated; and dry friction of 0.00600 N m"
+    )
+    assert head.sure == "97 %; the only other reading: an unknown cause (2 %)"
+    assert head.costs == (
+        "Cnβ 0.432 ± 0.013 instead of 0.478;\nCnr -0.1520 ± 0.0090 instead of -0.1900 (per rad, 95 %)"
+    )
+    assert (
+        head.first == "Measure the stiffness of the spring of 21.02 N m/rad again: removes 60.0 % of the gap."
+    )
+    assert head.kind == "found"
+    assert not head.warnings
+
+
+def test_the_head_is_the_same_in_every_face() -> None:
+    answer = findings_of(two_causes())
+    head = Head.of(answer)
+    assert as_text(head.section.blocks).splitlines()[0].startswith("What: A spring of 21.02 N m/rad")
+    assert str(answer).startswith(f"What: {head.what}"[:60])
+
+
+@pytest.mark.parametrize(
+    ("changes", "what", "sure", "costs", "first"),
+    [
+        ({"causes": []}, "No gap: the model agrees", "Nothing beyond chance (p ", "Nothing: Cn", "Use"),
+        ({"causes": ["unknown"]}, "A gap that no known effect explains; it acts on the damping", "97 %", "Not corr",
+         "Examine what acts on the damping"),
+        ({"causes": ["damping_scatter"]}, "The runs differ from each other by chance", "97 %", "Cnβ 0.4", "Run"),
+    ],
+)  # fmt: skip
+def test_other_kinds_of_answers(changes: Any, what: str, sure: str, costs: str, first: str) -> None:
+    head = Head.of(findings_of(two_causes(**changes)))
+    for line, begins in ((head.what, what), (head.sure, sure), (head.costs, costs), (head.first, first)):
+        assert line.startswith(begins)
+
+
+def test_an_undecided_answer_names_no_cause_and_advises_no_repair() -> None:
+    given = two_causes()
+    given["candidates"][0]["probability"], given["candidates"][1]["probability"] = 0.45, 0.40
+    given |= decision(
+        [(f"{DRY} + {SPRING}", 0.45), ("unknown", 0.40), (DRY, 0.15)], Settings().answer
+    ).to_json_dict()
+    head = Head.of(findings_of(given))
+    assert head.what == "A gap of undecided cause"
+    assert (
+        head.sure
+        == "Not yet: 45 % coulomb friction + spring miscalibration; 40 % an unknown cause; 15 % another"
+    )
+    assert head.costs.startswith("Over the likely answers: ")
+    steps = next_steps(findings_of(given))
+    assert steps[0].startswith("Make one more run: spring of 81.5 N m/rad, wind at 18.25 m/s")
+    assert "Do not repair" in steps[-1]
+    assert not any("Reduce the dry friction" in step for step in steps)
+    without = next_steps(findings_of(given | {"next_run": None}))
+    assert without[0].startswith("Add runs with other springs, wind speeds and release angles")
+
+
+def test_steps_are_ordered_by_the_share_of_the_gap_and_scatter_comes_after_the_causes() -> None:
+    given = two_causes(causes=[DRY, "damping_scatter", SPRING])
+    given["candidates"][0]["effect"] += " + damping_scatter"
+    answer = findings_of(given)
+    parts = shares_of_gap(answer)
+    assert (parts[SPRING][0], parts[DRY][0]) == (pytest.approx(0.6), pytest.approx(0.4))
+    spring, dry, bearing, *_ = next_steps(answer)
+    assert spring.endswith("removes 60.0 % of the gap.")
+    assert dry.endswith("removes 40.0 % of the gap.")
+    assert bearing.startswith("Run the bearing in")
+    given["waterfall"][1:] = [{"effect": DRY, "excess": 3.0}, {"effect": SPRING, "excess": 0.0}]
+    assert next_steps(findings_of(given))[0].endswith("removes 70.0 % of the gap.")
+    assert not any("tunnel" in step for step in next_steps(answer))
+
+
+@pytest.mark.parametrize(("source", "step", "left"), [
+    ("noise", "Repeat every run three times more", 0.5), ("freed form", "Add runs with other release angles", 0.0),
+])  # fmt: skip
+def test_a_wide_interval_has_a_step_that_narrows_it(source: str, step: str, left: float) -> None:
+    given = two_causes()
+    wide = given["coefficients"]["after"]["cn_r"]
+    wide |= {"std": 0.03, "shares": {source: 0.9999999}}
+    (found,) = (one for one in next_steps(findings_of(given)) if one.startswith(step))
+    now = 196.0 * 0.03 / 0.152
+    assert_shows(found.partition(": Cnr becomes ")[2].replace("0.01", "0"), [left * now, now])
+    wide["std"] = 0.003
+    assert not any(one.startswith(step) for one in next_steps(findings_of(given)))
+
+
+def test_the_only_cause_names_the_errors_that_go_with_it() -> None:
+    given = two_causes(causes=[DRY])
+    given["candidates"][0] |= {"effect": DRY}
+    given["waterfall"] = [{"effect": None, "excess": 10.0}, {"effect": DRY, "excess": 0.0}]
+    first = next_steps(findings_of(given))[0]
+    assert first == (
+        "Reduce the dry friction of the bearing and the potentiometer: removes the whole gap, the 11 % error of "
+        "Cnβ and the 25 % error of Cnr."
+    )
+
+
+def test_a_caveat_that_changes_the_answer_stands_in_the_head_and_no_other() -> None:
+    given = two_causes()
+    given["found"]["cautions"] = [
+        {"kind": "only one run", "run": "beta", "effects": [DRY]},
+        {"kind": "few runs", "runs": 3, "driven": False, "windy": True},
+    ]
+    (warning,) = Head.of(findings_of(given)).warnings
+    assert warning.startswith("Only run beta shows coulomb friction")
+
+
+def test_no_number_of_the_head_contradicts_the_verdict() -> None:
+    answer = findings_of(two_causes())
+    said, head = verdict(answer, ""), Head.of(answer)
+    assert "probability" in said
+    assert head.sure.partition(";")[0] in said or "97 %" in head.sure
+    assert "Cnβ falls by 10 % (0.478 → 0.432)" in said
+    assert "0.432" in head.costs
+    assert "0.478" in head.costs
+
+
+@pytest.mark.parametrize(("value", "std", "interval", "shown"), [
+    (0.457083, 1.2e-5, None, "0.4571 ± 0.0001"), (0.432, 0.0066, None, "0.432 ± 0.013"),
+    (14.2, 0.7, None, "14.2 ± 1.4"),
+    (-0.152, 0.0046, None, "-0.1520 ± 0.0090"), (0.0012, 1e-3, (0.0001, 0.0056), "0.0012 (0.0001 to 0.0056)"),
+    (0.5, None, None, "0.500"),
+])  # fmt: skip
+def test_an_interval_has_two_digits_and_its_value_four_at_most(
+    value: float, std: float | None, interval: Any, shown: str
+) -> None:
+    text, places = to_interval(Quantity(value, std, "1/rad", interval))
+    assert text == shown
+    assert places == len(text.split()[0].partition(".")[2])
+
+
+def test_changes_have_no_powers_of_ten() -> None:
+    for change in (*np.logspace(-9, 3, 60), 0.0, -3.4e-7, -0.02):
+        assert "e" not in changed_by(float(change)).replace("less", "")
+    assert changed_by(3.4e-7) == "less than 0.01 %"
+    assert changed_by(2.1) == "+210 %"
