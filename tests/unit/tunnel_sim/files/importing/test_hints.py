@@ -162,7 +162,9 @@ def test_a_speed_in_a_file_name_is_proposed(tmp_path: Path) -> None:
     paths = [csv(tmp_path, f"S16_V{speed}_r{n}.csv") for n, speed in enumerate((0, 10, "12.5"), 1)]
     with pytest.raises(Unstated, match=r'--name "S\{spring\}_V\{wind_speed\}\*" uses it') as caught:
         read_records(paths)
-    assert "'V10' in the file's name is left out: it may state wind_speed = 10" in caught.value.what
+    assert "a number in the files' names is left out: it may state wind_speed" in caught.value.what
+    assert "S16_V10_r2.csv" in caught.value.where  # both files with a wind, in one refusal
+    assert "S16_V12.5_r3.csv" in caught.value.where
     choices = ImportChoices(name="S{spring}_V{wind_speed}*", conditions=setting("air_density=1.2").conditions)
     runs = read_records(paths, choices).campaign.runs
     assert [(run.spring_stiffness, run.wind_speed) for run in runs] == [
