@@ -15,7 +15,7 @@ from typer import Argument, Option
 
 from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import say, say_written, show
+from tunnel_lab.terminal.outputs import say, say_sentence, say_written, show
 from tunnel_sim.files.campaign_folder import IMPORT_PICTURE
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
@@ -209,7 +209,7 @@ def import_files(
     notes, judged = imported.summary()
     for word, lines in (("Note", notes), ("Check", judged)):
         for line in lines:
-            say(f"{word}: {line}")
+            say_sentence(f"{word}: {line}")
     if out is None:
         assert preview is not None
         write_whole(preview, import_picture(imported))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import fill
 
 from rich.console import Console
 from rich.style import Style
@@ -39,6 +40,14 @@ def say(line: str, *, stderr: bool = False) -> None:
     console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
+def say_sentence(line: str) -> None:
+    """Print one line, wrapped at words in a terminal; no word is broken, so that paths can be copied."""
+    out = console(stderr=chosen.get() is not TableFormat.TEXT)
+    if out.is_terminal:
+        line = fill(line, out.width, break_long_words=False, break_on_hyphens=False)
+    out.print(line, soft_wrap=True)
+
+
 def say_written(*paths: Path | None, more: str = "", picture: Path | None = None) -> None:
     """Print the paths of the files that were written, in a terminal as links that open them.
 
@@ -71,7 +80,7 @@ def show(blocks: Iterable[Block]) -> None:
                 say("")
             _show_table(block)
         for line in lines(block):
-            say(line)
+            say_sentence(line)
         after_line = not isinstance(block, TextTable)
 
 
