@@ -16,7 +16,6 @@ from typer import Argument, Option
 from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_sentence, say_written, show
-from tunnel_sim.files.campaign_folder import IMPORT_PICTURE
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
@@ -196,6 +195,7 @@ def import_files(
       0 imported, 1 declined, 2 bad input; nothing is left half written.
     """
     from tunnel_lab.plotting.runs import import_picture
+    from tunnel_sim.files.campaign_folder import IMPORT_PICTURE
     from tunnel_sim.files.importing.records import read_records
     from tunnel_sim.files.importing.writing import write_imported
     from tunnel_sim.files.writing import write_whole
@@ -229,7 +229,7 @@ def import_files(
 
 def _would_be_written(imported: Imported, out: Path, *, overwrite: bool) -> str:
     """The names of the files that an import would write, and its campaign.toml."""
-    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, check_target
+    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, IMPORT_PICTURE, check_target
     from tunnel_sim.files.importing.writing import write_imported
 
     check_target(out, overwrite=overwrite)

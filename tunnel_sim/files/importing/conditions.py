@@ -24,7 +24,7 @@ from tunnel_sim.files.importing.condition_names import (
     units_of,
 )
 from tunnel_sim.files.importing.condition_table import ConditionTable
-from tunnel_sim.files.importing.remarks import Remark, doubt
+from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table
 from tunnel_sim.files.importing.units import claims, known_unit, split_unit
 from tunnel_sim.files.plausible import plausible_values
@@ -193,10 +193,10 @@ def from_facts(
     return conditions, hints
 
 
-def stated_remark(key: str, value: float, place: str) -> Remark:
+def stated_remark(key: str, value: float, place: str) -> ImportRemark:
     """The remark that a place states a condition; the table of runs has the numbers of some."""
     text = f"{key} = {value:g} from {place}"
-    return Remark(text, f"{key} from {place}" if key in _IN_TABLE else text)
+    return ImportRemark(text, f"{key} from {place}" if key in _IN_TABLE else text)
 
 
 def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:

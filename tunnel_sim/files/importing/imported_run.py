@@ -13,7 +13,7 @@ from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import Unstated, check_density, check_wind, conditions_of
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
-from tunnel_sim.files.importing.remarks import Remark, doubt
+from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import one_line, shown
@@ -139,14 +139,14 @@ def _on_the_cut(
     elif piece.first:
         rate = raw.quantity == "rate"
         at = "at the largest rate after the release" if rate else "where the body is released"
-        remarks.append(Remark(f"begins at {first} s, {at}", f"begins {at}"))
+        remarks.append(ImportRemark(f"begins at {first} s, {at}", f"begins {at}"))
     if piece.last < raw.cleaned.time_s.size and piece.stopped:
         remarks.append(
             doubt(f"ends at {last} s, where something stops the body; --end {name}=SECONDS changes it")
         )
     elif piece.last < raw.cleaned.time_s.size:
         why = "with the motion or before the next run"
-        remarks.append(Remark(f"ends at {last} s, {why}", f"ends {why}"))
+        remarks.append(ImportRemark(f"ends at {last} s, {why}", f"ends {why}"))
     for level, samples in clipped(reading):
         until = clock_text(float(clock[samples[-1]]))
         cut = (

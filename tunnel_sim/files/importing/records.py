@@ -24,7 +24,7 @@ from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pa
 from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
-from tunnel_sim.files.importing.remarks import Remark
+from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count, stem_of
@@ -80,23 +80,25 @@ class Imported:
         judged = [line for line in lines if line.doubt]
         return [*(line for line in lines if not line.doubt), *self.said], list(judged)
 
-    def _with_places(self, path: Path | None = None, *, short: bool = False) -> list[Remark]:
+    def _with_places(self, path: Path | None = None, *, short: bool = False) -> list[ImportRemark]:
         """The remarks on files and runs, each once after the places that it concerns."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
         found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
-        places: dict[Remark, list[str]] = {}
+        places: dict[ImportRemark, list[str]] = {}
         for text, place in dict.fromkeys(found):
-            remark = text if isinstance(text, Remark) else Remark(text)
-            key = Remark(remark.short, doubt=remark.doubt) if short else remark
+            remark = text if isinstance(text, ImportRemark) else ImportRemark(text)
+            key = ImportRemark(remark.short, doubt=remark.doubt) if short else remark
             if place not in places.setdefault(key, []):
                 places[key].append(place)
         lines = []
         for remark, names in places.items():
             more = f" and {len(names) - 6} more" if len(names) > 6 else ""
             everywhere = "all runs" if len(names) == len(self.parts) > 1 else ""
-            lines.append(Remark(f"{everywhere or ', '.join(names[:6]) + more}: {remark}", doubt=remark.doubt))
+            lines.append(
+                ImportRemark(f"{everywhere or ', '.join(names[:6]) + more}: {remark}", doubt=remark.doubt)
+            )
         return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class Remark(str):
+class ImportRemark(str):
     """A remark with its short form, to be read beside the table of runs.
 
     A plain text is a remark whose short form is itself. Text and short form are single lines.
@@ -19,13 +19,13 @@ class Remark(str):
     short: str
     doubt: bool
 
-    def __new__(cls, text: str, short: str | None = None, *, doubt: bool = False) -> Remark:
+    def __new__(cls, text: str, short: str | None = None, *, doubt: bool = False) -> ImportRemark:
         """A remark; arguments as above."""
         made = super().__new__(cls, text)
         made.short, made.doubt = text if short is None else short, doubt
         return made
 
 
-def doubt(text: str, short: str | None = None) -> Remark:
-    """A remark that the user has to judge; arguments as in `Remark`."""
-    return Remark(text, short, doubt=True)
+def doubt(text: str, short: str | None = None) -> ImportRemark:
+    """A remark that the user has to judge; arguments as in `ImportRemark`."""
+    return ImportRemark(text, short, doubt=True)
