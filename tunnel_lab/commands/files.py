@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
 
 from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
-from tunnel_lab.terminal.outputs import say, show
+from tunnel_lab.terminal.outputs import say, say_sentence, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
 from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.choices import ImportChoices
+    from tunnel_sim.files.importing.records import Imported
 
 _column = partial(Option, rich_help_panel="Columns")
 _unit = partial(Option, rich_help_panel="Units")
@@ -92,11 +94,15 @@ class StatedChoices:
         ),
     ] = ()
     start: Annotated[
-        float | None, _runs("--start", help="Leave out samples before this time of the file, s.")
-    ] = None
-    end: Annotated[float | None, _runs("--end", help="Leave out samples after this time of the file, s.")] = (
-        None
-    )
+        tuple[str, ...],
+        _runs(
+            "--start", metavar="[RUN=]S", help="First time of all files, or of one run, s. May be repeated."
+        ),
+    ] = ()
+    end: Annotated[
+        tuple[str, ...],
+        _runs("--end", metavar="[RUN=]S", help="Last time of all files, or of one run, s. May be repeated."),
+    ] = ()
     rest: Annotated[
         float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
     ] = None
@@ -117,7 +123,12 @@ class StatedChoices:
 
     def choices(self) -> ImportChoices:
         """The choices of the recipe, replaced where an option states another."""
-        from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, read_recipe
+        from tunnel_sim.files.importing.choices import (
+            ImportChoices,
+            parse_setting,
+            parse_times,
+            read_recipe,
+        )
         from tunnel_sim.files.toml_input import validate
 
         numbers: dict[str, float] = {}
@@ -126,10 +137,18 @@ class StatedChoices:
             conditions, columns = parse_setting(word, "--set")
             numbers |= conditions.model_dump(exclude_none=True)
             names |= columns.model_dump(exclude_none=True)
+        ends = {key: parse_times(getattr(self, key), f"--{key}") for key in ("start", "end")}
         kept = {} if self.recipe is None else read_recipe(self.recipe).model_dump(exclude_defaults=True)
         others = {"table", "settings", "recipe"}
         stated = {name: value for name, value in vars(self).items() if name not in others}
         stated |= {"conditions": numbers or None, "stated_by": names or None}
+        stretches: dict[str, dict[str, Any]] = {}
+        for key, times in ends.items():
+            stated[key] = times.pop("", None)
+            for run, time in times.items():
+                stretches.setdefault(run, {"run": run})[key] = time
+        if stretches:
+            stated["stretches"] = (*stretches.values(), *kept.get("stretches", ()))
         given = {name: value for name, value in stated.items() if value not in (None, ())}
         return validate(ImportChoices, kept | given, Path("options"))
 
@@ -148,6 +167,9 @@ def import_files(
         output_file("--preview", ".png", help="Draw the records; write no campaign.", panel="Output"),
     ] = None,
     yes: Annotated[bool, _output("--yes", "-y", help="Write without asking.")] = False,
+    dry_run: Annotated[
+        bool, _output("--dry-run", help="Show the files that would be written; write nothing.")
+    ] = False,
     overwrite: Annotated[
         bool, _output("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
@@ -156,10 +178,10 @@ def import_files(
 
     Text of any dialect, LVM, Excel, MAT, TDMS, HDF5, Parquet and JSON are read, also
     compressed (.csv.gz). Columns, units, sample rate, runs and releases are detected;
-    the choices and their reasons are printed before anything is written, and options
-    correct them. The campaign has a picture (import.png), the choices (import.toml, for
-    --recipe), and comments in campaign.toml on conditions that the files do not state,
-    such as the stiffness.
+    the choices and their reasons are printed before anything is written, at the end
+    the points to check, each with the option that settles it. The campaign has a
+    picture (import.png), the choices (import.toml, for --recipe), and comments in
+    campaign.toml on conditions that the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig
@@ -173,6 +195,7 @@ def import_files(
       0 imported, 1 declined, 2 bad input; nothing is left half written.
     """
     from tunnel_lab.plotting.runs import import_picture
+    from tunnel_sim.files.campaign_folder import IMPORT_PICTURE
     from tunnel_sim.files.importing.records import read_records
     from tunnel_sim.files.importing.writing import write_imported
     from tunnel_sim.files.writing import write_whole
@@ -183,12 +206,17 @@ def import_files(
     name = out.resolve().name if out else ""
     imported = read_records(files, stated.choices(), conditions=stated.table, name=name)
     show([parts_table(imported)])
-    for line in imported.remarks():
-        say(f"Note: {line}")
+    notes, judged = imported.summary()
+    for word, lines in (("Note", notes), ("Check", judged)):
+        for line in lines:
+            say_sentence(f"{word}: {line}")
     if out is None:
         assert preview is not None
         write_whole(preview, import_picture(imported))
-        say(f"Written: {preview}")
+        say_written(preview)
+        return
+    if dry_run:
+        say(_would_be_written(imported, out, overwrite=overwrite))
         return
     if not yes and not sys.stdin.isatty():
         raise TunnelError("cannot be confirmed without a terminal", where=str(out), remedy="add --yes")
@@ -196,7 +224,22 @@ def import_files(
         raise typer.Exit(1)
     write_imported(imported, out, overwrite=overwrite, picture=import_picture)
     count = len(imported.campaign.runs)
-    say(f"Written: {out} ({counted(count, 'run')}, {out / 'import.png'} shows them)")
+    say_written(out, more=counted(count, "run"), picture=out / IMPORT_PICTURE)
+
+
+def _would_be_written(imported: Imported, out: Path, *, overwrite: bool) -> str:
+    """The names of the files that an import would write, and its campaign.toml."""
+    from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, IMPORT_PICTURE, check_target
+    from tunnel_sim.files.importing.writing import write_imported
+
+    check_target(out, overwrite=overwrite)
+    with TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "campaign"
+        write_imported(imported, folder)
+        names = [path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file()]
+        text = (folder / CAMPAIGN_FILE).read_text(encoding="utf-8")
+    listed = "\n".join(f"  {out / name}" for name in (*names, Path(IMPORT_PICTURE)))
+    return f"Nothing is written. Without --dry-run:\n{listed}\n\n{out / CAMPAIGN_FILE}:\n\n{text.rstrip()}"
 
 
 class ExportFormat(StrEnum):

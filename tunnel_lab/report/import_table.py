@@ -11,13 +11,12 @@ if TYPE_CHECKING:
 
 
 def parts_table(imported: Imported) -> TextTable:
-    """The runs of an import: samples, rate, begin and end, swing, conditions, and the file where several."""
+    """The runs of an import: samples, rate, begin and end, swing, and conditions."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
     used = [part.run for part in imported.parts if part.run is not None]
     windless = all(run.drive is not None and run.wind_speed == 0.0 for run in used)  # a joint
     wind = () if windless else ("V\n[m/s]",)
     headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, *wind, "Kr\n[N m/rad]")
-    several = len(imported.sources) > 1
     rows = []
     for part in imported.parts:
         time, run = part.raw.cleaned.file_time_s[part.piece.first : part.piece.last], part.run
@@ -25,11 +24,11 @@ def parts_table(imported: Imported) -> TextTable:
         if run is not None:
             cells[1:] = [
                 f"{run.record.sample_rate:.4g}",
-                f"{time[0]:.2f}",
-                f"{time[-1]:.2f}",
+                f"{time[0]:.3f}",
+                f"{time[-1]:.3f}",
                 f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
                 *([f"{run.wind_speed:g}"] if wind else []),
                 "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             ]
-        rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
-    return TextTable("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
+        rows.append((part.id, *cells))
+    return TextTable("Read", ("run", *headings), tuple(rows), right=headings)

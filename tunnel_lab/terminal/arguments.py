@@ -42,8 +42,10 @@ def given_campaign(path: Path) -> Campaign:
     """
     from tunnel_lab.terminal.outputs import say
     from tunnel_lab.terminal.progress import bar
+    from tunnel_sim.files.as_campaign import refuse_records
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
 
+    refuse_records(path)
     if not path.is_file() or path.name == CAMPAIGN_FILE:
         with bar("reading runs") as progress:
             return read_campaign(path, progress)

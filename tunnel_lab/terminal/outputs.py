@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import fill
 
 from rich.console import Console
+from rich.style import Style
+from rich.text import Text
 
 from identification.show.blocks import Block, TextTable, brief, lines
 from tunnel_lab.terminal.table_format import TableFormat, chosen, quiet
-from tunnel_lab.terminal.table_layout import in_columns, is_too_wide, rendered, stacked
+from tunnel_lab.terminal.table_layout import (
+    folded,
+    in_columns,
+    is_too_wide,
+    rendered,
+    stacked,
+    without_shared,
+)
 
 
 class _Console(Console):
@@ -30,10 +40,35 @@ def say(line: str, *, stderr: bool = False) -> None:
     console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
-def say_written(*paths: Path | None) -> None:
-    """Print the paths of the files that were written; None is left out."""
+def say_sentence(line: str) -> None:
+    """Print one line, wrapped at words in a terminal; no word is broken, so that paths can be copied."""
+    out = console(stderr=chosen.get() is not TableFormat.TEXT)
+    if out.is_terminal:
+        line = fill(line, out.width, break_long_words=False, break_on_hyphens=False)
+    out.print(line, soft_wrap=True)
+
+
+def say_written(*paths: Path | None, more: str = "", picture: Path | None = None) -> None:
+    """Print the paths of the files that were written, in a terminal as links that open them.
+
+    Args:
+        paths: None is left out.
+        more: words after a path, in brackets.
+        picture: shows the content; its path ends the words.
+    """
     for path in filter(None, paths):
-        say(f"Written: {path}")
+        line = Text("Written: ").append_text(_link(path))
+        if more or picture:
+            line.append(f" ({more}")
+            if picture is not None:
+                line.append(", ").append_text(_link(picture)).append(" shows them")
+            line.append(")")
+        console(stderr=chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
+
+
+def _link(path: Path) -> Text:
+    """A path as a link (OSC 8), which terminals that know none print as the path alone."""
+    return Text(str(path), Style(link=path.resolve().as_uri()))
 
 
 def show(blocks: Iterable[Block]) -> None:
@@ -45,7 +80,7 @@ def show(blocks: Iterable[Block]) -> None:
                 say("")
             _show_table(block)
         for line in lines(block):
-            say(line)
+            say_sentence(line)
         after_line = not isinstance(block, TextTable)
 
 
@@ -54,9 +89,15 @@ def _show_table(table: TextTable) -> None:
     out, kind = console(), chosen.get()
     if kind is not TableFormat.TEXT:
         out.print(rendered(table, kind), soft_wrap=True, end="")
-    elif is_too_wide(table, out.width):
-        out.print(stacked(table, out.width), soft_wrap=True)
-    else:
+    elif not is_too_wide(table, out.width):
         out.print(in_columns(table))
+    else:
+        narrow, shared = without_shared(table)
+        fitting = narrow if not is_too_wide(narrow, out.width) else folded(narrow, out.width)
+        if fitting is None:
+            out.print(stacked(table, out.width), soft_wrap=True)
+        else:
+            out.print(in_columns(fitting))
+            out.print(shared, end="\n" if shared else "")
     if kind is not TableFormat.JSON:
         out.print()

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from textwrap import wrap
 
@@ -22,6 +23,7 @@ from tunnel_sim.vocabulary.text_cells import as_text_cell
 PROSE = 30
 """Columns: a longer cell is a sentence, which may be wrapped."""
 _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
+_FOLDED = 16  # columns: a first cell is not folded to less
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
@@ -79,8 +81,39 @@ def in_columns(table: TextTable) -> RichTable:
 
 def is_too_wide(table: TextTable, width: int) -> bool:
     """Whether cells other than sentences, or words of a heading, would be broken at this width."""
+    return _spare(table, width) < 0
+
+
+def _spare(table: TextTable, width: int) -> int:
+    """Columns left at this width; negative: so many are missing."""
     needed = sum(least + _PADDING for least in _least_widths(table))
-    return needed + _BETWEEN * (len(table.columns) - 1) > width
+    return width - needed - _BETWEEN * (len(table.columns) - 1)
+
+
+def without_shared(table: TextTable) -> tuple[TextTable, str]:
+    """A table without the columns whose cells are equal in all rows, and these in words; the first column stays."""
+    if len(table.rows) < 2:
+        return table, ""
+    cells = list(zip(*table.rows, strict=True))
+    kept = [at for at, column in enumerate(cells) if at == 0 or len(set(column) - {""}) > 1]
+    shared = [
+        f"{_on_one_line(table.columns[at])} {_on_one_line(max(column))}"
+        for at, column in enumerate(cells)
+        if at not in kept and max(column)
+    ]
+    rows = tuple(tuple(row[at] for at in kept) for row in table.rows)
+    words = f"In all rows: {', '.join(shared)}" if shared else ""
+    return replace(table, columns=tuple(table.columns[at] for at in kept), rows=rows), words
+
+
+def folded(table: TextTable, width: int) -> TextTable | None:
+    """A table whose long first cells are broken into lines to fit the width; None where that is not enough."""
+    least = _least_widths(table)[0]
+    room = least + _spare(table, width)
+    if room < _FOLDED or table.columns[0] in table.names:
+        return None
+    rows = tuple(("\n".join(wrap(row[0], room) or [""]), *row[1:]) for row in table.rows)
+    return replace(table, rows=rows)
 
 
 def _least_widths(table: TextTable) -> list[int]:

@@ -300,7 +300,7 @@ def write_campaign(
         remedy = did_you_mean(run_format, RUN_FORMATS)
         raise TunnelError(f"unknown run format '{run_format}'", where=shown(folder), remedy=remedy)
     clear_leftovers(folder.resolve().parent)  # restores a folder set aside by a killed command
-    _check_target(folder, overwrite=overwrite)
+    check_target(folder, overwrite=overwrite)
     # Run files are named by id where all ids are safe file names, else by number.
     ids = [run.id for run in campaign.runs]
     safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
@@ -331,7 +331,8 @@ def write_campaign(
     return folder
 
 
-def _check_target(folder: Path, *, overwrite: bool) -> None:
+def check_target(folder: Path, *, overwrite: bool) -> None:
+    """Refuse a folder in which no campaign can be written; arguments as in `write_campaign`."""
     where = shown(folder)
     if not folder.is_dir():
         if folder.exists() or folder.is_symlink():

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 _T = TypeVar("_T")
+_PLACES = 3  # listed of those with the same fault
 _LONGEST = 4096  # characters in one part of a message: the longest path
 
 
@@ -55,6 +56,22 @@ def joined(faults: Sequence[TunnelError]) -> TunnelError:
         "; ".join(texts) for texts in zip(*((one.what, one.remedy) for one in faults), strict=True)
     )
     return TunnelError(what, where=faults[0].where, remedy=remedy)
+
+
+def together(faults: Sequence[TunnelError]) -> TunnelError:
+    """Refusals of several places, at least one, as one refusal; equal ones are stated once, with their places."""
+    if len(faults) == 1:
+        return faults[0]
+    places: dict[tuple[str, str], dict[str, None]] = {}
+    for fault in faults:
+        places.setdefault((fault.what, fault.remedy), {})[fault.where] = None
+    found = []
+    for (what, remedy), names in places.items():
+        more = f" and {len(names) - _PLACES} more" if len(names) > _PLACES else ""
+        found.append(TunnelError(what, where=", ".join([*names][:_PLACES]) + more, remedy=remedy))
+    if len(found) == 1:
+        return found[0]
+    return TunnelError(". ".join(str(one) for one in found))
 
 
 def one_line(value: object, limit: int = 120) -> str:

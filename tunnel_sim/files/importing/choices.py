@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -37,7 +38,7 @@ class StatedBy(StrictModel):
 class Stretch(StrictModel):
     """``[[choices.stretches]]``: start and end of a run in its record, and its reading at rest; None: as found."""
 
-    file: OneLine = Field(description="the name of the file")
+    file: OneLine | None = optional("the name of the file; without it, any file")
     run: OneLine = Field(description="the name of the run")
     start: float | None = optional("the time of the release by the file's clock, in s")
     end: float | None = optional("the time at which the run ends by the file's clock, in s")
@@ -81,7 +82,7 @@ class ImportChoices(StrictModel):
 
     def stretch_of(self, file: str, run: str) -> Stretch:
         """The statement on start, end and rest of a run in its file."""
-        found = (one for one in self.stretches if (one.file, one.run) == (file, run))
+        found = (one for one in self.stretches if one.file in (file, None) and one.run == run)
         # A file may have a name that a recipe cannot express: there is then no statement about it.
         return next(found, Stretch.model_construct(file=file, run=run))
 
@@ -121,6 +122,23 @@ def _factor(key: str, unit: str, where: str) -> float:
         remedy = f"use one of {allowed}" if allowed != "1" else f"give {key} as a number without a unit"
         raise TunnelError(what, where=where, remedy=remedy)
     return factor
+
+
+def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
+    """Times in s by run, under the empty name that of all files, from words ``SECONDS`` or ``RUN=SECONDS``.
+
+    Raises:
+        TunnelError: for a word of another form.
+    """
+    times = {}
+    for word in words:
+        run, _, seconds = word.rpartition("=")
+        try:
+            times[run.strip()] = float(seconds)
+        except ValueError:
+            what = f"'{one_line(word, 40)}' is not a time"
+            raise TunnelError(what, where=option, remedy="give SECONDS or RUN=SECONDS") from None
+    return times
 
 
 def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:

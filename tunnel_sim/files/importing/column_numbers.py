@@ -11,6 +11,7 @@ import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
+from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
@@ -142,7 +143,8 @@ def in_seconds(
     if not unit:
         _ask_for_unit(times, ("time",), "--time-unit", where)
         unit, step = guessed_time_unit(values)
-        said.append(f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}")
+        taken = f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}"
+        said.append(doubt(f"{taken}; --time-unit changes this"))
     return values * UNITS["time"][unit] if unit != "s" else values
 
 
@@ -221,9 +223,12 @@ def in_radians(
                 remedy = 'give --calibration "a + b*V", or --unit if it is an angle'
                 raise TunnelError(what, where=where, remedy=remedy)
         unit, swing = guessed_angle_unit(values)
+        no_unit, change = f"the file states no unit of '{reading.name}'", "--unit changes this"
         said.append(
-            f"the file states no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit "
-            "changes this"
+            doubt(
+                f"{no_unit}: a swing of ±{swing:.4g} is taken as {unit}; {change}",
+                f"{no_unit}: it is taken as {unit}; {change}",
+            )
         )
     kind = kind_of(unit)
     factor = UNITS[kind][unit]
@@ -232,8 +237,8 @@ def in_radians(
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
-        what = f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn"
-        remedy = "give --unit deg if it does, or --counts-per-turn N for an encoder"
+        what = f"'{one_line(reading.name, 40)}' would swing by more than half a turn in degrees"
+        remedy = "give --counts-per-turn N for an encoder, or --unit deg if it does"
         raise TunnelError(what, where=where, remedy=remedy)
     return values, quantity, unit
 

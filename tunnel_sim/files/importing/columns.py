@@ -37,6 +37,7 @@ from tunnel_sim.files.importing.inputs import (
     names_input,
     stated_input,
 )
+from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -155,15 +156,18 @@ def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[s
         good = np.isfinite(values) & np.isfinite(reading)
         if np.count_nonzero(good) >= _LEAST_JUDGED and moves_before(values[good], reading[good]):
             moving.append(channel)
-    remarks = [
-        f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; "
-        "--input uses it if it drives the body"
+    remarks: list[str] = [
+        doubt(
+            f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; "
+            "--input uses it if it drives the body"
+        )
         for c in moving
         if columns.input is None
     ]
     rest = [channel for channel in others if channel not in moving or columns.input is not None]
     if rest:
-        remarks.append(f"columns that are not used: {listed(rest)}")
+        use = "--set KEY=NAME uses one that states a condition"
+        remarks.append(doubt(f"columns that are not used: {listed(rest)}; {use}"))
     return remarks
 
 
@@ -239,7 +243,8 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
         elif clocks:
             time = clocks[0]
             if len(clocks) > 1:
-                remarks.append(f"times from '{time.name}', the first of {len(clocks)} columns of times")
+                which = f"times from '{time.name}', the first of {len(clocks)} columns of times"
+                remarks.append(doubt(f"{which}; --time names another"))
         elif choices.rate is None:
             for channel in _unconditional(block, choices):
                 numbers = channel.values[np.isfinite(channel.values)][:_HEAD]

@@ -66,7 +66,7 @@ _WINDY = re.compile(
 )
 """Words of a name that suggest a speed of the wind."""
 _NOT_WINDY = re.compile(
-    r"(?i)ang|winkel|dreh|omega|motor|shaft|servo|joint|wheel|yaw|gyro|temp|press(ure)?$|druck$|humid|feucht|density|"
+    r"(?i)(?<![a-z])t_(?=air|luft|flow|tunnel|wind)|ang|winkel|dreh|omega|motor|shaft|servo|joint|wheel|yaw|gyro|temp|press(ure)?$|druck$|humid|feucht|density|"
     r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light|step|index|count|code"
 )
 _FAN = re.compile(r"(?i)(?<![a-z])(fan|blower|gebl[äa]se|tunnel|wind|windkanal)(?![a-z])")
@@ -109,6 +109,8 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
     name = re.sub(r"\s*[(\[{<].*", "", name)  # an unknown unit remains in the name
     plain = re.sub(r"[\s_.-]+", " ", name).strip()
     found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
+    if found is None and kind_of(unit) == "stiffness" and _LIKE["spring_stiffness"].fullmatch(plain):
+        return "spring_stiffness"
     # A unit of time does not fit such a name.
     symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
     return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
@@ -153,6 +155,7 @@ class Hint:
         what: its description in the file or its name, for a message.
         why: the reason for not using it.
         use: the option that uses or states it.
+        brief: the hint without its number, the same for every run; empty: the words without it.
         symbol: whether only a column's letter suggests it, which in a robot's log is a command or a velocity.
     """
 
@@ -162,8 +165,14 @@ class Hint:
     why: str
     use: str
     symbol: bool = False
+    brief: str = ""
 
     @property
     def words(self) -> str:
         """The whole hint in a line."""
         return f"{self.what} is left out: {self.why}; {self.use}"
+
+    @property
+    def short(self) -> str:
+        """The hint without its number, the same for every run."""
+        return self.brief or re.sub(r"(?<=') = [-+\w.]+", "", self.words, count=1)

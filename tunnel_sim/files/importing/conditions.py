@@ -24,15 +24,18 @@ from tunnel_sim.files.importing.condition_names import (
     units_of,
 )
 from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table
 from tunnel_sim.files.importing.units import claims, known_unit, split_unit
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import validate
+from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 
 _OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
+_IN_TABLE = ("wind_speed", "spring_stiffness")  # columns of the table of runs
 _LISTED = 10  # statements of a file that are listed in a remark
 
 
@@ -186,8 +189,14 @@ def from_facts(
         hints.remove(symbols[0])
     for key, value in conditions.items():
         named = "" if names[key] == key else f" ({names[key]})"
-        said.append(f"{key} = {value:g} from the file{named}")
+        said.append(stated_remark(key, value, f"the file{named}"))
     return conditions, hints
+
+
+def stated_remark(key: str, value: float, place: str) -> ImportRemark:
+    """The remark that a place states a condition; the table of runs has the numbers of some."""
+    text = f"{key} = {value:g} from {place}"
+    return ImportRemark(text, f"{key} from {place}" if key in _IN_TABLE else text)
 
 
 def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
@@ -277,15 +286,33 @@ def conditions_of(
     return found, sizes
 
 
-def refuse_open_wind(
-    table: Table, beside: Sequence[Channel | None], choices: ImportChoices, where: str
+def refuse_open_conditions(
+    table: Table,
+    beside: Sequence[Channel | None],
+    choices: ImportChoices,
+    named: Sequence[Hint],
+    where: str,
 ) -> None:
-    """Refuse a table beside whose records wind-off is not assumed, before they are known; arguments as above."""
+    """Refuse a table without a condition that only the user can state, before its records are known.
+
+    Args:
+        named: conditions that the name of the file seems to state; the others are as above.
+    """
     stated = find_conditions(table, beside, choices, [], where)
     rows = np.ones(table.channels[0].values.size, dtype=bool)
     given = choices.conditions.model_dump(exclude_none=True)
     known = {**stated.numbers, **stated.measured(rows, []), **given}
-    check_wind(known, stated.unused(rows), Path(), "", [], where, driven=True)
+    check_wind(known, [*stated.unused(rows), *named], Path(), "", [], where, driven=True)
+    check_density(known, known, where)
+
+
+def check_density(conditions: Mapping[str, float], sizes: Mapping[str, float], where: str) -> None:
+    """Refuse a run with the wind on whose air density is needed and not stated."""
+    scales = conditions.get("spring_stiffness"), sizes.get("frontal_area"), sizes.get("reference_length")
+    wind = conditions.get("wind_speed", 0.0)
+    if needs_density(wind, *scales) and "air_density" not in conditions:
+        what = f"wind-on ({wind:g} m/s) without air_density"
+        raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
 
 
 def check_wind(
@@ -300,18 +327,19 @@ def check_wind(
 ) -> None:
     """Report unused content that resembles a condition; refuse to assume wind-off where a wind is suggested."""
     open_ones = [hint for hint in hints if hint.key not in conditions]
-    said += [hint.words for hint in open_ones]
+    said += [doubt(hint.words, hint.short) for hint in open_ones]
     if "wind_speed" in conditions:
         return
     wind_off = "--set wind_speed=0 states wind-off"
     for hint in open_ones:
         letter = hint.symbol and driven  # beside a command it is a velocity or another command
         if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
-            what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
+            left_out = hint.brief.rpartition(";")[0] or f"{hint.what} is left out: {hint.why}"
+            what = f"{left_out}; wind-off is not assumed beside it"
             raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
     if WIND_ON.search(f"{stem_of(file)} {run}"):
         what = "the name states that the wind is on, but not its speed"
         remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
         raise Unstated(what, where=where, remedy=remedy)
     if not driven:
-        said.append("wind_speed is not stated: wind-off is assumed")
+        said.append(doubt("wind_speed is not stated: wind-off is assumed; --set wind_speed=SPEED states it"))

@@ -72,7 +72,9 @@ _LABELLED = re.compile(
     rf"(?P<unit>[ _-]?(?:m[_-]?s|{_UNIT}))?"
     rf"(?=$|[^a-z0-9]|(?:{_LABEL})\d)"
 )
-_MEASURED = re.compile(rf"(?i)(?<![^\W_])(?P<number>{_DIGITS})(?P<unit>[ _-]?(?:{_UNIT}))(?![^\W_])")
+_BEFORE = rf"(?i)(?<![^\W_])(?P<number>{_DIGITS})"
+_MEASURED = re.compile(rf"{_BEFORE}(?P<unit>[ _-]?(?:{_UNIT}))(?![^\W_])")
+_SPEED_OR_TIME = re.compile(rf"{_BEFORE}(?P<unit>[ _-]?ms)(?![^\W_])")
 _PLACES = {"spring_stiffness": "spring", "air_density": "density", "release_angle": "angle"}
 
 
@@ -101,12 +103,16 @@ class NamePart:
         return f"{self.before}{{{_PLACES.get(self.key, self.key)}}}{self.behind}"
 
 
-def name_parts(stem: str) -> list[NamePart]:
-    """Parts of a file's name that may state conditions, in their order, one for each condition."""
-    return list({part.key: part for part in [*_parts(stem)][::-1]}.values())[::-1]
+def name_parts(stem: str, *, speeds: bool = False) -> list[NamePart]:
+    """Parts of a file's name that may state conditions, in their order, one for each condition.
+
+    Args:
+        speeds: whether a number before "ms" may be a speed in m/s.
+    """
+    return list({part.key: part for part in [*_parts(stem, speeds=speeds)][::-1]}.values())[::-1]
 
 
-def _parts(stem: str) -> Iterator[NamePart]:
+def _parts(stem: str, *, speeds: bool) -> Iterator[NamePart]:
     found = []
     for match in _LABELLED.finditer(stem):
         label = match["label"].lower()
@@ -114,12 +120,12 @@ def _parts(stem: str) -> Iterator[NamePart]:
         unit = (match["unit"] or "").strip(" _-").lower()
         factor = _AFTER.get(key, {}).get(unit, 1.0 if unit in ("", "ms") else None)
         found.append((match, key, match["label"] + match["gap"], factor))
-    for match in _MEASURED.finditer(stem):
+    for match in (*_MEASURED.finditer(stem), *(_SPEED_OR_TIME.finditer(stem) if speeds else ())):
         if any(match.start() < other.end() and other.start() < match.end() for other, *_ in found):
             continue
         unit = match["unit"].strip(" _-").lower()
-        key = next(key for key, units in _AFTER.items() if unit in units)
-        found.append((match, key, "", _AFTER[key][unit]))
+        key = next((key for key, units in _AFTER.items() if unit in units), "wind_speed")
+        found.append((match, key, "", _AFTER[key].get(unit, 1.0)))
     for match, key, before, factor in sorted(found, key=lambda one: one[0].start()):
         if factor is not None:
             value = float(re.sub("[,p]", ".", match["number"])) * factor
@@ -128,11 +134,14 @@ def _parts(stem: str) -> Iterator[NamePart]:
 
 def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
     """Apparent statements in the names of files, with a pattern for them where all names have the same parts."""
-    pattern = _pattern(files)
+    # The number before "ms" differs between runs of several speeds; the sampling of a logger is the same.
+    numbers = [[match["number"] for match in _SPEED_OR_TIME.finditer(stem_of(path))] for path in files]
+    speeds = all(map(len, numbers)) and len({tuple(one) for one in numbers}) > 1
+    pattern = _pattern(files, speeds=speeds)
     found = {}
     for path in files:
         hints = []
-        for part in name_parts(stem_of(path)):
+        for part in name_parts(stem_of(path), speeds=speeds):
             what = f"'{stem_of(path)[part.start : part.end]}' in the file's name"
             why = f"it may state {part.key} = {part.value:g}"
             use = "--conditions RUNS.csv states it run by run"
@@ -141,16 +150,17 @@ def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
                 use = f'--name "{pattern}" uses it'
             elif len(files) == 1:
                 use = f"--set {part.key}={part.value:g} uses it"
-            hints.append(Hint(part.key, part.value, what, why, use))
+            brief = f"a number in the files' names is left out: it may state {part.key}; {use}"
+            hints.append(Hint(part.key, part.value, what, why, use, brief=brief if len(files) > 1 else ""))
         found[path] = hints
     return found
 
 
-def _pattern(files: Sequence[Path]) -> str:
+def _pattern(files: Sequence[Path], *, speeds: bool) -> str:
     """A pattern for `name_pattern` from the first name; empty if it does not fit all of them."""
     stem = stem_of(files[0])
     text, at = "", 0
-    parts = [part for part in name_parts(stem) if part.written]
+    parts = [part for part in name_parts(stem, speeds=speeds) if part.written]
     for part in parts:
         between = stem[at : part.start]
         text += re.sub(r".*[^\W_]|[{}*]", "*", between) + part.text
@@ -161,7 +171,8 @@ def _pattern(files: Sequence[Path]) -> str:
     compiled = name_pattern(text)
     keys = [part.key for part in parts]
     for path in files:
-        stated = {part.key: part.value for part in name_parts(stem_of(path)) if part.written}
+        parts = name_parts(stem_of(path), speeds=speeds)
+        stated = {part.key: part.value for part in parts if part.written}
         try:
             if from_name(compiled, path) != {key: stated.get(key) for key in keys}:
                 return ""

@@ -10,12 +10,14 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import clipped, clock_text, from_rest, from_zero
 from tunnel_sim.files.importing.condition_names import Hint
 from tunnel_sim.files.importing.condition_table import ConditionTable
-from tunnel_sim.files.importing.conditions import Unstated, check_wind, conditions_of
+from tunnel_sim.files.importing.conditions import Unstated, check_density, check_wind, conditions_of
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
+from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
-from tunnel_sim.files.toml_input import shown
-from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
+from tunnel_sim.files.reading import stem_of
+from tunnel_sim.files.toml_input import one_line, shown
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.inputs import INPUTS
@@ -72,17 +74,18 @@ def imported_run(
     Raises:
         Unstated: where a condition is open that only the user can state.
     """
-    where = f"{shown(raw.source)}, run '{name}'"
+    where = shown(raw.source) + ("" if name == one_line(stem_of(raw.source)) else f", run '{name}'")
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.file_time_s, piece, stretch, where)
     if name in choices.leave_out:
         return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
     if piece.doubt:
-        return ImportedRun(name, raw, piece, None, (f"left out: {piece.doubt}",), None, {})
+        why = doubt(f"left out: {piece.doubt}")
+        return ImportedRun(name, raw, piece, None, (why,), None, {})
     kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     clock = raw.cleaned.file_time_s[kept]
-    remarks = _on_the_cut(raw, piece, clock, reading, sensor.unit)
+    remarks = _on_the_cut(name, raw, piece, clock, reading, sensor.unit)
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
         reading = from_rest(reading, rest, sensor.unit, remarks, where)
@@ -90,16 +93,16 @@ def imported_run(
     stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, remarks, where)
     hints = [*raw.stated.unused(rows), *named]
     check_wind(stated, hints, raw.source, name, remarks, where, driven=raw.input is not None)
-    rig = choices.conditions
-    scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     held: dict[str, float] = {}
-    windy = needs_density(stated.get("wind_speed", 0.0), *scales) and "air_density" not in stated
-    if windy and later:
+    windy = False
+    try:
+        check_density(stated, choices.conditions.model_dump(), where)
+    except Unstated:
+        if not later:
+            raise
+        windy = True
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
-        remarks.append(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)")
-    elif windy:
-        what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
-        raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
+        remarks.append(doubt(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)"))
     drive = _drive(raw, kept, choices, remarks)
     without_spring_needs_drive((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
@@ -114,33 +117,42 @@ def imported_run(
         if record is None:
             record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
-        return ImportedRun(name, raw, piece, None, (*remarks, _left_out(error)), rest, sizes)
+        return ImportedRun(name, raw, piece, None, (*remarks, doubt(_left_out(error))), rest, sizes)
     if drive is None and stride <= 1 and (few := few_samples(record)):
-        remarks.append(few)
+        remarks.append(doubt(few))
     begun = float(clock[0] - record.time_s[0])
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive, clock_s=begun)
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
 
 
-def _on_the_cut(raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readings, unit: str) -> list[str]:
+def _on_the_cut(
+    name: str, raw: RawRecord, piece: RecordPiece, clock: Times, reading: Readings, unit: str
+) -> list[str]:
     """Remarks on the first and the last sample of a run, and on peaks that its sensor cuts off."""
-    remarks = []
-    if piece.first:
-        at = "where the body is released"
-        if raw.quantity == "rate":
-            at = "at the largest rate after the release"
-        elif piece.held > 0.0:
-            at = f"from where on the motion is free: the {piece.held:.3g} s before it are not part of a free decay"
-        remarks.append(f"begins at {clock_text(float(clock[0]))} s, {at}")
-    if piece.last < raw.cleaned.time_s.size:
-        why = "where something stops the body" if piece.stopped else "with the motion or before the next run"
-        remarks.append(f"ends at {clock_text(float(clock[-1]))} s, {why}")
+    remarks: list[str] = []
+    first, last = clock_text(float(clock[0])), clock_text(float(clock[-1]))
+    if piece.first and piece.held > 0.0:
+        free = (
+            f"from where on the motion is free: the {piece.held:.3g} s before it are not part of a free decay"
+        )
+        remarks.append(doubt(f"begins at {first} s, {free}; --start {name}=SECONDS changes it"))
+    elif piece.first:
+        rate = raw.quantity == "rate"
+        at = "at the largest rate after the release" if rate else "where the body is released"
+        remarks.append(ImportRemark(f"begins at {first} s, {at}", f"begins {at}"))
+    if piece.last < raw.cleaned.time_s.size and piece.stopped:
+        remarks.append(
+            doubt(f"ends at {last} s, where something stops the body; --end {name}=SECONDS changes it")
+        )
+    elif piece.last < raw.cleaned.time_s.size:
+        why = "with the motion or before the next run"
+        remarks.append(ImportRemark(f"ends at {last} s, {why}", f"ends {why}"))
     for level, samples in clipped(reading):
         until = clock_text(float(clock[samples[-1]]))
-        cut = counted(samples.size, "sample")
-        remarks.append(
-            f"the peaks are cut off at {level:.4g} {unit}: {cut} until {until} s; a later start leaves them out"
+        cut = (
+            f"the peaks are cut off at {level:.4g} {unit}: {counted(samples.size, 'sample')} until {until} s"
         )
+        remarks.append(doubt(f"{cut}; a later start, --start {name}={until}, leaves them out"))
     return remarks
 
 
@@ -161,7 +173,8 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
     kv = raw.input_facts.get("servo_kv") if "servo_kv" in INPUTS[column].keys else None
     if choices.input_hold is None:
         asked = "not stated, linear is assumed; --input-hold zero if a controller holds each command"
-        said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")
+        found = f"drive_hold = {hold} from the file"
+        said.append(found if order in (0.0, 1.0) else doubt(f"drive_hold: {asked}"))
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
     said += [] if kv is None else [f"servo_kv = {kv:g} from the file"]
     return Drive(column, values[kept], hold, gain, kv)

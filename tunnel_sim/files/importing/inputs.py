@@ -12,6 +12,7 @@ import numpy as np
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import ANGLE, named
 from tunnel_sim.files.importing.condition_names import condition_of
+from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import Channel, is_input
 from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
@@ -115,8 +116,10 @@ def find_input(
     commands = [channel for channel in candidates if names_command(channel)]
     if len(commands) == 1 and not exact:
         remarks += [
-            f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; --input uses it instead of "
-            f"'{one_line(commands[0].name, 40)}'"
+            doubt(
+                f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; --input uses it "
+                f"instead of '{one_line(commands[0].name, 40)}'"
+            )
             for c in candidates
             if c is not commands[0]
         ]
@@ -144,10 +147,9 @@ def _as_input(
         factor = kind.factor(unit) / (choices.counts_per_turn or 1.0)
         said += [f"'{name}' is taken in the unit of the angle, {unit}"] if choices.input_as is None else []
     size, lag = correlation(channel.values, reading)
-    said.append(
-        f"driven by '{one_line(channel.name, 40)}', {kind.meaning} ({column}): its correlation with the reading is "
-        f"{size:.2f} at a lag of {counted(lag, 'sample')}; --input none if it is a free decay"
-    )
+    driven, free = f"driven by '{name}', {kind.meaning} ({column})", "--input none if it is a free decay"
+    correlated = f"its correlation with the reading is {size:.2f} at a lag of {counted(lag, 'sample')}"
+    said.append(doubt(f"{driven}: {correlated}; {free}", f"{driven}; {free}"))
     return RunInput(column, channel, channel.values * factor)
 
 

@@ -6,6 +6,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,14 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
 from tunnel_sim.files.importing.column_numbers import Calibration
 from tunnel_sim.files.importing.columns import RunColumns, Unread, find_columns, with_readings
-from tunnel_sim.files.importing.conditions import Stated, find_conditions, of_short_table, refuse_open_wind
+from tunnel_sim.files.importing.condition_names import Hint
+from tunnel_sim.files.importing.conditions import (
+    Stated,
+    find_conditions,
+    of_short_table,
+    refuse_open_conditions,
+    stated_remark,
+)
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
@@ -68,6 +76,7 @@ def raw_records(
     choices: ImportChoices,
     calibration: Calibration | None,
     named: dict[str, float],
+    hints: Sequence[Hint],
     *,
     several: bool,
     with_table: bool = False,
@@ -77,6 +86,7 @@ def raw_records(
     Args:
         several: whether ids must name the file among others.
         with_table: whether a table may state the conditions.
+        hints: conditions that the name of the file seems to state.
     """
     # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
@@ -91,7 +101,7 @@ def raw_records(
                 raise
             faults: list[TunnelError] = [fault]  # what is to be stated of a file is asked for at once
             beside = fault.columns
-            attempt(faults, lambda: refuse_open_wind(table, beside, choices, where))  # noqa: B023 - at once
+            attempt(faults, partial(refuse_open_conditions, table, beside, choices, hints, where))
             raise joined(faults) from None
         for columns in every:
             said = [*columns.said]
@@ -101,7 +111,7 @@ def raw_records(
             run = columns.pair.run
             file = stem_of(source.path) if several or not (table.part or run) else ""
             name = one_line("-".join(part for part in (file, table.part, run) if part))
-            said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
+            said += [stated_remark(key, value, "the file's name") for key, value in named.items()]
             run_rows = _RunRows(name, source.path, table, columns, kept, stated, said, where)
             found += _records(run_rows, choices)
     return found

@@ -16,12 +16,15 @@ from tunnel_sim.files.importing.condition_names import (
     OF_REPEATABILITY,
     RIG_KEYS,
     SPREAD_KEYS,
+    Hint,
 )
 from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
 from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
+from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count, stem_of
@@ -34,7 +37,7 @@ from tunnel_sim.vocabulary.campaign import (
     RigProperties,
     SensorProperties,
 )
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, together
 from tunnel_sim.vocabulary.record import Array
 
 _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
@@ -69,19 +72,34 @@ class Imported:
 
     def remarks(self, path: Path | None = None) -> list[str]:
         """Remarks on the reading of all files or one, and on changes, each once with its runs."""
+        return [*self._with_places(path), *self.said]
+
+    def summary(self) -> tuple[list[str], list[str]]:
+        """The remarks beside the table of runs, without its numbers: those to know, and those to judge."""
+        lines = self._with_places(short=True)
+        judged = [line for line in lines if line.doubt]
+        return [*(line for line in lines if not line.doubt), *self.said], list(judged)
+
+    def _with_places(self, path: Path | None = None, *, short: bool = False) -> list[ImportRemark]:
+        """The remarks on files and runs, each once after the places that it concerns."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
         found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
-        places: dict[str, list[str]] = {}
+        places: dict[ImportRemark, list[str]] = {}
         for text, place in dict.fromkeys(found):
-            places.setdefault(text, []).append(place)
+            remark = text if isinstance(text, ImportRemark) else ImportRemark(text)
+            key = ImportRemark(remark.short, doubt=remark.doubt) if short else remark
+            if place not in places.setdefault(key, []):
+                places[key].append(place)
         lines = []
-        for text, names in places.items():
+        for remark, names in places.items():
             more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-            everywhere = len(names) == len(self.parts) > 1
-            lines.append(f"{'all runs' if everywhere else ', '.join(names[:6]) + more}: {text}")
-        return [*lines, *self.said]
+            everywhere = "all runs" if len(names) == len(self.parts) > 1 else ""
+            lines.append(
+                ImportRemark(f"{everywhere or ', '.join(names[:6]) + more}: {remark}", doubt=remark.doubt)
+            )
+        return lines
 
 
 def read_records(
@@ -99,19 +117,10 @@ def read_records(
         name: of the campaign; empty: the name of the first file.
         later: whether missing air densities may be stated later (`Imported.held`).
     """
-    calibration = read_calibration(choices.calibration)
-    pattern = None if choices.name is None else name_pattern(choices.name)
     table = None if conditions is None else ConditionTable(conditions)
-    sources: list[Source] = []
-    raws: list[RawRecord] = []
-    for path in (path for path in files if path.name not in choices.leave_out):
-        source = read_source(path, choices)
-        named = from_name(pattern, path)
-        several = len(files) > 1
-        raws += raw_records(
-            source, choices, calibration, named, several=several, with_table=table is not None
-        )
-        sources.append(source)
+    kept = [path for path in files if path.name not in choices.leave_out]
+    hints = name_hints(kept) if kept else {}
+    sources, raws = _raws(kept, choices, hints, several=len(files) > 1, with_table=table is not None)
     if not raws:
         what = "every file is left out" if files else "no files"
         raise TunnelError(what, remedy="name at least one")
@@ -119,16 +128,10 @@ def read_records(
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs contain {' and '.join(sorted(kinds))}", remedy=remedy)
-    ids, hints = [raw.id for raw in raws], name_hints([source.path for source in sources])
-    parts = []
-    for at, raw in enumerate(raws):
-        label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
-        time, reading = raw.cleaned.time_s, raw.cleaned.reading
-        find = _FINDERS.get(raw.quantity)
-        cut = choices.cut and not raw.whole and raw.input is None
-        pieces = find(time, reading) if cut and find is not None else [RecordPiece(0, time.size)]
-        for run, piece in zip(_names(label, pieces), pieces, strict=True):
-            parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
+    parts = _parts(raws, choices, table, hints, later=later)
+    runs = {part.id for part in parts}
+    for one in (one for one in choices.stretches if one.file is None and one.run not in runs):
+        raise TunnelError(f"no run '{one.run}'", where="--start, --end", remedy=did_you_mean(one.run, runs))
     names = {*(part.id for part in parts), *(path.name for path in files)}
     for left in (left for left in choices.leave_out if left not in names):
         what = f"no run or file '{one_line(left, 60)}' to leave out"
@@ -137,7 +140,12 @@ def read_records(
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     sizes = _sizes(parts, choices)
     campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].quantity)
-    # For the recipe: properties found in the files, where all records share them.
+    resolved, said = _resolved(choices, sources, raws), _said(campaign, table)
+    return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
+
+
+def _resolved(choices: ImportChoices, sources: Sequence[Source], raws: Sequence[RawRecord]) -> ImportChoices:
+    """The choices with the properties that all records share, for the recipe."""
     known: dict[str, Any] = {**sources[0].known}
     units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))
     if len(units) == 1 and choices.counts_per_turn is None and choices.calibration is None:
@@ -145,8 +153,12 @@ def read_records(
     if len(columns) == 1:
         known["angle"] = columns
     found = {key: value for key, value in known.items() if getattr(choices, key) in (None, ())}
-    resolved = choices.model_copy(update=found)
-    said = []
+    return choices.model_copy(update=found)
+
+
+def _said(campaign: Campaign, table: ConditionTable | None) -> list[str]:
+    """Remarks on the campaign."""
+    said: list[str] = []
     if (step := campaign.sensor.resolution) is not None:
         levels = "the readings lie on levels that far apart"
         said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
@@ -157,7 +169,82 @@ def read_records(
     said += [] if table is None else table.said
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
-    return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
+    return said
+
+
+def _raws(
+    files: Sequence[Path],
+    choices: ImportChoices,
+    hints: Mapping[Path, Sequence[Hint]],
+    *,
+    several: bool,
+    with_table: bool,
+) -> tuple[list[Source], list[RawRecord]]:
+    """Files and their records; what is to be stated of all files is asked for at once."""
+    calibration = read_calibration(choices.calibration)
+    pattern = None if choices.name is None else name_pattern(choices.name)
+    sources: list[Source] = []
+    raws: list[RawRecord] = []
+    faults: list[TunnelError] = []
+    for path in files:
+        try:
+            source, named = read_source(path, choices), from_name(pattern, path)
+            raws += raw_records(
+                source, choices, calibration, named, hints[path], several=several, with_table=with_table
+            )
+            sources.append(source)
+        except TunnelError as fault:
+            faults.append(fault)
+    if faults:
+        raise _refusal(faults)
+    return sources, raws
+
+
+def _parts(
+    raws: Sequence[RawRecord],
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    hints: Mapping[Path, Sequence[Hint]],
+    *,
+    later: bool,
+) -> list[ImportedRun]:
+    """The runs of all records, cut at releases; what is to be stated of all runs is asked for at once."""
+    ids = [raw.id for raw in raws]
+    parts = []
+    faults: list[TunnelError] = []
+    for at, raw in enumerate(raws):
+        label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
+        pieces = _pieces(raw, choices)
+        for run, piece in zip(_names(label, pieces), pieces, strict=True):
+            try:
+                parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
+            except TunnelError as fault:
+                faults.append(fault)
+    if faults:
+        raise _refusal(faults)
+    return parts
+
+
+def _pieces(raw: RawRecord, choices: ImportChoices) -> list[RecordPiece]:
+    """The runs of a record; one that the file names is one run, without the hand before its release."""
+    time, reading = raw.cleaned.time_s, raw.cleaned.reading
+    find = _FINDERS.get(raw.quantity)
+    if find is None or not choices.cut or raw.input is not None:
+        return [RecordPiece(0, time.size)]
+    pieces = find(time, reading)
+    if not raw.whole:
+        return pieces
+    runs = [piece for piece in pieces if not piece.doubt]
+    first = runs[0] if len(runs) == 1 else RecordPiece(0, 0)
+    return [RecordPiece(first.first, time.size, held=first.held)]
+
+
+def _refusal(faults: Sequence[TunnelError]) -> TunnelError:
+    """All refusals as one, which is `Unstated` where only the user can state what is open."""
+    found = together(faults)
+    if all(isinstance(fault, Unstated) for fault in faults):
+        return Unstated(found.what, where=found.where, remedy=found.remedy)
+    return found
 
 
 def _names(label: str, pieces: Sequence[RecordPiece]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -133,18 +133,105 @@ def test_times_of_notes_table_and_picture_are_those_that_start_takes(
     status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
     assert status == 0
     assert "the times stated here are the times of the file, which starts at 100 s" in said
-    (begins,) = re.findall(r"begins at (\S+) s", said)
+    (row,) = (line.split() for line in said.splitlines() if line.split()[:1] == ["log"])
+    begins = row[3]
     assert float(begins) == pytest.approx(104.0, abs=0.02)  # where the body was let go
     assert drawn == pytest.approx([float(begins)])
-    (row,) = (line.split() for line in said.splitlines() if line.split()[:1] == ["log"])
-    assert float(row[3]) == pytest.approx(float(begins), abs=0.006)
     status, again, _ = tunnel("import", path, "--preview", tmp_path / "look.png", "--start", begins)
     assert status == 0
     (again_row,) = (line.split() for line in again.splitlines() if line.split()[:1] == ["log"])
     assert again_row[1] == row[1]  # samples
     assert [float(cell) for cell in again_row[3:5]] == pytest.approx(
-        [float(cell) for cell in row[3:5]], abs=0.011
+        [float(cell) for cell in row[3:5]], abs=0.0011
     )
+    status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png", "--start", "log=105")
+    (later,) = (line.split() for line in said.splitlines() if line.split()[:1] == ["log"])
+    assert later[3] == "105.000"
+
+
+def test_a_run_that_is_not_there_has_no_start(tunnel: Tunnel, tmp_path: Path) -> None:
+    words = ("import", record(tmp_path), "--preview", tmp_path / "look.png", "--start")
+    assert "no run 'lag'; did you mean 'log'?" in tunnel(*words, "lag=1")[2]
+    assert "--start: 'soon' is not a time; give SECONDS or RUN=SECONDS" in tunnel(*words, "soon")[2]
+
+
+def several_logs(folder: Path, *, columns: str = "time_s,yaw_rad", prefix: str = "log") -> list[Path]:
+    """Three files alike, with a third column that nothing uses."""
+    time, free = decay()
+    paths = []
+    for number in range(3):
+        rows = "".join(
+            f"{t:.3f},{a:.5f},{20 + t / 9:.2f}\n" for t, a in zip(time[100 * number :], free, strict=False)
+        )
+        name = f"{prefix}-{number}.csv"
+        paths.append(written(folder, name, f"{columns},temperature_C\n{rows}"))
+    return paths
+
+
+def test_several_files_take_one_line_each_and_what_is_to_judge_stands_at_the_end(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    prefix = "2026-11-28_yaw-rig_campaign-7_spring-4_repetition"
+    paths = several_logs(tmp_path, prefix=prefix)
+    status, said, err = tunnel("import", *paths, "--preview", tmp_path / "look.png")
+    assert (status, err) == (0, "")
+    lines = said.splitlines()
+    last = max(number for number, line in enumerate(lines) if line.startswith("Note: "))
+    table = lines[: next(number for number, line in enumerate(lines) if line.startswith("Note: "))]
+    assert max(map(len, table)) <= 80
+    assert len(table) <= 5 + 2 * 3 + 1  # a long name takes two lines
+    assert "In all rows: " in said
+    assert "rate [Hz] 200" in said
+    checks = lines[last + 1 : -1]
+    assert all(line.startswith("Check: all runs: ") for line in checks)
+    assert any("not used: 'temperature" in line and "--set KEY=NAME" in line for line in checks)
+    assert any("wind-off is assumed; --set wind_speed=SPEED" in line for line in checks)
+
+
+def test_one_answer_has_the_questions_of_all_files(tunnel: Tunnel, tmp_path: Path) -> None:
+    volts = several_logs(tmp_path, columns="time_s,pot [V]")
+    counts = several_logs(tmp_path, columns="time_s,yaw [counts]", prefix="enc")
+    status, _, err = tunnel("import", *volts, *counts, "--out", tmp_path / "rig", "--yes")
+    assert (status, err.count("\n")) == (2, 1)
+    assert err.count("'pot' is in V; give --calibration") == 1
+    assert err.count("'yaw' is in counts; give --counts-per-turn N") == 1
+    assert all(path.name in err for path in (*volts, *counts))
+    assert not (tmp_path / "rig").exists()
+
+
+def test_a_dry_run_shows_the_campaign_and_writes_nothing(tunnel: Tunnel, tmp_path: Path) -> None:
+    paths = several_logs(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    rig = tmp_path / "rig"
+    status, said, err = tunnel("import", *paths, "--out", rig, "--dry-run")
+    assert (status, err) == (0, "")
+    assert sorted(tmp_path.rglob("*")) == before
+    assert tunnel("import", *paths, "--out", rig, "--yes")[0] == 0
+    files = [path for path in rig.rglob("*") if path.is_file()]
+    assert all(f"  {path}\n" in said for path in files)
+    shown = (rig / "campaign.toml").read_text()
+    assert shown.strip() in said
+    status, _, err = tunnel("import", *paths, "--out", rig, "--dry-run")
+    assert (status, "the folder exists" in err) == (2, True)
+
+
+def test_a_folder_of_records_gets_the_command_that_imports_it(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("day 1").mkdir()
+    paths = several_logs(Path("day 1"))
+    for command in ("identify", "diagnose"):
+        status, _, err = tunnel(command, "day 1")
+        assert (status, err.count("\n")) == (2, 1)
+        assert "is a folder of 3 records (.csv), not a campaign; import it: tunnel import" in err
+    line = shlex.split(err.partition("import it: ")[2])
+    assert line == ["tunnel", "import", "day 1/*.csv", "--out", "day 1-campaign"]
+    assert tunnel("import", *paths, *line[3:], "--yes")[0] == 0
+    for path in paths:
+        path.write_text(path.read_text().replace("yaw_rad", "pot [V]"))
+    assert "--out 'day 1-campaign' --calibration \"a + b*V\"; it asks: " in tunnel("diagnose", "day 1")[2]
 
 
 @pytest.mark.parametrize("name", ["xGyro", "gyro_z", "YawRate", "Winkelgeschwindigkeit", "theta_dot"])

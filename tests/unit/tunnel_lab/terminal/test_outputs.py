@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from identification.show.blocks import Paragraph
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
 from tests.support.gone_reader import unheard
+from tunnel_lab.terminal.outputs import say_written, show
 
 ROOT = Path(__file__).parents[4]
 
@@ -39,6 +41,25 @@ def test_identify_plot_and_effects_write_before_they_print(
     page = tmp_path / "e.md"
     assert unheard("effects", "--markdown", page, "--json", tmp_path / "effects.json") == 0
     assert page.exists()
+
+
+def test_in_a_terminal_a_written_path_is_a_link_and_sentences_are_wrapped_at_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, sentence = tmp_path / "a b.png", "A sentence of many words. " * 8
+    monkeypatch.setenv("COLUMNS", "40")
+    say_written(path, more="3 runs", picture=path)
+    show([Paragraph(sentence.strip())])
+    assert capsys.readouterr().out == f"Written: {path} (3 runs, {path} shows them)\n{sentence.strip()}\n"
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm-256color")
+    say_written(path)
+    out = capsys.readouterr().out
+    assert f"{path.as_uri()}\x1b\\{path}\x1b]8;;\x1b\\" in out
+    show([Paragraph(sentence.strip())])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 40
+    assert " ".join(lines).split() == sentence.split()
 
 
 @pytest.mark.parametrize("words", [("--help",), ("identify", "--help"), ("effects",)])

@@ -15,6 +15,7 @@ from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library
 
+_NAMED = 3  # sheets that a remark lists
 _HEAD = 400  # rows of a sheet that are inspected
 _TEXTS = (
     "run",
@@ -35,6 +36,14 @@ class _Sheet:
         return len(self.rows[0]) if self.rows else 0
 
     @property
+    def described(self) -> str:
+        """The layout in words."""
+        if self.layout is None:
+            return "no numbers"
+        headed = "names in the row above the numbers" if self.layout.headed else "no names of columns"
+        return f"{counted(self.width, 'column')}, numbers from row {self.layout.first + 1}, {headed}"
+
+    @property
     def is_record(self) -> bool:
         """Whether it has as many rows of numbers as a record."""
         return self.layout is not None and len(self.rows) - self.layout.first >= LEAST_ROWS
@@ -49,7 +58,14 @@ def _read(content: bytes, where: str) -> list[Table]:
         sheets = [_sheet(book, name, where) for name in book.sheet_names]
         records = [sheet for sheet in sheets if sheet.is_record]
         others = [sheet for sheet in sheets if sheet not in records] if records else []
-        tables = [(sheet, table) for sheet in records or sheets for table in _tables(book, sheet)]
+        alike: dict[str, list[str]] = {}
+        for sheet in records or sheets:
+            alike.setdefault(sheet.described, []).append(sheet.name)
+        tables = [
+            (sheet, table)
+            for sheet in records or sheets
+            for table in _tables(book, sheet, _of_sheets(alike[sheet.described], sheet))
+        ]
         names = {_same(name) for sheet, table in tables for name in (sheet.name, table.part) if name}
         described: dict[str, dict[str, Any]] = {}
         covers: dict[str, float] = {}
@@ -63,10 +79,18 @@ def _read(content: bytes, where: str) -> list[Table]:
             if not rows or len(rows) < len(tables):
                 # the texts of a cover are read above, and are not columns of a record
                 short += [
-                    replace(table, part=sheet.name, said=table.said[:1]) for table in _tables(book, sheet)
+                    replace(table, part=sheet.name, said=table.said[:1])
+                    for table in _tables(book, sheet, _of_sheets([sheet.name], sheet))
                 ]
         several = len(book.sheet_names) > 1
         return [_with(table, sheet, described, covers, several) for sheet, table in tables] + short
+
+
+def _of_sheets(names: Sequence[str], sheet: _Sheet) -> str:
+    """A remark on the layout that some sheets share."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    listed = ", ".join(f"'{name}'" for name in names[:_NAMED])
+    return f"workbook: sheet{'s' if len(names) > 1 else ''} {listed}{more}, {sheet.described}"
 
 
 def _check_archive(content: bytes, where: str) -> None:
@@ -92,7 +116,7 @@ def _sheet(book: Any, name: str, where: str) -> _Sheet:
     return _Sheet(name, rows, find_layout(rows, ["\t".join(row) for row in rows], ".", width))
 
 
-def _tables(book: Any, sheet: _Sheet) -> list[Table]:
+def _tables(book: Any, sheet: _Sheet, said: str) -> list[Table]:
     """The tables of a sheet of numbers, whose parts name their runs; none if it has no numbers."""
     layout = sheet.layout
     if layout is None:
@@ -100,9 +124,6 @@ def _tables(book: Any, sheet: _Sheet) -> list[Table]:
     numeric = [any(is_number(row[i]) for row in sheet.rows[layout.first :]) for i in range(sheet.width)]
     kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
     body = book.load_sheet(sheet.name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
-    headed = "names in the row above the numbers" if layout.headed else "no names of columns"
-    columns = counted(sheet.width, "column")
-    said = f"workbook: sheet '{sheet.name}', {columns}, numbers from row {layout.first + 1}, {headed}"
     labels = None if layout.runs is None else body.to_series(layout.runs)
     tables = tables_of(body, layout, ".", labels, Table((), facts=layout.facts, said=(said,)))
     return [part for table in tables if table.channels for part in by_run(table)]

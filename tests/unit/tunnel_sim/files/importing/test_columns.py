@@ -82,7 +82,7 @@ def test_the_first_of_several_columns_of_times_is_taken() -> None:
         Channel("time", TIME, "s"), Channel("elapsed", TIME, "s"), Channel("yaw", SWING, "rad")
     )
     assert taken == [("", "time", "yaw")]
-    assert "times from 'time', the first of 2 columns of times" in said
+    assert "times from 'time', the first of 2 columns of times; --time names another" in said
 
 
 @pytest.mark.parametrize(("share", "left_out"), [(0.015, True), (0.025, False)])

@@ -14,6 +14,7 @@ from identification import identify
 from tests.support.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
+from tunnel_sim.files.importing.condition_names import condition_of, resembles
 from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import read_records
 
@@ -162,7 +163,9 @@ def test_a_speed_in_a_file_name_is_proposed(tmp_path: Path) -> None:
     paths = [csv(tmp_path, f"S16_V{speed}_r{n}.csv") for n, speed in enumerate((0, 10, "12.5"), 1)]
     with pytest.raises(Unstated, match=r'--name "S\{spring\}_V\{wind_speed\}\*" uses it') as caught:
         read_records(paths)
-    assert "'V10' in the file's name is left out: it may state wind_speed = 10" in caught.value.what
+    assert "a number in the files' names is left out: it may state wind_speed" in caught.value.what
+    assert "S16_V10_r2.csv" in caught.value.where  # both files with a wind, in one refusal
+    assert "S16_V12.5_r3.csv" in caught.value.where
     choices = ImportChoices(name="S{spring}_V{wind_speed}*", conditions=setting("air_density=1.2").conditions)
     runs = read_records(paths, choices).campaign.runs
     assert [(run.spring_stiffness, run.wind_speed) for run in runs] == [
@@ -205,6 +208,27 @@ def test_names_that_state_a_speed(tmp_path: Path, name: str, speed: float, use: 
 )
 def test_other_names_state_no_speed(tmp_path: Path, name: str) -> None:
     assert read_records([csv(tmp_path, name)]).campaign.runs[0].wind_speed == 0.0
+
+
+def test_numbers_before_ms_that_differ_may_be_speeds(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, f"run{n}_{speed}ms.csv") for n, speed in enumerate((0, 12, 20), 1)]
+    with pytest.raises(Unstated, match=r'--name "\*_\{wind_speed\}ms" uses it'):
+        read_records(paths)
+    choices = ImportChoices(name="*_{wind_speed}ms", conditions=setting("air_density=1.2").conditions)
+    assert [run.wind_speed for run in read_records(paths, choices).campaign.runs] == [0.0, 12.0, 20.0]
+    alike = [csv(tmp_path, f"run{n}_5ms.csv") for n in (1, 2)]  # the interval of the samples
+    assert {run.wind_speed for run in read_records(alike).campaign.runs} == {0.0}
+
+
+def test_a_temperature_of_the_air_is_not_a_wind() -> None:
+    assert resembles("T_air", "") is None
+    assert resembles("v_air", "") == "wind_speed"
+
+
+@pytest.mark.parametrize("name", ["Feder", "spring", "K", "k_theta"])
+def test_a_name_of_a_spring_states_its_stiffness_with_the_unit_of_one(name: str) -> None:
+    assert condition_of(name, "N m/rad") == "spring_stiffness"
+    assert condition_of(name, "") is None
 
 
 def test_names_of_which_not_all_have_the_part_ask_for_a_table(tmp_path: Path) -> None:

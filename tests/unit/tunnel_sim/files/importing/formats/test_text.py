@@ -258,7 +258,7 @@ def test_a_unit_that_is_not_known_is_asked_about(tmp_path: Path) -> None:
 def test_a_swing_of_more_than_half_a_turn_is_asked_about(heading: str, tmp_path: Path) -> None:
     path = log(tmp_path, heading, 551.0)
     with pytest.raises(
-        TunnelError, match=r"would swing by ±189\.3°, more than half a turn; give --unit deg if"
+        TunnelError, match=r"would swing by more than half a turn in degrees; give --counts-per-turn N"
     ):
         read_records([path])
     (run,) = read_records([path], ImportChoices(unit="deg")).campaign.runs

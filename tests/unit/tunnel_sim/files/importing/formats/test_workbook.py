@@ -101,6 +101,24 @@ def test_a_cover_sheet_speaks_of_all_runs(tmp_path: Path, cover: Rows) -> None:
     assert not any("holds text" in remark for remark in found.remarks())
 
 
+def test_a_run_that_a_plan_names_begins_where_the_body_is_released(tmp_path: Path) -> None:
+    held = np.concatenate([np.linspace(0.0, ANGLE[0], 100), np.full(200, ANGLE[0]), ANGLE])
+    rows = [("t [s]", "yaw [rad]"), *zip(np.arange(held.size) / 200.0, held, strict=True)]
+    plan = [("Run", "Sheet", "Kr"), (7, "A", 16.12), (8, "B", 44.84)]
+    found = read_records([book(tmp_path, {"Plan": plan, "A": rows, "B": None})])
+    assert [run.id for run in found.campaign.runs] == ["7", "8"]
+    (first, second) = (part.piece.first for part in found.parts)
+    assert abs(first - 300) <= 3
+    assert second == 0
+    np.testing.assert_allclose(found.campaign.runs[1].record.yaw_rad, ANGLE, atol=1e-12)
+
+
+def test_sheets_of_one_layout_are_one_remark(tmp_path: Path) -> None:
+    found = read_records([book(tmp_path, dict.fromkeys("ABCDE"))])
+    (line,) = (line for line in found.remarks() if "workbook" in line)
+    assert "workbook: sheets 'A', 'B', 'C' and 2 more, 2 columns, numbers from row 2" in line
+
+
 def test_a_row_comes_before_the_cover(tmp_path: Path) -> None:
     cover = [("Luftdichte", 1.25), ("Kr", 16.12), ("V [m/s]", 8)]
     table = [("Blatt", "V [m/s]"), ("A", 12)]
