@@ -21,7 +21,7 @@ from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
 from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
-from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
+from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate, with_added
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count, stem_of
@@ -127,7 +127,9 @@ def read_records(
         find = _FINDERS.get(raw.quantity)
         cut = choices.cut and not raw.whole and raw.input is None
         pieces = find(time, reading) if cut and find is not None else [RecordPiece(0, time.size)]
-        for run, piece in zip(_names(label, pieces), pieces, strict=True):
+        added = [one for one in choices.stretches if (one.file, one.record) == (raw.source.name, raw.id)]
+        named_pieces = dict(zip(_names(label, pieces), pieces, strict=True))
+        for run, piece in with_added(time, named_pieces, added).items():
             parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
     names = {*(part.id for part in parts), *(path.name for path in files)}
     for left in (left for left in choices.leave_out if left not in names):

@@ -7,7 +7,7 @@ swing and by the noise, never by the largest swing of the record. A record witho
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import sqrt
@@ -349,6 +349,25 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
     growing = (abs(away[after]) > _STILL_GROWING * abs(away[top]) for top, after in pairwise(tops))
     free = next((k for k, grows in enumerate(growing) if not grows), 0)
     return max(piece.first, tops[free]) if tops else piece.first
+
+
+def with_added(
+    time_s: Times, found: Mapping[str, RecordPiece], stated: Sequence[Stretch]
+) -> dict[str, RecordPiece]:
+    """The runs of a record by name, and those that the user adds; an added release ends the run before it.
+
+    Args:
+        stated: the added runs, with their start, s.
+    """
+    pieces = dict(found)
+    for one in stated:
+        first = int(np.searchsorted(time_s, time_s[0] if one.start is None else one.start))
+        last = min((piece.first for piece in pieces.values() if piece.first > first), default=time_s.size)
+        for name, piece in pieces.items():
+            if piece.first < first < piece.last:
+                pieces[name] = replace(piece, last=first)
+        pieces[one.run] = RecordPiece(min(first, last - 1), last)
+    return dict(sorted(pieces.items(), key=lambda item: item[1].first))
 
 
 def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
