@@ -16,7 +16,7 @@ export default {
   },
   watch: {
     data() { this.chart ? this.chart.setData(this.data) : this.build(); },
-    marks: { handler() { this.place(); this.seek(); }, deep: true },
+    marks: { handler() { this.place(); }, deep: true },
   },
   methods: {
     colour(role) { return getComputedStyle(this.$el).getPropertyValue(`--${role}-now`).trim() || this.probe(role); },
@@ -51,16 +51,10 @@ export default {
       }, this.data, this.$refs.plot);
       this.handles = new Map();
       this.place();
-      this.seek();
     },
     add() {
       const { min, max } = this.chart.scales.x;
       this.$emit("added", { at: 0.5 * (min + max) });
-    },
-    seek() { // once: a later change does not take the focus from where it is
-      if (!this.focus || this.sought === this.focus || !this.handles?.has(this.focus)) return;
-      this.sought = this.focus;
-      this.handles.get(this.focus).focus();
     },
     height(width) { return Math.max(180, Math.min(300, Math.round(0.32 * width))); },
     place() {
@@ -86,6 +80,11 @@ export default {
         handle.hidden ||= to <= from;
         handle.firstChild.textContent = mark.about;
         handle.firstChild.style.top = `${-at - 9}px`; // above the chart, where no trace is
+      }
+      const sought = this.handles.get(this.focus);
+      if (sought && !sought.hidden && this.sought !== this.focus) { // once: later changes leave the focus where it is
+        this.sought = this.focus;
+        sought.focus();
       }
     },
     handle(id) {

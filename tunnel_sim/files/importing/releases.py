@@ -361,7 +361,8 @@ def with_added(
     """
     pieces = dict(found)
     for one in stated:
-        first = int(np.searchsorted(time_s, time_s[0] if one.start is None else one.start))
+        start = time_s[0] if one.start is None else one.start
+        first = int(np.searchsorted(time_s, start - _slack(time_s)))
         last = min((piece.first for piece in pieces.values() if piece.first > first), default=time_s.size)
         for name, piece in pieces.items():
             if piece.first < first < piece.last:
@@ -376,13 +377,17 @@ def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str)
         return found
     start = time_s[found.first] if stated.start is None else stated.start
     end = time_s[found.last - 1] if stated.end is None else stated.end
-    # Half a step of slack: a marker between two samples belongs to the closer one.
-    slack = 0.5 * float(np.median(np.diff(time_s)))
+    slack = _slack(time_s)
     first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
     if last - first < 2:
         remedy = "state a start before the end, within the record"
         raise TunnelError(f"no samples from {start:g} to {end:g} s", where=where, remedy=remedy)
     return RecordPiece(first, last)
+
+
+def _slack(time_s: Times) -> float:
+    """Half a step, s: a marker between two samples belongs to the closer one."""
+    return 0.5 * float(np.median(np.diff(time_s)))
 
 
 def _without_drift(time_s: Times, angle: Angles, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Angles:
