@@ -52,10 +52,7 @@ _FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"
 _ELSEWHERE = ("answer", "fit", "place", "closes", "next")
 """Sections that the page shows in another way, or another page."""
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
-_BEFORE = (
-    "It compares sets of effects with the runs, which takes from half a minute to several minutes; it runs in a "
-    "separate process, and this page may be closed meanwhile."
-)
+_BEFORE = "It compares sets of effects with the runs: half a minute to several minutes, also with this page closed."
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
@@ -113,6 +110,7 @@ class DiagnosePage:
             left = "time left not known after a pause"
             if not state.pauses:
                 left = progress.reached.words(progress.seconds + time.time() - state.printed)
+                left += " (known once a gap is found)" if left.endswith("yet") else ""
             words = (
                 f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
                 "It runs in a separate process: this page may be closed."

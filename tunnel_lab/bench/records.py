@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from tunnel_lab.bench import preview
+from tunnel_lab.bench import column_units, preview
 from tunnel_lab.bench.parts import (
     Chart,
     Fault,
@@ -97,7 +97,7 @@ class RecordsPage:
                     Chart(run.id, "time [s]", label, [("reading", "after")], curve)
 
     async def _first(self) -> None:
-        self._names = await asyncio.to_thread(preview.column_names, self._session)
+        self._names = await asyncio.to_thread(column_units.column_names, self._session)
         self._show_files()
         await self._read()
 
@@ -213,18 +213,18 @@ class RecordsPage:
         self._table.clear()
         if redraw:
             self._drawn.clear()
-            columns = await asyncio.to_thread(preview.columns_of, self._session)
+            columns = await asyncio.to_thread(column_units.columns_of, self._session)
             if self._is_past(mine):
                 return True
             self._units.clear()
             self._units.set_visibility(bool(columns))
             with self._units:
-                preview.show_columns(columns, self._stated)
+                column_units.show_columns(columns, self._stated)
             if imported is None:
                 self._units.open()
         if imported is None:
             self._judged.set_visibility(False)
-            curves = await asyncio.to_thread(preview.raw_columns, self._session)
+            curves = await asyncio.to_thread(column_units.raw_columns, self._session)
             if self._drawn.is_deleted or not curves:
                 return False
             with self._drawn:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.import_files import decay
-from tunnel_lab.bench import conditions, preview
+from tunnel_lab.bench import column_units, conditions, preview
 from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
@@ -143,7 +143,7 @@ def test_choices_are_a_recipe_and_can_be_taken_back(session: Session) -> None:
         preview.state(session, {"rate": -1.0})
     preview.state(session, {"unit": None, "angle": ()})
     assert preview.choices_of(session).unit is None
-    assert preview.column_names(session) == ["time", "yaw"]
+    assert column_units.column_names(session) == ["time", "yaw"]
 
 
 def test_a_campaign_written_again_keeps_its_conditions(session: Session) -> None:
@@ -168,11 +168,11 @@ def test_a_bad_file_does_not_block_a_good_one(session: Session) -> None:
     (session.uploads / "log.csv").unlink()
     with pytest.raises(TunnelError, match=r"notes\.csv"):
         preview.read(session)
-    assert preview.raw_columns(session) == []
+    assert column_units.raw_columns(session) == []
 
 
 def test_the_raw_columns_are_those_of_the_file(session: Session) -> None:
-    (name, unit, rows, values), (second, _, _, readings) = preview.raw_columns(session)
+    (name, unit, rows, values), (second, _, _, readings) = column_units.raw_columns(session)
     assert (name, unit, second) == ("time", "s", "yaw")
     assert len(rows) == len(values) == len(readings)
     assert values == sorted(values)
