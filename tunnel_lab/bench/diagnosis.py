@@ -52,7 +52,9 @@ _FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"
 _ELSEWHERE = ("answer", "fit", "place", "closes", "next")
 """Sections that the page shows in another way, or another page."""
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
-_BEFORE = "It compares sets of effects with the runs: half a minute to several minutes, also with this page closed."
+_BEFORE = (
+    "It compares sets of effects with the runs: half a minute to several minutes, also with this page closed."
+)
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")

@@ -16,6 +16,7 @@ from tunnel_lab.bench.parts import (
     Frame,
     address,
     button,
+    page_words,
     show_blocks,
     show_items,
 )
@@ -241,7 +242,7 @@ class RecordsPage:
 
             show_blocks([parts_table(imported)])
             with ui.element("ul").classes("notes"):
-                show_items(imported.remarks())
+                show_items(map(page_words, imported.remarks()))
         return True
 
     def _is_past(self, reading: int) -> bool:
@@ -304,7 +305,7 @@ class RecordsPage:
                 ],
                 f"{self._focus} start" if self._focus in [mark.run for mark in record.marks] else "",
             )
-            self._show_runs(record)
+            self._show_runs(record, alone=len(imported.parts) == 1)
         self._focus = ""
         for field, mark in zip(self._rests, marks, strict=True):
             field.set_value(float(f"{mark.rest:.6g}"))
@@ -329,15 +330,15 @@ class RecordsPage:
             self._runs[record.key] = ui.element("div").props("role=status aria-live=polite")
         return chart
 
-    def _show_runs(self, record: preview.DrawnRecord) -> None:
-        """What is to be judged in a record, and buttons for its runs."""
+    def _show_runs(self, record: preview.DrawnRecord, *, alone: bool) -> None:
+        """What is to be judged in a record, and buttons for its runs, unless one is ``alone`` in the campaign."""
         self._runs[record.key].clear()
         with self._runs[record.key]:
             for mark in record.marks:
                 for line in mark.doubts:
                     ui.label(f"{mark.run}: {line}").classes("doubt")
             with ui.element("p").classes("buttons of-runs"):
-                for mark in record.marks:
+                for mark in () if alone else record.marks:
                     words = "Remove" if mark.added else "Use again" if mark.is_left_out else "Leave out"
                     change = preview.restore if mark.is_left_out else preview.remove
                     button(f"{words}: {mark.run}", partial(self._cut, partial(change, self._session, mark)))

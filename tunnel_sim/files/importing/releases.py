@@ -366,7 +366,7 @@ def with_added(
         last = min((piece.first for piece in pieces.values() if piece.first > first), default=time_s.size)
         for name, piece in pieces.items():
             if piece.first < first < piece.last:
-                pieces[name] = replace(piece, last=first)
+                pieces[name] = replace(piece, last=first, stopped=False)
         pieces[one.run] = RecordPiece(min(first, last - 1), last)
     return dict(sorted(pieces.items(), key=lambda item: item[1].first))
 

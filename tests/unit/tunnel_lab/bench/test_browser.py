@@ -347,6 +347,10 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
         fit = one.page.frame_locator('iframe[title="The fit over the data"]')
         fit.locator(".uplot").nth(1).wait_for()
         shown = fit.locator("select option").all_inner_texts()
+        reading, seen = fit.locator(".u-value").first, "(one) => getComputedStyle(one).visibility"
+        assert reading.evaluate(seen) == "hidden"  # no dash where nothing is pointed at
+        fit.locator(".u-over").first.hover()
+        assert reading.evaluate(seen) == "visible"
         frame = one.page.locator('iframe[title="The fit over the data"]').bounding_box()
         assert frame["height"] > 600
     assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
