@@ -74,6 +74,7 @@ class RecordsPage:
         self._rests: list[ui.number] = []
         self._names: list[str] = []
         self._runs: dict[str, ui.element] = {}
+        self._shown_runs: dict[str, object] = {}
         self._shown_choices: list[str] | None = None
         self._focus = ""
         self._units = ui.expansion("Columns of the files, and their units").classes("choices")
@@ -269,7 +270,7 @@ class RecordsPage:
         self._judged.set_text(f"To judge, below: {', '.join(doubtful[:_MOST_NAMES])}{more}")
         self._judged.set_visibility(bool(doubtful))
         if not self._drawn.default_slot.children:
-            self._runs = {}
+            self._runs, self._shown_runs = {}, {}
         records = preview.drawn(imported, list(self._runs))
         marks = [mark for record in records for mark in record.marks]
         unit = imported.campaign.sensor.unit
@@ -332,6 +333,10 @@ class RecordsPage:
 
     def _show_runs(self, record: preview.DrawnRecord, *, alone: bool) -> None:
         """What is to be judged in a record, and buttons for its runs, unless one is ``alone`` in the campaign."""
+        shown = alone, [(mark.run, mark.doubts, mark.added, mark.is_left_out) for mark in record.marks]
+        if self._shown_runs.get(record.key) == shown:
+            return  # a button that is being pressed stays
+        self._shown_runs[record.key] = shown
         self._runs[record.key].clear()
         with self._runs[record.key]:
             for mark in record.marks:
