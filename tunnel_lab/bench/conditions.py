@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
@@ -10,7 +10,7 @@ from typing import Any
 
 from nicegui import events, ui
 
-from tunnel_lab.bench.parts import Fault, Frame, page_words, show_items
+from tunnel_lab.bench.parts import Fault, Frame, label_of, name_of, page_words, show_items, text_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document, read_campaign
 from tunnel_sim.files.importing.condition_names import RIG_KEYS, RUN_KEYS, Conditions
@@ -29,16 +29,6 @@ Words = dict[tuple[str, str], str]
 """Faults by row and key: one line for each cell."""
 RIG = ""
 """The row of the rig's sizes: no run has an empty name."""
-WORDS = {
-    "wind_speed": "wind speed V [m/s]",
-    "spring_stiffness": "stiffness Kr [N m/rad]",
-    "air_density": "air density ρ [kg/m³]",
-    "release_angle": "release angle [rad]",
-    "yaw_inertia": "nominal inertia Izz [kg m²]",
-    "frontal_area": "frontal area A [m²]",
-    "reference_length": "reference length l [m]",
-    "width": "width [m]",
-}
 MISSING = {
     "spring_stiffness": "needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
     "frontal_area": "needed for Cnβ and Cnr",
@@ -47,6 +37,7 @@ MISSING = {
 """Consequences of missing values; the other keys are optional, or required (`faults`)."""
 _OF_JOINT = "0 for a joint without a spring"
 """The stiffness of a driven run in still air."""
+_DENSITY = "air_density"
 _MOST_ROWS = 20  # in a table without a scroll bar
 _MOST_LINES = 8  # listed faults
 _PASTE = """(event) => {
@@ -221,7 +212,7 @@ def _document(session: Session) -> dict[str, Any]:
 
 
 def _texts(table: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, str]:
-    return {key: "" if table.get(key) is None else repr(float(table[key])).removesuffix(".0") for key in keys}
+    return {key: "" if table.get(key) is None else text_of(float(table[key])) for key in keys}
 
 
 def _with(table: Mapping[str, Any], cells: Mapping[str, str], keys: tuple[str, ...]) -> dict[str, Any]:
@@ -231,6 +222,14 @@ def _with(table: Mapping[str, Any], cells: Mapping[str, str], keys: tuple[str, .
         values["wind_speed"] = 0.0
     others = {key: value for key, value in table.items() if key not in keys}
     return others | {key: value for key, value in values.items() if value is not None}
+
+
+def _without_density(runs: Sequence[str], count: int) -> str:
+    """What is missing in wind-on runs without an air density, in one line."""
+    more = f" and {len(runs) - _MOST_LINES} more" if len(runs) > _MOST_LINES else ""
+    once = ", or once under “Same for all runs”" if count > 1 else ""
+    words = f"wind-on without air density: give it in kg/m³ (about 1.2 for air) in the marked cells{once}"
+    return f"{', '.join(runs[:_MOST_LINES])}{more}: {words}"
 
 
 class ConditionsPage:
@@ -247,7 +246,7 @@ class ConditionsPage:
         ).classes("soft")
         if len(self._runs) > 1:
             with ui.element("div").classes("fields"):
-                keys = {key: WORDS[key] for key in RUN_KEYS}
+                keys = {key: label_of(Conditions, key) for key in RUN_KEYS}
                 self._key = ui.select(keys, label="Same for all runs", value="air_density").props("dense")
                 self._value = ui.input("Value").props("dense").on("change", self._fill)
         self._grid = self._table()
@@ -256,7 +255,7 @@ class ConditionsPage:
         self._rig: dict[str, ui.input] = {}
         with ui.element("div").classes("fields"):
             for key, text in self._cells[RIG].items():
-                field = ui.input(WORDS[key], value=text).props("dense bottom-slots")
+                field = ui.input(label_of(Conditions, key), value=text).props("dense bottom-slots")
                 self._rig[key] = field.on("change", partial(self._resize, key, field))
         ui.checkbox(
             "Keep values that look like a wrong unit", value=not is_judged(session), on_change=self._judge
@@ -273,7 +272,7 @@ class ConditionsPage:
             columns.append(
                 {
                     "field": key,
-                    "headerName": WORDS[key],
+                    "headerName": label_of(Conditions, key),
                     "editable": True,
                     "minWidth": 64,
                     "flex": 1,
@@ -376,9 +375,15 @@ class ConditionsPage:
             field.value = cells[RIG][key]
             field.error = wrong.get((RIG, key))
             field.props["hint"] = missing.get((RIG, key), "")
-        unstated = [(WORDS[key].partition(" [")[0], said) for (_, key), said in missing.items()]
+        unstated = [(name_of(Conditions, key), said) for (_, key), said in missing.items()]
         notes = dict.fromkeys(f"{words} is not stated: {said}" for words, said in unstated)
-        lines = [(page_words(line), "fault") for line in wrong.values()] + [(line, "") for line in notes]
+        empty = [run for run in self._runs if (run, _DENSITY) in wrong and not cells[run][_DENSITY].strip()]
+        others = {
+            place: line for place, line in wrong.items() if place[1] != _DENSITY or place[0] not in empty
+        }
+        lines = [(page_words(line), "fault") for line in others.values()] + [(line, "") for line in notes]
+        if empty:
+            lines.insert(0, (_without_density(empty, len(self._runs)), "fault"))
         self._lines.clear()
         with self._lines:
             for line, style in lines[:_MOST_LINES]:

@@ -32,7 +32,7 @@ from tunnel_lab.bench.parts import (
     show_facts,
     show_items,
 )
-from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
+from tunnel_lab.bench.workspace import DIAGNOSIS, Session, is_current, read_diagnosis
 from tunnel_lab.report.figures import diagnosis_figure
 from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
@@ -46,13 +46,15 @@ if TYPE_CHECKING:
     from identification.show.quantity import Quantity
 
 
-WORK = "diagnosis"
 STOPPED = 130
 _FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"))
 """Sections below the figures, in groups side by side; the others are folded."""
 _ELSEWHERE = ("answer", "fit", "place", "closes", "next")
 """Sections that the page shows in another way, or another page."""
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
+_BEFORE = (
+    "It compares sets of effects with the runs: half a minute to several minutes, also with this page closed."
+)
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
 _PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
@@ -69,7 +71,7 @@ class DiagnosePage:
 
     def __init__(self, session: Session, frame: Frame) -> None:
         self._session, self._frame = session, frame
-        self._log = session.log(WORK)
+        self._log = session.log(DIAGNOSIS)
         self._shown: object = None
         self._before = ""
         build_choice(session, self._show_command)
@@ -110,6 +112,7 @@ class DiagnosePage:
             left = "time left not known after a pause"
             if not state.pauses:
                 left = progress.reached.words(progress.seconds + time.time() - state.printed)
+                left += " (known once a gap is found)" if left.endswith("yet") else ""
             words = (
                 f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
                 "It runs in a separate process: this page may be closed."
@@ -144,6 +147,8 @@ class DiagnosePage:
         with self._result:
             self._show_answer()
         self._frame.refresh(self._on)
+        if not result.is_file() and not state.error:
+            self._clock.set_text(_BEFORE)
 
     def _show_answer(self) -> None:
         try:
@@ -157,6 +162,7 @@ class DiagnosePage:
             self._fault.show(error)
 
     async def _start(self) -> None:
+        self._clock.set_text("Starting: the program loads its models, which takes a few seconds …")
         with self._fault.around():
             await asyncio.to_thread(work.start, self._command, self._log)
 
@@ -274,6 +280,7 @@ class ByHandPart:
                 box = ui.checkbox(kind.name.replace("_", " "), value=kind.name in answer.causes)
                 self._boxes[kind.name] = box.on_value_change(partial(self._fit_chosen, False))
         self._fault = Fault()
+        self._wait = ui.label().classes("soft").props("role=status aria-live=polite")
         self._place = ui.element("div").props("role=status aria-live=polite").classes("by-hand")
         with ui.element("p").classes("buttons"):
             button(_CONVERGE, partial(self._fit_chosen, True))
@@ -286,6 +293,7 @@ class ByHandPart:
             return
         self._waiting, shown = True, None
         self._place.classes(add="waiting")
+        self._wait.set_text("Fitting the chosen causes …")
         while True:
             effects = [name for name, box in self._boxes.items() if box.value]
             if shown == (effects, self._converged):
@@ -306,6 +314,7 @@ class ByHandPart:
                     show_closure(closure, self._answer)
         self._waiting = False
         self._place.classes(remove="waiting")
+        self._wait.set_text("")
 
 
 def show_closure(closure: Closure, answer: Diagnosis) -> None:

@@ -18,21 +18,17 @@ from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import unit
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
-from tunnel_lab.bench.parts import Fault, Frame, button, show_blocks, show_command
+from tunnel_lab.bench.parts import Fault, Frame, button, name_of, show_blocks, show_command
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
+from tunnel_sim.files.importing.condition_names import Conditions
 from tunnel_sim.files.toml_input import load_toml
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 _FIRST = (ESTIMATOR, "conventional", "matrix_pencil")
 """Estimators chosen initially: quick ones."""
-_INPUTS = {
-    "spring_stiffness": "stiffness Kr",
-    "wind_speed": "wind speed V",
-    "air_density": "air density ρ",
-    "frontal_area": "frontal area A",
-    "reference_length": "reference length l",
-}
+_INPUTS = ("spring_stiffness", "wind_speed", "air_density", "frontal_area", "reference_length")
+"""Stated values with an uncertainty."""
 _BUDGET = "budget"
 _POLL_S = 0.5
 _MOST_RUNS = 50
@@ -68,8 +64,10 @@ class IdentifyPage:
                 common = load_toml(session.uncertainties, missing="").get("common", {})
                 self._percents = {key: 100.0 * float(value) for key, value in common.items()}
             with ui.element("div").classes("fields"):
-                for key, name in _INPUTS.items():
-                    field = ui.number(f"{name} [%]", value=self._percents.get(key), min=0.0)
+                for key in _INPUTS:
+                    field = ui.number(
+                        f"{name_of(Conditions, key)} [%]", value=self._percents.get(key), min=0.0
+                    )
                     field.props("dense step=any").on("change", partial(self._state, key, field))
             self._budget_fault = Fault()
             with ui.element("p").classes("buttons"):

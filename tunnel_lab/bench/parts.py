@@ -8,8 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from nicegui import ui
@@ -18,28 +19,9 @@ from identification.show.blocks import Block, as_html, brief
 from tunnel_lab.bench.workspace import STAGES, Session, closed
 from tunnel_sim.vocabulary.errors import TunnelError
 
-FIELDS = {
-    "angle": "Column of the angle",
-    "unit": "Unit of the angle",
-    "time": "Column of the times",
-    "time-unit": "Unit of the times",
-    "input": "Column of a driven run's input",
-    "input-as": "What the input is",
-    "input-hold": "The input between its samples",
-    "rate": "Sample rate",
-    "counts-per-turn": "Counts of an encoder per turn",
-    "calibration": "Angle of a voltage",
-    "start": "Leave out samples before",
-    "end": "Leave out samples after",
-    "rest": "Reading at rest",
-    "name": "Conditions in the file names",
-    "set": "Conditions of all runs",
-    "leave-out": "Leave out",
-    "delimiter": "Delimiter of a text file",
-    "decimal": "Decimal sign of a text file",
-    "no-cut": "Cut records at releases",
-}
-"""Labels of fields, without example and unit, by the equivalent option."""
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
 _OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"([^\"]*)\"))?")
 
 _HEAD = """
@@ -55,11 +37,40 @@ def page_words(text: str) -> str:
     return _OPTION.sub(_field, plain)
 
 
+def asked_in(text: str) -> list[str]:
+    """The choices, as names of fields of `ImportChoices`, that a line of a command asks for."""
+    keys = _choices()
+    return list(dict.fromkeys(keys[option] for option, _ in _OPTION.findall(text) if option in keys))
+
+
+def label_of(model: type[BaseModel], key: str) -> str:
+    """The label of a field of a model, with its unit."""
+    return model.model_fields[key].title or key.replace("_", " ")
+
+
+def name_of(model: type[BaseModel], key: str) -> str:
+    """The label of a field of a model, without its unit."""
+    return label_of(model, key).partition(" [")[0]
+
+
 def _field(found: re.Match[str]) -> str:
     """An option as its field, with the value to type there; an option without a field is unchanged."""
-    if found[1] not in FIELDS:
+    from tunnel_sim.files.importing.choices import ImportChoices
+
+    key = _choices().get(found[1])
+    if key is None:
         return found[0]
-    return f"“{FIELDS[found[1]]}” {found[2]}" if found[2] else f"“{FIELDS[found[1]]}”"
+    words = f"“{name_of(ImportChoices, key)}”"
+    return f"{words} {found[2]}" if found[2] else words
+
+
+@cache
+def _choices() -> dict[str, str]:
+    """The fields of `ImportChoices` by the option of ``tunnel import`` that fills them."""
+    from tunnel_sim.files.importing.choices import ImportChoices
+
+    options = {key: key.replace("_", "-") for key in ImportChoices.model_fields}
+    return {option: key for key, option in (options | {"conditions": "set", "cut": "no-cut"}).items()}
 
 
 def address(session: Session, stage: str) -> str:
@@ -110,11 +121,13 @@ class Frame:
                 self.way_on()
 
     def way_on(self) -> None:
-        """Links to the next and the final stage, where they are open."""
+        """Links to the next and the final stage, where they are open, or what the next one waits for."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
-        if after < len(keys) and not self._why_closed(keys[after]):
+        if after < len(keys) and (why := self._why_closed(keys[after])):
+            ui.label(f"{STAGES[after].title} waits: {why[0].lower()}{why[1:]}").classes("waits")
+        elif after < len(keys):
             path = address(self._session, keys[after])
             ui.link(f"Continue: {STAGES[after].title}", path).classes("button go")
         if after < len(keys) - 1 and not self._why_closed(keys[-1]):
@@ -175,6 +188,11 @@ def show_items(lines: Iterable[str]) -> None:
             ui.label(line)
 
 
+def text_of(value: float) -> str:
+    """A number as a user types it: without the rounding error of a conversion of units."""
+    return f"{value:.15g}"
+
+
 def heading(text: str) -> None:
     """The heading of a part of a page."""
     ui.html(text, sanitize=False, tag="h2")
@@ -203,6 +221,8 @@ class Chart(ui.element, component="static/chart.js"):
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
         moved: called with the id of a mark and its new position, in the unit of its axis; may be awaitable.
+        added: called with the abscissa of a release to add, the middle of what is visible; None: no button.
+        removed: called with the id of a mark on which Delete is pressed.
     """
 
     def __init__(
@@ -213,25 +233,34 @@ class Chart(ui.element, component="static/chart.js"):
         series: Sequence[tuple[str, str]],
         data: Sequence[Sequence[float | None]],
         moved: Callable[[str, float], Any] | None = None,
+        added: Callable[[float], Any] | None = None,
+        removed: Callable[[str], Any] | None = None,
     ) -> None:
         super().__init__()
         curves = [list(curve) for curve in series]
-        self._props.update(title=title, x=x, y=y, series=curves, data=data, marks=[])
+        self._props.update(
+            title=title, x=x, y=y, series=curves, data=data, marks=[], focus="", adds=added is not None
+        )
         self.classes("chart")
         if moved is not None:
             self.on("moved", lambda event: moved(str(event.args["id"]), float(event.args["at"])))
+        if added is not None:
+            self.on("added", lambda event: added(float(event.args["at"])))
+        if removed is not None:
+            self.on("removed", lambda event: removed(str(event.args["id"])))
 
     def show(self, data: Sequence[Sequence[float | None]]) -> None:
         """Show other curves of the same labels."""
         self._props["data"] = data
         self.update()
 
-    def show_marks(self, marks: Sequence[Mapping[str, Any]]) -> None:
+    def show_marks(self, marks: Sequence[Mapping[str, Any]], focus: str = "") -> None:
         """Show marks.
 
         Args:
+            focus: id of the mark that takes the focus; empty: none.
             marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
                 abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the text ``about``.
         """
-        self._props.update(marks=[dict(mark) for mark in marks])
+        self._props.update(marks=[dict(mark) for mark in marks], focus=focus)
         self.update()

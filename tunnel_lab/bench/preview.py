@@ -2,52 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
-from nicegui import events, ui
+from nicegui import ui
 
-from tunnel_lab.bench.parts import FIELDS, show_command
+from tunnel_lab.bench.fields import Changed, field_of
+from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.errors import TunnelError, counted
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.columns import ColumnPair
     from tunnel_sim.files.importing.imported_run import ImportedRun
+    from tunnel_sim.files.importing.raw_records import RawRecord
     from tunnel_sim.files.importing.records import Imported
-    from tunnel_sim.files.importing.tables import Channel, Table
     from tunnel_sim.vocabulary.record import Array
 
 
-MOST_COLUMNS = 8
-"""At most this many raw columns are drawn."""
 MOST_RECORDS = 24
 """At most this many records are drawn."""
-READINGS = ("angle", "counts", "voltage", "rate", "acceleration")
-"""Kinds of unit that a reading may have."""
-Role = Literal["time", "angle", "condition", "input"]
+CORRECTIONS = tuple(
+    key for key in ImportChoices.model_fields if key not in ("leave_out", "stretches", "stated_by")
+)
+"""The choices with a field; the others are made in the charts, and by leaving out."""
+LEFT_OUT = "left out as stated"
+"""The remark of the importer on a run that the user leaves out."""
 _STILL = 0.01  # of the range of a run's readings: a smaller range looks flat
-_WRITTEN = {
-    "rate": "Sample rate, where there are no times [Hz]",
-    "counts_per_turn": "Counts of an encoder per turn",
-    "calibration": "Angle of a voltage, such as 0.1 + 20*V",
-    "start": "Leave out samples before [s]",
-    "end": "Leave out samples after [s]",
-    "rest": "Reading at rest, to be subtracted [rad]",
-    "name": "Conditions in the file names: V{wind_speed}",
-    "set": "Conditions of all runs, such as wind_speed=0",
-    "delimiter": "Delimiter of a text file: tab, blank, ; , or |",
-    "decimal": "Decimal sign of a text file",
-}
-"""Labels of the choices that are typed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +48,8 @@ class Mark:
         rest: the reading at rest, in the reading's unit.
         about: the source of ``rest`` in words: its uncertainty, or that it is stated.
         fault: the reason for leaving the run out; empty where it is used.
+        doubts: what the user has to judge, in one line each; empty where the run looks like a free decay.
+        added: whether the user has added it.
     """
 
     run: str
@@ -69,17 +59,35 @@ class Mark:
     rest: float
     about: str
     fault: str
+    doubts: tuple[str, ...] = ()
+    added: bool = False
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether the user has left it out."""
+        return self.fault == LEFT_OUT
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnRecord:
-    """A record as it is drawn: the time in s, and the reading in its unit, None within a gap."""
+    """A record as it is drawn: the time in s, and the reading in its unit, None within a gap.
+
+    Args:
+        cut: whether releases can be added: it is neither driven nor kept whole.
+    """
 
     title: str
+    file: str
+    cut: bool
     unit: str
     time: list[float]
     reading: list[float | None]
     marks: tuple[Mark, ...]
+
+    @property
+    def key(self) -> str:
+        """Its file and its name."""
+        return f"{self.file}/{self.title}"
 
 
 def files_of(session: Session) -> list[Path]:
@@ -110,7 +118,7 @@ def settings_of(choices: ImportChoices) -> str:
     """The conditions that are stated for all runs, as ``--set`` takes them."""
     numbers = choices.conditions.model_dump(exclude_none=True)
     names = choices.stated_by.model_dump(exclude_none=True)
-    stated = [f"{key}={value:g}" for key, value in numbers.items()]
+    stated = [f"{key}={text_of(value)}" for key, value in numbers.items()]
     return ", ".join([*stated, *(f"{key}={name}" for key, name in names.items())])
 
 
@@ -124,7 +132,7 @@ def settings_from(text: str | None) -> dict[str, Any]:
 
     if not (text or "").strip():
         return {"conditions": None, "stated_by": None}
-    numbers, names = parse_setting(text or "", FIELDS["set"])
+    numbers, names = parse_setting(text or "", name_of(ImportChoices, "conditions"))
     return {
         "conditions": numbers.model_dump(exclude_none=True),
         "stated_by": names.model_dump(exclude_none=True),
@@ -154,6 +162,38 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
             remedy="move one of them",
         )
     state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
+
+
+def add(session: Session, record: DrawnRecord, at: float) -> str:
+    """Add a run that is released at a time of its record, s by the file's clock.
+
+    Returns:
+        Name of the run.
+    """
+    taken = {mark.run for mark in record.marks}
+    names = (f"{record.title}-added-{number}" for number in range(1, len(taken) + 2))
+    name = next(name for name in names if name not in taken)
+    stated = [one.model_dump() for one in choices_of(session).stretches]
+    state(
+        session,
+        {"stretches": [*stated, {"file": record.file, "run": name, "start": at, "record": record.title}]},
+    )
+    return name
+
+
+def remove(session: Session, mark: Mark) -> None:
+    """Remove an added run with its release, or leave a found one out."""
+    choices = choices_of(session)
+    if mark.added:
+        kept = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
+        state(session, {"stretches": [one.model_dump() for one in kept]})
+    elif not mark.is_left_out:
+        leave_out(session, [*choices.leave_out, mark.run])
+
+
+def restore(session: Session, mark: Mark) -> None:
+    """Use a run again that the user has left out."""
+    leave_out(session, [name for name in choices_of(session).leave_out if name != mark.run])
 
 
 def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
@@ -201,138 +241,66 @@ def leave_out(session: Session, names: Sequence[str]) -> None:
     state(session, {"leave_out": tuple(names)})
 
 
-def _tables(session: Session) -> Iterator[tuple[Path, Sequence[Table]]]:
-    """The tables of the files that can be read."""
-    from tunnel_sim.files.importing.source import read_source
+def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
+    """The first records, with their runs; those with a run to judge come first.
 
-    for path in files_of(session):
-        try:
-            tables = read_source(path, choices_of(session)).tables
-        except TunnelError:
-            continue
-        yield path, tables
-
-
-def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[float | None]]]:
-    """The columns of the first readable table, unchanged.
-
-    Returns:
-        Name, unit (if stated), row numbers and values of each numeric column; few enough to draw.
+    Args:
+        order: keys of the records that are drawn already, which keep their places.
     """
-    import numpy as np
+    stretches, unit = imported.choices.stretches, imported.campaign.sensor.unit
+    added = {(one.file, one.run) for one in stretches if one.record is not None}
+    raws = {
+        id(part.raw): (part.raw, [each for each in imported.parts if each.raw is part.raw])
+        for part in imported.parts
+    }
+    doubts = {part.id: doubts_of(part, imported) for part in imported.parts}
+    places = {key: place for place, key in enumerate(order)}
 
-    for _, tables in _tables(session):
-        shown = []
-        for channel in tables[0].channels[:MOST_COLUMNS] if tables else ():
-            if channel.values.size > 1 and np.isfinite(channel.values).any():
-                rows = np.arange(channel.values.size, dtype=np.float64)
-                shown.append((channel.name, channel.unit, *points(rows, channel.values)))
-        if shown:
-            return shown
-    return []
+    def place(found: tuple[RawRecord, list[ImportedRun]]) -> int:
+        raw, parts = found
+        return places.get(
+            f"{raw.source.name}/{raw.id}", len(places) + (not any(doubts[part.id] for part in parts))
+        )
 
-
-def column_names(session: Session) -> list[str]:
-    """Names of the columns in the dropped files; empty where a file cannot be read."""
-    found = list(_tables(session))
-    if len(found) < len(files_of(session)):
-        return []
-    return list(
-        dict.fromkeys(channel.name for _, tables in found for table in tables for channel in table.channels)
-    )
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of the dropped files: its actual or possible meaning, whether it is used, and its unit if known."""
-
-    name: str
-    unit: str
-    source: str
-    role: Role
-    used: bool
-
-    @property
-    def units(self) -> list[str]:
-        """The units that the user can state for it; none where only the file can state the unit."""
-        from tunnel_sim.files.importing.units import UNITS
-
-        kinds = {"time": ("time",), "angle": READINGS}.get(self.role, ())
-        return [unit for kind in kinds for unit in UNITS[kind]]
-
-    def stating(self, unit: str | None) -> dict[str, Any]:
-        """The choices that state one of its `units`; an unused column is thereby chosen."""
-        key = "time_unit" if self.role == "time" else "unit"
-        if self.used or unit is None:
-            return {key: unit}
-        return {key: unit, self.role: self.name if self.role == "time" else (self.name,)}
-
-
-def columns_of(session: Session) -> list[Column]:
-    """The columns of all readable dropped files, each name once."""
-    from tunnel_sim.files.importing.columns import find_pairs
-
-    choices = choices_of(session)
-    found: dict[str, Column] = {}
-    for path, tables in _tables(session):
-        for table in tables:
-            try:
-                pairs = find_pairs(table, choices, path.name)
-            except TunnelError:  # it has to be chosen first
-                pairs = []
-            for channel in table.channels:
-                found.setdefault(channel.name, _column(channel, table.channels, pairs, choices))
-    return list(found.values())
-
-
-def _column(
-    channel: Channel, channels: Sequence[Channel], pairs: list[ColumnPair], choices: ImportChoices
-) -> Column:
-    import numpy as np
-
-    from tunnel_sim.files.importing.column_names import is_time, named_kind
-    from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, guessed_time_unit
-    from tunnel_sim.files.importing.condition_names import condition_of
-    from tunnel_sim.files.importing.inputs import stated_input
-    from tunnel_sim.files.importing.tables import is_input
-
-    role: Role
-    if any(channel is pair.time for pair in pairs) or (not pairs and is_time(channel)):
-        role, used, stated = "time", True, choices.time_unit
-    elif condition_of(channel.name, channel.unit) is not None:
-        return Column(channel.name, channel.unit, "a condition of the runs", "condition", True)
-    elif is_input(channel) or channel is stated_input(channels, choices):
-        return Column(channel.name, channel.unit, "the input of a driven run", "input", True)
-    else:
-        used = any(channel is pair.reading for pair in pairs)
-        role, stated = "angle", choices.unit if used else None
-    if stated is not None:
-        return Column(channel.name, stated, "stated here", role, used)
-    if channel.unit:
-        return Column(channel.name, channel.unit, "stated in the file", role, used)
-    if not np.isfinite(channel.values).any():
-        return Column(channel.name, "", "it has no numbers", role, used)
-    if role == "angle" and (kind := named_kind(channel.name)):
-        return Column(channel.name, "", f"{kind} by its name; nothing states its unit", role, used)
-    guess = guessed_time_unit if role == "time" else guessed_angle_unit
-    unit, size = guess(channel.values)
-    what = f"steps of {size:.4g}" if role == "time" else f"a swing of ±{size:.4g}"
-    return Column(channel.name, unit, f"guessed from {what}", role, used)
-
-
-def drawn(imported: Imported) -> list[DrawnRecord]:
-    """The first records, with their runs."""
-    raws = {id(part.raw): part.raw for part in imported.parts}
-    unit = imported.campaign.sensor.unit
     records = []
-    for raw in list(raws.values())[:MOST_RECORDS]:
-        time, marks = raw.cleaned.file_time_s, []
-        for part in (part for part in imported.parts if part.raw is raw):
+    for raw, parts in sorted(raws.values(), key=place)[:MOST_RECORDS]:
+        time, file, marks = raw.cleaned.file_time_s, raw.source.name, []
+        for part in parts:
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
-            fault = part.said[-1] if part.run is None else ""
-            marks.append(Mark(part.id, raw.source.name, start, end, *_rest(part, unit), fault))
-        records.append(DrawnRecord(raw.id, unit, *points(time, raw.cleaned.reading), tuple(marks)))
+            fault, of_user = part.said[-1] if part.run is None else "", (file, part.id) in added
+            marks.append(Mark(part.id, file, start, end, *_rest(part, unit), fault, doubts[part.id], of_user))
+        cut = imported.choices.cut and not raw.whole and raw.input is None
+        curve = points(time, raw.cleaned.reading)
+        records.append(DrawnRecord(raw.id, file, cut, unit, *curve, tuple(marks)))
     return records
+
+
+def doubts_of(part: ImportedRun, imported: Imported) -> tuple[str, ...]:
+    """What the user has to judge in a run, in one line each; empty where it looks like a free decay."""
+    from tunnel_sim.files.importing.cleaning import clipped
+    from tunnel_sim.files.plausible import few_samples
+
+    if part.run is None:
+        return () if part.said[-1] == LEFT_OUT else (part.said[-1],)
+    if part.run.drive is not None:
+        return ()
+    time, unit = (
+        part.raw.cleaned.file_time_s[part.piece.first : part.piece.last],
+        imported.campaign.sensor.unit,
+    )
+    found = []
+    if part.piece.held > 0.0:
+        found.append(f"a hand holds the body for {part.piece.held:.2g} s after its peak; check the release")
+    followed = any(other.raw is part.raw and other.piece.first >= part.piece.last for other in imported.parts)
+    if part.piece.stopped and not followed:
+        found.append(f"something stops the body at {time[-1]:.2f} s; check the end")
+    if cut := clipped(part.reading):
+        levels = " and ".join(f"{level:.3g}" for level, _ in cut)
+        last = max(float(time[samples[-1]]) for _, samples in cut)
+        found.append(f"peaks are cut off at {levels} {unit}; move the release behind {last:.2f} s")
+    if few := few_samples(part.run.record):
+        found.append(few)
+    return tuple(found)
 
 
 def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:
@@ -368,82 +336,45 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
     return end, f"about {significant(end, 2)} {unit}, found"
 
 
-def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaitable[None]]) -> None:
-    """A field for the unit of each of the first columns; a changed unit calls ``state`` with the choices."""
-    with ui.element("div").classes("fields wide"):
-        for column in columns[:MOST_COLUMNS]:
-            units = column.units
-            if column.unit not in units:  # the unit in the file, neither of a time nor of an angle
-                units = [*units, *([column.unit] if column.unit else [])]
-
-            async def change(event: events.ValueChangeEventArguments[Any], column: Column = column) -> None:
-                await state(column.stating(event.value))
-
-            source, use = column.source, "not read; a unit chosen here makes it the angle"
-            if column.used:
-                use = {"time": "read as the times", "angle": "read as the angle"}.get(column.role, "")
-            elif column.unit:  # the field is empty, so that this unit can be chosen too
-                source = f"{column.unit}, {source}"
-            value = column.unit if column.used and column.unit else None
-            label = f"Unit of {column.name}"
-            field = ui.select(units, label=label, value=value, clearable=True, on_change=change).props(
-                "dense"
-            )
-            field.props["hint"] = "; ".join(filter(None, (source, use)))
-            if not column.units:
-                field.props("disable")
-    if len(columns) > MOST_COLUMNS:
-        ui.label(f"{counted(len(columns) - MOST_COLUMNS, 'more column')} not shown.").classes("soft")
+def choices_to_show(session: Session, asked: str) -> list[str]:
+    """The choices, as fields of `ImportChoices`, that a fault asks for, or that the user has stated."""
+    stated = choices_of(session).model_fields_set | (
+        {"conditions"} if settings_of(choices_of(session)) else set()
+    )
+    wanted = {*asked_in(asked), *stated}
+    return [key for key in CORRECTIONS if key in wanted]
 
 
-def show_choices(
-    session: Session, columns: list[str], changed: Callable[[str, Any], Awaitable[None]]
-) -> None:
-    """The fields of the choices; a change calls back with name and new value, None for detection from the files."""
+def show_choices(session: Session, keys: Sequence[str], columns: list[str], changed: Changed) -> None:
+    """A field for each of some choices."""
     from tunnel_sim.files.importing.units import UNITS
-    from tunnel_sim.vocabulary.drive import HOLDS
-    from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
 
     now = choices_of(session)
-    angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
-
-    async def choose(key: str, event: events.ValueChangeEventArguments[Any]) -> None:
-        await changed(key, event.value or (() if key == "angle" else None))
-
-    async def write(key: str, field: ui.number | ui.input) -> None:
-        await changed(key, None if field.value == "" else field.value)
-
+    options = {
+        "angle": columns,
+        "unit": [unit for kind, units in UNITS.items() if kind != "time" for unit in units],
+        "time": columns,
+        "time_unit": list(UNITS["time"]),
+        "input": [*columns, "none"],
+    }
     with ui.element("div").classes("fields wide"):
-        for key, options in (
-            ("angle", columns),
-            ("unit", angle),
-            ("time", columns),
-            ("time_unit", list(UNITS["time"])),
-            ("input", [*columns, "none"]),
-            ("input_as", list(INPUT_COLUMNS)),
-            ("input_hold", list(HOLDS)),
-        ):
-            several = key == "angle"
-            value = list(now.angle) if several else getattr(now, key)
-            chosen = value if several else [value]
-            ui.select(
-                [*options, *(choice for choice in chosen if choice and choice not in options)],
-                label=FIELDS[key.replace("_", "-")],
-                value=value,
-                multiple=several,
-                clearable=True,
-                on_change=partial(choose, key),
-            ).props("dense")
-        for key, label in _WRITTEN.items():
-            field: ui.number | ui.input
-            if key == "set":
-                field = ui.input(label, value=settings_of(now)).props("dense")
-            elif key in ("calibration", "name", "delimiter", "decimal"):
-                field = ui.input(label, value=getattr(now, key) or "").props("dense")
+        for key in keys:
+            if key == "conditions":
+                field = ui.input(label_of(ImportChoices, key), value=settings_of(now)).props(
+                    "dense bottom-slots"
+                )
+                field.props["hint"] = "such as wind_speed=0, air_density=1.2"
+                field.on("change", partial(_set_conditions, changed, field))
             else:
-                field = ui.number(label, value=getattr(now, key)).props("dense step=any")
-            field.on("change", partial(write, key, field))
-        ui.checkbox("Cut records at releases", value=now.cut, on_change=lambda e: changed("cut", e.value))
+                field_of(ImportChoices, key, getattr(now, key), changed, options.get(key))
+
+
+async def _set_conditions(changed: Changed, field: ui.input) -> None:
+    await changed("conditions", field.value)
+
+
+def show_import_command(session: Session) -> None:
+    """The command that repeats the import."""
     show_command(
         f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
     )

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from tunnel_lab.bench import preview
+from tunnel_lab.bench import column_units, preview
 from tunnel_lab.bench.parts import (
     Chart,
     Fault,
     Frame,
     address,
     button,
+    page_words,
     show_blocks,
     show_items,
 )
@@ -28,11 +29,12 @@ if TYPE_CHECKING:
 
 
 _TIME = "time of the file [s]"
+_MOST_NAMES = 8  # of runs, in a line
 _KINDS = {"start": "release", "end": "end", "rest": "rest"}
 _HELP = (
     "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or ends (square), and the "
-    "dashed line to the angle at which it rests: that angle is then subtracted. Drag in a chart to zoom; "
-    "double-click to see all of it."
+    "dashed line to the angle at which it rests: that angle is then subtracted. Delete on a circle leaves the run "
+    "out. Drag in a chart to zoom; double-click to see all of it. A release is added in the middle of the view."
 )
 
 
@@ -51,11 +53,14 @@ class RecordsPage:
             return
         self._files = ui.element("div")
         self._fault = Fault()
+        self._asked = ui.element("div")
         with ui.element("p").classes("buttons"):
             self._write_button = button("Write the campaign", self._write, main=True)
             self._write_button.props("disabled")
             if session.imported:
                 frame.way_on()
+        self._judged = ui.label().classes("doubt").props("role=status aria-live=polite")
+        self._judged.set_visibility(False)
         self._written = Fault()
         self._naming = ui.element("div").classes("fields")
         self._left_out = ui.element("div").classes("fields")
@@ -63,11 +68,15 @@ class RecordsPage:
             with self._naming:
                 name = ui.input("Name of the campaign", value=session.name).props("dense")
                 name.on("change", lambda: self._rename(str(name.value)))
-        self._form_place = ui.expansion("Missing information and corrections").classes("choices")
+        self._corrections = ui.expansion("Corrections").classes("choices")
         self._reading = 0
         self._charts: list[Chart] = []
         self._rests: list[ui.number] = []
         self._names: list[str] = []
+        self._runs: dict[str, ui.element] = {}
+        self._shown_runs: dict[str, object] = {}
+        self._shown_choices: list[str] | None = None
+        self._focus = ""
         self._units = ui.expansion("Columns of the files, and their units").classes("choices")
         self._drawn = ui.element("div")
         self._table = ui.element("div").props("role=status aria-live=polite")
@@ -90,17 +99,24 @@ class RecordsPage:
                     Chart(run.id, "time [s]", label, [("reading", "after")], curve)
 
     async def _first(self) -> None:
-        self._names = await asyncio.to_thread(preview.column_names, self._session)
-        self._show_choices()
+        self._names = await asyncio.to_thread(column_units.column_names, self._session)
         self._show_files()
         await self._read()
-        if self._imported is None:
-            self._form_place.open()
 
-    def _show_choices(self) -> None:
-        self._form_place.clear()
-        with self._form_place:
-            preview.show_choices(self._session, self._names, self._changed)
+    def _show_choices(self, asked: str) -> None:
+        """The fields that a fault asks for and those stated, and the others folded."""
+        keys = preview.choices_to_show(self._session, asked)
+        if keys == self._shown_choices:
+            return  # the field that is being filled keeps the focus
+        self._shown_choices = keys
+        self._asked.clear()
+        with self._asked:
+            preview.show_choices(self._session, keys, self._names, self._changed)
+        self._corrections.clear()
+        with self._corrections:
+            others = [key for key in preview.CORRECTIONS if key not in keys]
+            preview.show_choices(self._session, others, self._names, self._changed)
+            preview.show_import_command(self._session)
 
     def _rename(self, name: str) -> None:
         with self._fault.around():
@@ -123,14 +139,37 @@ class RecordsPage:
 
     async def _changed(self, key: str, value: Any) -> None:
         with self._fault.around():
-            preview.state(self._session, preview.settings_from(value) if key == "set" else {key: value})
+            preview.state(
+                self._session, preview.settings_from(value) if key == "conditions" else {key: value}
+            )
             await self._read()
 
     async def _stated(self, changes: dict[str, Any]) -> None:
         """Save the unit of a column; the fields of the choices also show it."""
         with self._fault.around():
             preview.state(self._session, changes)
-            self._show_choices()
+            self._shown_choices = None
+            await self._read()
+
+    async def _added(self, record: preview.DrawnRecord, at: float) -> None:
+        """Add a release; its mark takes the focus."""
+
+        def add() -> None:
+            self._focus = preview.add(self._session, record, at)
+
+        await self._cut(add)
+
+    async def _cut(self, change: Callable[[], None]) -> None:
+        """Change the runs of a record; nothing changes where the files cannot be read with it."""
+        with self._fault.around():
+            before = preview.choices_of(self._session)
+            try:
+                change()
+                await asyncio.to_thread(preview.read, self._session)
+            except TunnelError:
+                kept = {"stretches": [one.model_dump() for one in before.stretches]}
+                preview.state(self._session, {**kept, "leave_out": before.leave_out})
+                raise
             await self._read()
 
     async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
@@ -165,6 +204,7 @@ class RecordsPage:
         self._fault.show(said)
         if imported is None and not redraw:
             return False
+        self._show_choices(str(said))
         self._imported = imported
         # A campaign without some of the dropped files is written only where the user has left these out.
         if imported is not None and not faults:
@@ -175,17 +215,18 @@ class RecordsPage:
         self._table.clear()
         if redraw:
             self._drawn.clear()
-            columns = await asyncio.to_thread(preview.columns_of, self._session)
+            columns = await asyncio.to_thread(column_units.columns_of, self._session)
             if self._is_past(mine):
                 return True
             self._units.clear()
             self._units.set_visibility(bool(columns))
             with self._units:
-                preview.show_columns(columns, self._stated)
+                column_units.show_columns(columns, self._stated)
             if imported is None:
                 self._units.open()
         if imported is None:
-            curves = await asyncio.to_thread(preview.raw_columns, self._session)
+            self._judged.set_visibility(False)
+            curves = await asyncio.to_thread(column_units.raw_columns, self._session)
             if self._drawn.is_deleted or not curves:
                 return False
             with self._drawn:
@@ -202,7 +243,7 @@ class RecordsPage:
 
             show_blocks([parts_table(imported)])
             with ui.element("ul").classes("notes"):
-                show_items(imported.remarks())
+                show_items(map(page_words, imported.remarks()))
         return True
 
     def _is_past(self, reading: int) -> bool:
@@ -224,13 +265,19 @@ class RecordsPage:
 
     def _draw(self, imported: Imported) -> None:
         """Draw the records, or only their marks where the records are already drawn."""
-        records = preview.drawn(imported)
+        doubtful = [part.id for part in imported.parts if preview.doubts_of(part, imported)]
+        more = f" and {len(doubtful) - _MOST_NAMES} more" if len(doubtful) > _MOST_NAMES else ""
+        self._judged.set_text(f"To judge, below: {', '.join(doubtful[:_MOST_NAMES])}{more}")
+        self._judged.set_visibility(bool(doubtful))
+        if not self._drawn.default_slot.children:
+            self._runs, self._shown_runs = {}, {}
+        records = preview.drawn(imported, list(self._runs))
         marks = [mark for record in records for mark in record.marks]
         unit = imported.campaign.sensor.unit
         if not self._drawn.default_slot.children:
             ui.label(_HELP).classes("soft")
             with ui.element("div").classes("charts"):
-                self._charts = [self._chart(record) for record in records]
+                self._charts = [self._record(record) for record in records]
             hidden = len({id(part.raw) for part in imported.parts}) - len(records)
             if hidden > 0:
                 ui.label(f"{counted(hidden, 'more record')} not drawn.").classes("soft")
@@ -252,11 +299,15 @@ class RecordsPage:
                         "from": mark.start,
                         "to": mark.end,
                         "about": f"rest {mark.about}",
+                        "out": bool(mark.fault),
                     }
                     for mark in record.marks
                     for kind, words in _KINDS.items()
-                ]
+                ],
+                f"{self._focus} start" if self._focus in [mark.run for mark in record.marks] else "",
             )
+            self._show_runs(record, alone=len(imported.parts) == 1)
+        self._focus = ""
         for field, mark in zip(self._rests, marks, strict=True):
             field.set_value(float(f"{mark.rest:.6g}"))
             field.props["hint"] = mark.about
@@ -266,14 +317,36 @@ class RecordsPage:
         """Save a reading at rest; where the field is emptied, it is detected again."""
         await self._moved(mark, "rest", field.value)
 
-    def _chart(self, record: preview.DrawnRecord) -> Chart:
+    def _record(self, record: preview.DrawnRecord) -> Chart:
+        """The chart of a record, and the place for its runs below it."""
         marks = {f"{mark.run} {kind}": (mark, kind) for mark in record.marks for kind in _KINDS}
         curves: list[Sequence[float | None]] = [record.time, record.reading]
-        label = f"reading [{record.unit}]"
-        return Chart(
-            record.title, _TIME, label, [("reading", "after")], curves,
-            lambda name, at: self._moved(*marks[name], at),
-        )  # fmt: skip
+        with ui.element("div"):
+            chart = Chart(
+                record.title, _TIME, f"reading [{record.unit}]", [("reading", "after")], curves,
+                moved=lambda name, at: self._moved(*marks[name], at),
+                added=(lambda at: self._added(record, at)) if record.cut else None,
+                removed=lambda name: self._cut(lambda: preview.remove(self._session, marks[name][0])),
+            )  # fmt: skip
+            self._runs[record.key] = ui.element("div").props("role=status aria-live=polite")
+        return chart
+
+    def _show_runs(self, record: preview.DrawnRecord, *, alone: bool) -> None:
+        """What is to be judged in a record, and buttons for its runs, unless one is ``alone`` in the campaign."""
+        shown = alone, [(mark.run, mark.doubts, mark.added, mark.is_left_out) for mark in record.marks]
+        if self._shown_runs.get(record.key) == shown:
+            return  # a button that is being pressed stays
+        self._shown_runs[record.key] = shown
+        self._runs[record.key].clear()
+        with self._runs[record.key]:
+            for mark in record.marks:
+                for line in mark.doubts:
+                    ui.label(f"{mark.run}: {line}").classes("doubt")
+            with ui.element("p").classes("buttons of-runs"):
+                for mark in () if alone else record.marks:
+                    words = "Remove" if mark.added else "Use again" if mark.is_left_out else "Leave out"
+                    change = preview.restore if mark.is_left_out else preview.remove
+                    button(f"{words}: {mark.run}", partial(self._cut, partial(change, self._session, mark)))
 
     async def _write(self) -> None:
         with self._written.around():

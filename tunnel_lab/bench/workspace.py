@@ -22,6 +22,8 @@ _LEAST_NAME = 3  # characters of a name that files share
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
 ESTIMATOR = "output_error"
 """The estimator whose estimate opens the diagnosis."""
+DIAGNOSIS = "diagnosis"
+"""The name of the diagnosis among the commands."""
 
 
 @dataclass(frozen=True)
@@ -220,12 +222,15 @@ def closed(session: Session, key: str) -> str:
         return "Write the campaign on the page Records first."
     if place > 1 and session.draft.is_file():
         return "Correct the conditions that are marked first."
+    if place > 2 and work_of(session.log(ESTIMATOR)).running:
+        return f"{ESTIMATOR} is running; its estimate opens this stage."
     if place > 2 and not is_current(session, session.estimate(ESTIMATOR)):
-        return f"Identify the campaign with {ESTIMATOR} first."
+        return f"Identify the campaign with {ESTIMATOR} first: the diagnosis starts from its estimate."
     if place > 2 and work_of(session.log(ESTIMATOR)).status == 1:
         return "The campaign could not be identified; the page Identify says why."
     if place > 3 and not is_current(session, session.diagnosis):
-        return "Diagnose the campaign first."
+        running = work_of(session.log(DIAGNOSIS)).running
+        return "The diagnosis is running." if running else "Diagnose the campaign first."
     return ""
 
 

@@ -53,6 +53,7 @@
       ],
       bands: spec.band ? [{ series: spec.band, fill: colour("noise") }] : [],
       cursor: { sync: { key: group, scales: ["x", null] } },
+      hooks: { setCursor: [(chart) => chart.root.classList.toggle("pointed", chart.cursor.idx != null)] },
     };
   }
 

@@ -29,9 +29,9 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def optional(description: str) -> Any:
-    """A field that may be left out: None."""
-    return Field(default=None, description=description)
+def optional(description: str, title: str | None = None) -> Any:
+    """A field that may be left out: None; a page shows it under its title."""
+    return Field(default=None, description=description, title=title)
 
 
 ModelT = TypeVar("ModelT", bound=StrictModel)

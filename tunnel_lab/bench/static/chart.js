@@ -1,7 +1,8 @@
-// A chart by uPlot with marks: handles above it that are dragged, or moved with the arrow keys.
+// A chart by uPlot with marks: handles above it that are dragged, moved with the arrow keys, or removed with Delete.
 export default {
-  template: `<figure><figcaption class="soft">{{ title }}</figcaption><div class="plot" ref="plot" role="img" :aria-label="title"></div></figure>`,
-  props: { title: String, x: String, y: String, series: Array, data: Array, marks: Array },
+  template: `<figure><figcaption class="soft">{{ title }}</figcaption><div class="plot" ref="plot" role="img" :aria-label="title"></div>
+    <button v-if="adds" type="button" class="button" :aria-label="'Add a release to ' + title" @click="add">Add a release</button></figure>`,
+  props: { title: String, x: String, y: String, series: Array, data: Array, marks: Array, focus: String, adds: Boolean },
   mounted() {
     this.resize = new ResizeObserver(() => this.build());
     this.resize.observe(this.$el);
@@ -34,7 +35,6 @@ export default {
         return this.place();
       }
       this.chart?.destroy();
-      const number = (value) => (value == null ? "–" : String(Number(value.toPrecision(4))).replace("-", "−"));
       const axis = (label, size) => ({
         label, labelSize: 18, size, font: "11px system-ui", labelFont: "12px system-ui", stroke: this.colour("ink"),
         grid: { stroke: this.colour("line"), width: 1 }, ticks: { stroke: this.colour("line"), size: 5 },
@@ -43,14 +43,18 @@ export default {
         width, height: this.height(width),
         scales: { x: { time: false } },
         axes: [axis(this.x, 34), axis(this.y, 56)],
-        series: [{ label: this.x, value: (_, v) => number(v) }, ...this.series.map(([label, role]) => ({
-          label, stroke: this.colour(role), width: 1.3, points: { show: false }, value: (_, v) => number(v),
+        series: [{}, ...this.series.map(([label, role]) => ({
+          label, stroke: this.colour(role), width: 1.3, points: { show: false },
         }))],
-        legend: { show: this.series.length > 1 },
+        legend: { show: this.series.length > 1, live: false },
         hooks: { setScale: [() => requestAnimationFrame(() => this.place())] },
       }, this.data, this.$refs.plot);
       this.handles = new Map();
       this.place();
+    },
+    add() {
+      const { min, max } = this.chart.scales.x;
+      this.$emit("added", { at: 0.5 * (min + max) });
     },
     height(width) { return Math.max(180, Math.min(300, Math.round(0.32 * width))); },
     place() {
@@ -59,7 +63,7 @@ export default {
       for (const [id, handle] of this.handles) if (!wanted.has(id)) { handle.remove(); this.handles.delete(id); }
       for (const mark of this.marks) {
         const handle = this.handles.get(mark.id) || this.handle(mark.id);
-        handle.className = `mark ${mark.kind}`;
+        handle.className = `mark ${mark.kind}${mark.out ? " out" : ""}`;
         handle.setAttribute("aria-label", mark.label);
         handle.setAttribute("aria-valuenow", mark.at);
         const said = `${mark.at.toPrecision(5)} ${mark.unit}`, { clientWidth, clientHeight } = this.chart.over;
@@ -76,6 +80,11 @@ export default {
         handle.hidden ||= to <= from;
         handle.firstChild.textContent = mark.about;
         handle.firstChild.style.top = `${-at - 9}px`; // above the chart, where no trace is
+      }
+      const sought = this.handles.get(this.focus);
+      if (sought && !sought.hidden && this.sought !== this.focus) { // once: later changes leave the focus where it is
+        this.sought = this.focus;
+        sought.focus();
       }
     },
     handle(id) {
@@ -111,6 +120,10 @@ export default {
       });
       made.addEventListener("mousedown", (event) => event.stopPropagation()); // uPlot would zoom
       made.addEventListener("keydown", (event) => {
+        if (event.key === "Delete" && mark().kind === "start") {
+          event.preventDefault();
+          this.$emit("removed", { id });
+        }
         const steps = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
         if (!steps) return;
         event.preventDefault();

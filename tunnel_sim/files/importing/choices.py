@@ -43,41 +43,64 @@ class Stretch(StrictModel):
     start: float | None = optional("the time of the release by the file's clock, in s")
     end: float | None = optional("the time at which the run ends by the file's clock, in s")
     rest: float | None = optional("the reading at rest in rad, to be subtracted")
+    record: OneLine | None = optional("the name of the record, where its run is added to those found")
 
 
 class ImportChoices(StrictModel):
     """How files are read; None: found from the files."""
 
-    time: OneLine | None = optional("the name or number of the column of times")
+    time: OneLine | None = optional("the name or number of the column of times", "Column of the times")
     angle: tuple[OneLine, ...] = Field(
-        default=(), strict=False, description="a list of names or numbers of columns"
+        default=(),
+        strict=False,
+        title="Column of the angle",
+        description="a list of names or numbers of columns",
     )
-    unit: OneLine | None = optional("the unit of the angle, such as 'deg'")
-    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'")
-    rate: SampleRate | None = optional("a positive number in Hz")
-    counts_per_turn: Positive | None = optional("a positive number")
+    unit: OneLine | None = optional("the unit of the angle, such as 'deg'", "Unit of the angle")
+    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'", "Unit of the times")
+    rate: SampleRate | None = optional("a positive number in Hz", "Sample rate [Hz]")
+    counts_per_turn: Positive | None = optional("a positive number", "Counts of an encoder per turn")
     calibration: OneLine | None = optional(
-        "a formula such as '0.1 + 20*V', or the name of a table of two columns"
+        "a formula such as '0.1 + 20*V', or the name of a table of two columns",
+        "Angle of a voltage",
     )
-    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional("'tab', ';', ',', '|' or 'blank'")
-    decimal: Literal[".", ","] | None = optional("'.' or ','")
-    start: float | None = optional("a time of the file in s: earlier samples are left out")
-    end: float | None = optional("a time of the file in s: later samples are left out")
-    rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
-    input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
-    input_as: InputColumn | None = optional(one_of([f"'{name}'" for name in INPUT_COLUMNS]))
-    input_hold: Hold | None = optional("'zero' or 'linear'")
+    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional(
+        "'tab', ';', ',', '|' or 'blank'", "Delimiter of a text file"
+    )
+    decimal: Literal[".", ","] | None = optional("'.' or ','", "Decimal sign of a text file")
+    start: float | None = optional(
+        "a time of the file in s: earlier samples are left out", "Leave out samples before [s]"
+    )
+    end: float | None = optional(
+        "a time of the file in s: later samples are left out", "Leave out samples after [s]"
+    )
+    rest: float | None = optional(
+        "the reading at rest in rad, to be subtracted from every run", "Reading at rest [rad]"
+    )
+    input: OneLine | None = optional(
+        "the name of the input's column of a driven run, or 'none'", "Column of a driven run's input"
+    )
+    input_as: InputColumn | None = optional(
+        one_of([f"'{name}'" for name in INPUT_COLUMNS]), "What the input is"
+    )
+    input_hold: Hold | None = optional("'zero' or 'linear'", "The input between its samples")
     leave_out: tuple[OneLine, ...] = Field(
-        default=(), strict=False, description="a list of names of runs or files"
+        default=(), strict=False, title="Leave out", description="a list of names of runs or files"
     )
-    cut: bool = Field(default=True, description="false to keep records whole")
+    cut: bool = Field(
+        default=True, title="Cut records at releases", description="false to keep records whole"
+    )
     stretches: tuple[Stretch, ...] = Field(
         default=(),
         strict=False,
         description="[[choices.stretches]] tables with file, run, start, end and rest",
     )
-    name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
-    conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
+    name: OneLine | None = optional(
+        "a pattern of file names such as 'S{spring}_V{wind_speed}_*'", "Conditions in the file names"
+    )
+    conditions: Conditions = Field(
+        default=Conditions(), title="Conditions of all runs", description="a [choices.conditions] table"
+    )
     stated_by: StatedBy = Field(default=StatedBy(), description="a [choices.stated_by] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:

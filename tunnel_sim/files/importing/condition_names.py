@@ -13,16 +13,16 @@ from tunnel_sim.files.toml_input import NotNegative, Positive, StrictModel, opti
 class Conditions(StrictModel):
     """Conditions of runs, sizes of the rig and the scatter between runs, as in ``campaign.toml``."""
 
-    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
+    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off", "wind speed V [m/s]")
     spring_stiffness: NotNegative | None = optional(
-        "a number in N m/rad, 0 for a driven body without a spring"
+        "a number in N m/rad, 0 for a driven body without a spring", "stiffness Kr [N m/rad]"
     )
-    air_density: Positive | None = optional("a positive number in kg/m3")
-    release_angle: float | None = optional("a number in rad")
-    yaw_inertia: Positive | None = optional("a positive number in kg m2")
-    frontal_area: Positive | None = optional("a positive number in m2")
-    reference_length: Positive | None = optional("a positive number in m")
-    width: Positive | None = optional("a positive number in m")
+    air_density: Positive | None = optional("a positive number in kg/m3", "air density ρ [kg/m³]")
+    release_angle: float | None = optional("a number in rad", "release angle [rad]")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2", "nominal inertia Izz [kg m²]")
+    frontal_area: Positive | None = optional("a positive number in m2", "frontal area A [m²]")
+    reference_length: Positive | None = optional("a positive number in m", "reference length l [m]")
+    width: Positive | None = optional("a positive number in m", "width [m]")
     repeatability_wind_speed: Spread | None = optional(SPREAD)
     repeatability_spring_stiffness: Spread | None = optional(SPREAD)
     repeatability_mechanical_damping: Spread | None = optional(SPREAD)

@@ -23,7 +23,7 @@ from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
 from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
-from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
+from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate, with_added
 from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.plausible import plausible_values
@@ -215,7 +215,9 @@ def _parts(
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
         pieces = _pieces(raw, choices)
-        for run, piece in zip(_names(label, pieces), pieces, strict=True):
+        found = dict(zip(_names(label, pieces), pieces, strict=True))
+        added = [one for one in choices.stretches if (one.file, one.record) == (raw.source.name, raw.id)]
+        for run, piece in with_added(raw.cleaned.time_s, found, added).items():
             try:
                 parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
             except TunnelError as fault:

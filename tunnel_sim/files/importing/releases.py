@@ -7,7 +7,7 @@ swing and by the noise, never by the largest swing of the record. A record witho
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import sqrt
@@ -351,19 +351,43 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
     return max(piece.first, tops[free]) if tops else piece.first
 
 
+def with_added(
+    time_s: Times, found: Mapping[str, RecordPiece], stated: Sequence[Stretch]
+) -> dict[str, RecordPiece]:
+    """The runs of a record by name, and those that the user adds; an added release ends the run before it.
+
+    Args:
+        stated: the added runs, with their start, s.
+    """
+    pieces = dict(found)
+    for one in stated:
+        start = time_s[0] if one.start is None else one.start
+        first = int(np.searchsorted(time_s, start - _slack(time_s)))
+        last = min((piece.first for piece in pieces.values() if piece.first > first), default=time_s.size)
+        for name, piece in pieces.items():
+            if piece.first < first < piece.last:
+                pieces[name] = replace(piece, last=first, stopped=False)
+        pieces[one.run] = RecordPiece(min(first, last - 1), last)
+    return dict(sorted(pieces.items(), key=lambda item: item[1].first))
+
+
 def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
     """A run with stated start and end; refused if fewer than two samples are in between."""
     if stated.start is None and stated.end is None:
         return found
     start = time_s[found.first] if stated.start is None else stated.start
     end = time_s[found.last - 1] if stated.end is None else stated.end
-    # Half a step of slack: a marker between two samples belongs to the closer one.
-    slack = 0.5 * float(np.median(np.diff(time_s)))
+    slack = _slack(time_s)
     first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
     if last - first < 2:
         remedy = "state a start before the end, within the record"
         raise TunnelError(f"no samples from {start:g} to {end:g} s", where=where, remedy=remedy)
     return RecordPiece(first, last)
+
+
+def _slack(time_s: Times) -> float:
+    """Half a step, s: a marker between two samples belongs to the closer one."""
+    return 0.5 * float(np.median(np.diff(time_s)))
 
 
 def _without_drift(time_s: Times, angle: Angles, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Angles:

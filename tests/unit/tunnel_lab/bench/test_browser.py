@@ -60,7 +60,7 @@ def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, 
         session = Session(served.folder, "img_src_x_onerror_alert_1")
         assert [path.name for path in session.uploads.iterdir()] == ["img_src_x_onerror_alert_1_.csv"]
         page.set_viewport_size({"width": 390, "height": 900})
-        page.get_by_text("Missing information and corrections").click()
+        page.get_by_text("Corrections", exact=True).click()
         page.get_by_label("Conditions in the file names").wait_for()
         page.wait_for_function(SETTLED)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -289,7 +289,7 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
             page.keyboard.type(text)
             page.keyboard.press("Enter")
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
-        page.wait_for_selector("text=run 'a': wind-on without air_density")
+        page.wait_for_selector("text=a: wind-on without air density")
         assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"
         one.open("/typed/conditions")  # what is wrong is kept too
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
@@ -347,6 +347,10 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
         fit = one.page.frame_locator('iframe[title="The fit over the data"]')
         fit.locator(".uplot").nth(1).wait_for()
         shown = fit.locator("select option").all_inner_texts()
+        reading, seen = fit.locator(".u-value").first, "(one) => getComputedStyle(one).visibility"
+        assert reading.evaluate(seen) == "hidden"  # no dash where nothing is pointed at
+        fit.locator(".u-over").first.hover()
+        assert reading.evaluate(seen) == "visible"
         frame = one.page.locator('iframe[title="The fit over the data"]').bounding_box()
         assert frame["height"] > 600
     assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
@@ -387,7 +391,7 @@ def test_wind_on_files_become_one_campaign_under_a_name_of_ones_own(
         assert not write.is_disabled()
         one.click("Write the campaign")
         page.wait_for_url("**/conditions")
-        page.wait_for_selector("text=wind-on without air_density")
+        page.wait_for_selector("text=wind-on without air density")
     runs = read_campaign(served.folder / "third-day").runs
     assert [(run.id, run.wind_speed) for run in runs] == [("day3_1", 0.0), ("day3_3", 12.0)]
 

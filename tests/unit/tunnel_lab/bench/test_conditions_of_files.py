@@ -57,7 +57,7 @@ def test_sizes_of_the_rig_wait_for_the_density_too(tmp_path: Path) -> None:
     path.write_text("frontal_area [cm2]: 360\n" + path.read_text())
     write(session, preview.read(session)[0])
     cells = conditions.typed(session)
-    assert float(cells[conditions.RIG]["frontal_area"]) == pytest.approx(0.036)
+    assert cells[conditions.RIG]["frontal_area"] == "0.036"
     cells["run1"]["air_density"] = "1.2"
     assert conditions.save(session, cells) == {}
     assert read_campaign(session.campaign).rig.frontal_area == pytest.approx(0.036)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.import_files import decay
-from tunnel_lab.bench import conditions, preview
+from tunnel_lab.bench import column_units, conditions, preview
 from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
@@ -77,6 +77,65 @@ def test_a_moved_rest_is_subtracted_also_by_the_command_and_can_be_taken_back(se
         preview.read(session)
 
 
+def test_an_added_release_splits_a_run_also_for_the_command_and_can_be_removed(session: Session) -> None:
+    (record,) = preview.drawn(preview.read(session)[0])
+    (found,) = record.marks
+    assert preview.add(session, record, 5.0) == "log-added-1"
+    first, added = preview.drawn(preview.read(session)[0])[0].marks
+    assert (first.run, first.start, added.start) == ("log", found.start, pytest.approx(5.0))
+    assert (first.end, added.end) == (pytest.approx(4.995), found.end)
+    assert (first.added, added.added) == (False, True)
+    preview.move(session, added, {"start": 6.0})
+    again = read_records([session.uploads / "log.csv"], read_recipe(session.choices))
+    assert [run.id for run in again.campaign.runs] == ["log", "log-added-1"]
+    sizes = [run.record.time_s.size for run in again.campaign.runs]
+    assert sum(sizes) == 1800 - again.parts[0].piece.first
+    assert sizes[1] == 600
+    preview.remove(session, preview.drawn(again)[0].marks[1])
+    (left,) = preview.drawn(preview.read(session)[0])[0].marks
+    assert (left.run, left.start, left.end) == (found.run, found.start, found.end)
+
+
+def test_a_found_run_is_left_out_and_used_again(session: Session) -> None:
+    (record,) = preview.drawn(preview.read(session)[0])
+    preview.add(session, record, 5.0)
+    first = preview.drawn(preview.read(session)[0])[0].marks[0]
+    preview.remove(session, first)
+    left = preview.drawn(preview.read(session)[0])[0].marks[0]
+    assert left.is_left_out
+    assert left.doubts == ()
+    preview.restore(session, left)
+    assert not preview.drawn(preview.read(session)[0])[0].marks[0].is_left_out
+
+
+def test_records_with_a_run_to_judge_come_first_and_keep_their_places(session: Session) -> None:
+    time, angle = decay(duration=16.0)
+    angle = np.clip(angle, -0.2, 0.2)
+    rows = [f"{t:.3f},{y:.6f}" for t, y in zip(time, angle, strict=True)]
+    (session.uploads / "odd.csv").write_text("time_s,yaw_rad\n" + "\n".join(rows))
+    records = preview.drawn(preview.read(session)[0])
+    assert [record.title for record in records] == ["odd", "log"]
+    assert "peaks are cut off at 0.2 and -0.2 rad" in records[0].marks[0].doubts[0]
+    assert records[1].marks[0].doubts == ()
+    preview.move(session, records[0].marks[0], {"start": 8.0})
+    imported = preview.read(session)[0]
+    assert [one.title for one in preview.drawn(imported)] == ["log", "odd"]
+    assert [one.title for one in preview.drawn(imported, [one.key for one in records])] == ["odd", "log"]
+
+
+def test_a_fault_asks_for_its_own_fields(session: Session) -> None:
+    log = session.uploads / "log.csv"
+    log.write_text(log.read_text().replace("yaw_rad", "pot_V"))
+    with pytest.raises(TunnelError) as caught:
+        preview.read(session)
+    assert preview.choices_to_show(session, str(caught.value)) == ["calibration"]
+    preview.state(session, {"calibration": "1*V"})
+    assert preview.choices_to_show(session, "") == ["calibration"]  # what is stated can be corrected
+    preview.state(session, preview.settings_from("wind_speed=0.0360000000000001"))
+    assert preview.settings_of(preview.choices_of(session)) == "wind_speed=0.0360000000000001"
+    assert preview.choices_to_show(session, "") == ["calibration", "conditions"]
+
+
 def test_choices_are_a_recipe_and_can_be_taken_back(session: Session) -> None:
     preview.state(session, {"unit": "deg", "angle": ["yaw_rad"]})
     assert preview.choices_of(session).unit == "deg"
@@ -84,7 +143,7 @@ def test_choices_are_a_recipe_and_can_be_taken_back(session: Session) -> None:
         preview.state(session, {"rate": -1.0})
     preview.state(session, {"unit": None, "angle": ()})
     assert preview.choices_of(session).unit is None
-    assert preview.column_names(session) == ["time", "yaw"]
+    assert column_units.column_names(session) == ["time", "yaw"]
 
 
 def test_a_campaign_written_again_keeps_its_conditions(session: Session) -> None:
@@ -109,11 +168,11 @@ def test_a_bad_file_does_not_block_a_good_one(session: Session) -> None:
     (session.uploads / "log.csv").unlink()
     with pytest.raises(TunnelError, match=r"notes\.csv"):
         preview.read(session)
-    assert preview.raw_columns(session) == []
+    assert column_units.raw_columns(session) == []
 
 
 def test_the_raw_columns_are_those_of_the_file(session: Session) -> None:
-    (name, unit, rows, values), (second, _, _, readings) = preview.raw_columns(session)
+    (name, unit, rows, values), (second, _, _, readings) = column_units.raw_columns(session)
     assert (name, unit, second) == ("time", "s", "yaw")
     assert len(rows) == len(values) == len(readings)
     assert values == sorted(values)

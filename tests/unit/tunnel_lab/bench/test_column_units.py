@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.import_files import decay
 from tunnel_lab.bench import preview
-from tunnel_lab.bench.preview import Column, columns_of
+from tunnel_lab.bench.column_units import Column, columns_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, guessed_time_unit
 
