@@ -17,7 +17,7 @@ class Doubt:
     """A prediction by which a probable answer fails.
 
     Args:
-        kind: ``held out``, ``ahead``, ``patched``, ``left`` or ``elsewhere``, as in `Predictions`.
+        kind: ``held out``, ``ahead``, ``patched``, ``untested``, ``left`` or ``elsewhere``, as in `Predictions`.
         share: that was found, a fraction; None where the place is in doubt.
     """
 
@@ -33,6 +33,7 @@ class Predictions:
         held_out: share of the gap that it explains on held-out readings.
         ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
         patched: share of the gap that the user's model explains, with the answer written into it.
+        untested: share of the gap that the fit leaves, where the user's model can have only a mean of a cause.
         left: root mean square residual over that of the readings about their mean, a ratio.
         elsewhere: whether the residuals show a place at which none of its causes acts.
     """
@@ -40,6 +41,7 @@ class Predictions:
     held_out: float | None = None
     ahead: float | None = None
     patched: float | None = None
+    untested: float | None = None
     left: float | None = None
     elsewhere: bool = False
 
@@ -51,6 +53,8 @@ class Predictions:
             for kind, share in shares.items()
             if share is not None and share < chosen.predicted_from
         ]
+        if self.untested is not None:
+            found.append(Doubt("untested", self.untested))
         if self.left is not None and self.left > chosen.left_of_swing:
             found.append(Doubt("left", self.left))
         if self.elsewhere:

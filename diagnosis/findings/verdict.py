@@ -218,6 +218,9 @@ DOUBTS: Mapping[str, Callable[[float], str]] = {
         f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
     ),
     "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
+    "untested": lambda found: (
+        f"leaves {share(found)} of the gap, and the model can have only the mean of its friction under load"
+    ),
     "left": lambda found: f"leaves a residual of {share(found)} of the swing",
     "elsewhere": lambda _: "the residuals point elsewhere",
 }

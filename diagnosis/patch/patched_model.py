@@ -29,7 +29,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
-from diagnosis.patch.native_friction import native_friction, nearest_polynomial
+from diagnosis.patch.native_friction import Carried, native_friction, nearest_polynomial
 from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.search.study import Study
 from tunnel_sim.engine.joint_model import JointModel
@@ -150,10 +150,12 @@ def found_law(
             else:
                 program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
                 differences.append(Fact("no native element", {"moment": words}))
-    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss)
+    carried = Carried.over(physics.parameters, _loads(problem, common, release))
+    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss, carried)
     damping += friction.damping
     program = _added(program, friction.program)
     differences += friction.differences
+    rest = law.rest + data.similarity.rest
     units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
     k0, k1, k2, k3 = (to_own_unit(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
     c0, c1, c2 = (to_own_unit(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
@@ -162,13 +164,29 @@ def found_law(
         spring=(k0, k1, k2, k3),
         damping=(c0, c1, c2),
         friction=to_own_unit(friction.loss, "N m"),
-        program=_own_program(program, law.rest + data.similarity.rest, to_own_unit) if program else (),
-        contact=tuple((name, to_own_unit(value, unit)) for name, value, unit in friction.contact),
+        presliding=to_own_unit(friction.presliding, "rad"),
+        program=_own_program(program, rest, to_own_unit) if program else (),
+        contact=tuple(
+            (name, to_own_unit(value, unit) + (rest if name == "load_angle" else 0.0))
+            for name, value, unit in friction.contact
+        ),
         actuator=actuator,
         kp=None if kp is None else to_own_unit(kp, "N m/rad"),
         noise=noise,
     )
     return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
+
+
+def _loads(problem: Problem, common: Array, release: Array) -> list[tuple[Array, Array]]:
+    """Every run's angle from rest, rad, and its actuator's moment, N m, each of shape (n,)."""
+    zero, found = problem.zero(common, release), list[tuple[Array, Array]]()
+    for run in problem.data.runs:
+        drive, moment = problem.chain(common, release, run).physics().drive, np.zeros(run.reading.size)
+        if drive is not None and drive.through_actuator:
+            acting = drive.acting
+            moment = acting.scale * np.interp(run.times - acting.delay, acting.time_s, acting.values)
+        found.append((run.reading - zero, moment))
+    return found
 
 
 def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | None) -> list[Fact]:
@@ -436,7 +454,7 @@ def _written_model(
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     identified = law(chosen.point.common)
     differences = identified.differences
-    if identified.patch.friction > 0.0:
+    if identified.patch.friction > 0.0 and identified.patch.presliding == 0.0:
         creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
         if creep > 0.0:
             unit = "m" if model.law.slide else "rad"

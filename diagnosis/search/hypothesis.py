@@ -314,13 +314,16 @@ def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
 
 
 def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
-    """The forms of every effect that the runs can show; where one of them is free already, that one alone."""
+    """The forms of every effect that the runs can show; where some are free already, the largest of these alone."""
     free, load_varies = fitted.problem.free_forms, fitted.problem.carries_load
     by_effect = [
         [tuple(f"{kind.name}.{name}" for name in form) for form in kind.shown_forms(load_varies=load_varies)]
         for kind in fitted.problem.effects
     ]
-    return [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
+    known = ([form for form in forms if set(form) <= set(free)] for forms in by_effect)
+    return [
+        [max(kept, key=len)] if kept else forms for kept, forms in zip(known, by_effect, strict=True) if forms
+    ]
 
 
 def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:
