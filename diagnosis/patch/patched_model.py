@@ -240,6 +240,7 @@ Simulate = Callable[[Array, Start, float], Motion]
 
 _RELEASE_STEPS = 2  # Gauss–Newton steps of a run's start in the engine
 _SHIFT = 1e-4  # of the start, for its derivatives
+_NO_DROP = 1e-6  # of the mean squared residual: a step that promises less is not simulated
 
 
 def native_closure(
@@ -316,12 +317,15 @@ def _restarted(
         return engine_residual(problem, common, per_run, index, simulate, native)
 
     best = left(own)
-    for _ in range(_RELEASE_STEPS):
-        # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
-        size = max(abs(float(own[0])), 1e-3)
-        steps = _SHIFT * size * np.array([1.0, 10.0])
-        slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
-        move = np.linalg.lstsq(np.array(slopes).T[seen], best[seen], rcond=1e-10)[0]
+    # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
+    size = max(abs(float(own[0])), 1e-3)
+    steps = _SHIFT * size * np.array([1.0, 10.0])
+    slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+    columns = np.array(slopes).T[seen]
+    for _ in range(_RELEASE_STEPS):  # the start moves too little to change them
+        move = np.linalg.lstsq(columns, best[seen], rcond=1e-10)[0]
+        if np.sum((columns @ move) ** 2) <= _NO_DROP * np.sum(best[seen] ** 2):
+            break
         trial = own + np.concatenate([move, np.zeros(own.size - 2)])
         moved = left(trial)
         if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
@@ -401,7 +405,7 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     """
     chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    chosen_out = predict_held_out(chosen)
     found, needs_plugin = _written_model(study, model, nominal_out, chosen_out)
     if not needs_plugin:
         return found

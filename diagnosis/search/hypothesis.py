@@ -292,8 +292,14 @@ def with_forms(
             continue
         textbook = deepest(textbook)
         ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
+        tried: dict[tuple[Form, ...], Fit | None] = {}
         for forms in _choices(textbook):
-            freed = _free_forms(textbook, forms)
+            parts = [fit for part, fit in tried.items() if _within(part, forms)]
+            gained = [fit for fit in parts if fit is not None]
+            if parts and not gained:
+                continue  # forms together, of which none gains alone
+            start = min(gained, key=lambda fit: fit.total, default=textbook)
+            tried[forms] = freed = _free_forms(start, forms)
             if freed is None:
                 continue
             needed = _needed(freed, forms, chosen.form_needed * textbook.excess * textbook.count)
@@ -311,6 +317,11 @@ def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
     """All combinations of one form of every effect."""
     by_effect = _forms_by_effect(fitted)
     return itertools.product(*by_effect) if by_effect else iter(())
+
+
+def _within(part: Sequence[Form], forms: Sequence[Form]) -> bool:
+    """Whether the form of every effect has that of another choice within it."""
+    return all(set(one) <= set(other) for one, other in zip(part, forms, strict=True))
 
 
 def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
