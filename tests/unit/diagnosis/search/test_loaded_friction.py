@@ -12,9 +12,11 @@ import pytest
 from diagnosis import diagnose, vocabulary
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.parameters import Point
 from diagnosis.patch.native_friction import Carried, native_friction
-from diagnosis.search.hypothesis import _choices
+from diagnosis.search import hypothesis
+from diagnosis.search.hypothesis import Hypothesis, _choices, with_forms
 from tests.marks import slow
 from tests.reference.robot_joints import LEVEL, MOTOR, NOISE, RATE, TIME, multisine, robot
 from tests.support.gap_campaigns import campaign, nominal
@@ -57,6 +59,28 @@ def test_the_form_is_offered_where_gravity_makes_the_load_vary(base):
 
     assert LOAD not in offered(FRICTION)
     assert LOAD in offered(FRICTION, GRAVITY)
+
+
+def test_forms_together_are_tried_where_one_gains_alone_and_from_there(base, monkeypatch):
+    textbook = Problem(base.problem.data, (GRAVITY, FRICTION))
+    known = dict(zip(base.problem.names, base.point.common.tolist(), strict=True))
+    known |= {"gravity_stiffness.stiffness": 1.5, "coulomb_friction.friction_moment": 0.01}
+    found = fit(textbook, Point(np.array([known.get(n, 0.0) for n in textbook.names]), base.point.per_run))
+    tried, freeing = list[tuple[tuple[str, ...], ...]](), hypothesis._free_forms
+
+    def freed(fitted, forms, **rest):
+        tried.append(fitted.problem.free_forms)
+        return freeing(fitted, forms, **rest) if forms[-1] == (LOAD,) and gains else None
+
+    monkeypatch.setattr(hypothesis, "_free_forms", freed)
+    gap = misfit(base)
+    gains = False
+    with_forms([Hypothesis(("gravity_stiffness", "coulomb_friction"), found)], gap, 0.0)
+    assert len(tried) == len(FRICTION.forms()) - 1
+    tried.clear()
+    gains = True
+    with_forms([Hypothesis(("gravity_stiffness", "coulomb_friction"), found)], gap, 0.0)
+    assert tried[-1] == (LOAD,)
 
 
 def test_the_patch_adds_what_gravity_adds_and_leaves_out_what_a_drive_does():
