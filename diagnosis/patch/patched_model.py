@@ -150,7 +150,8 @@ def found_law(
             else:
                 program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
                 differences.append(Fact("no native element", {"moment": words}))
-    carried = Carried.over(physics.parameters, _loads(problem, common, release))
+    loads = _loads(problem, common, release) if physics.parameters.get("friction_load", 0.0) else ()
+    carried = Carried.over(physics.parameters, loads) if loads else Carried()
     friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss, carried)
     damping += friction.damping
     program = _added(program, friction.program)

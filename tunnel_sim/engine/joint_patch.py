@@ -183,7 +183,7 @@ def _write_friction(
     joint.frictionloss = friction if patch.presliding == 0.0 else 0.0
     if joint.frictionloss != before.dof_frictionloss[0]:
         joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
-    if patch.presliding == 0.0:
+    if patch.presliding == 0.0 or friction == 0.0:
         return
     actuator = spec.add_actuator()
     actuator.name = f"{model.joint}_friction"
