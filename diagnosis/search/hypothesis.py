@@ -295,9 +295,9 @@ def with_forms(
         tried: dict[tuple[Form, ...], Fit | None] = {}
         for forms in _choices(textbook):
             parts = [fit for part, fit in tried.items() if _within(part, forms)]
-            gained = [fit for fit in parts if fit is not None]
-            if parts and not gained:
-                continue  # forms together, of which none gains alone
+            if parts and parts[0] is None:
+                continue  # forms together; the first gains alone, while it may hide the others
+            gained = (fit for fit in parts if fit is not None)
             start = min(gained, key=lambda fit: fit.total, default=textbook)
             tried[forms] = freed = _free_forms(start, forms)
             if freed is None:
