@@ -8,14 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.answer.held_out import (
-    HeldOut,
-    both_ends,
-    excess_base,
-    one_more,
-    predict_held_out,
-    share_closed,
-)
+from diagnosis.answer.held_out import both_ends, excess_base, one_more, share_closed
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.findings.candidates import candidates
 from diagnosis.findings.next_run import NextRun
@@ -68,7 +61,6 @@ class ByHand:
         self._base = excess_base(self._study)
         self._fits: dict[frozenset[str], Fit] = {frozenset(): self._study.nominal}
         self._whole = {frozenset[str](): self._study.nominal}
-        self._held_out: dict[Fit, HeldOut] = {}
 
     def closure(self, effects: Collection[str], *, converged: bool = False) -> Closure:
         """Fit effects to the runs, and predict the runs held out of that fit.
@@ -91,13 +83,10 @@ class ByHand:
             if names not in self._whole:
                 self._whole[names] = polish(Hypothesis(tuple(sorted(names)), fitted)).fit
             fitted = self._whole[names]
-        for one in (self._study.nominal, fitted):
-            if one not in self._held_out:
-                self._held_out[one] = predict_held_out(one)
         known = Hypothesis(tuple(sorted(names)), fitted)
         # Only the parameters of the one candidate are used: its share and its probability do not matter.
         study = replace(self._study, answers=(Answer(known.names, 0.0, 1.0, known, known),) if names else ())
-        ends = both_ends(study, self._base, self._held_out)
+        ends = both_ends(study, self._base)
         parameters = candidates(study, self._base)[0].parameters if names else {}
         before, after = (step.excess for step in ends.steps)
         return Closure(tuple(sorted(names)), before, after, ends.held_out, parameters)

@@ -369,6 +369,7 @@ def _predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,
         patched=None if patched is None else patched.judged(chosen),
+        untested=None if patched is None else patched.untested(chosen),
         left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,8 +103,18 @@ class HeldOut:
     points: dict[str, tuple[Array, Array]]
 
 
+#: Of fits that are still in use: the waterfall, the patch and the remainder ask for the same ones.
+_KNOWN: WeakKeyDictionary[Fit, HeldOut] = WeakKeyDictionary()
+
+
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, starting from the fit of all, and predict the group."""
+    """Refit without each group of runs, starting from the fit of all, and predict the group; once for each fit."""
+    if whole not in _KNOWN:
+        _KNOWN[whole] = _held_out(whole)
+    return _KNOWN[whole]
+
+
+def _held_out(whole: Fit) -> HeldOut:
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}
@@ -297,14 +308,13 @@ def _finite(found: Fit | None) -> Fit | None:
     return found if found is not None and np.isfinite(found.total) else None
 
 
-def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+def waterfall(study: Study, base: Base) -> Waterfall:
     """Add the causes one after another in their best order, and remove each alone from the whole.
 
-    ``known`` has the held-out predictions of some fits already. The excesses come from the fits' own integrator.
-    The order is greedy: each next cause is the one that explains most of the fitted readings. A random moment
-    comes last, since it absorbs the other causes.
+    The excesses come from the fits' own integrator. The order is greedy: each next cause is the one that explains
+    most of the fitted readings. A random moment comes last, since it absorbs the other causes.
     """
-    models = _Models(study, base, known)
+    models = _Models(study, base)
     names: Names = frozenset()
     steps = models.first_steps()
     left = sorted(models.causes)
@@ -328,9 +338,9 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     return Waterfall(tuple(steps), without, models.words)
 
 
-def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+def both_ends(study: Study, base: Base) -> Waterfall:
     """The first and the last step only: the nominal model, and all causes together."""
-    models = _Models(study, base, known)
+    models = _Models(study, base)
     names = sorted({*models.causes, *study.scattering})
     last = Step(" + ".join(names), models.excess(models.causes))
     return Waterfall((models.first_steps()[0], last), {}, models.words)
@@ -339,15 +349,15 @@ def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
 class _Models:
     """Residual gaps of the model with some of the causes."""
 
-    def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
-        self._study, self._base, self._known = study, base, dict(known)
+    def __init__(self, study: Study, base: Base) -> None:
+        self._study, self._base = study, base
         powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
         self.read_off = {name: powers[name] for name in study.read_off if study.named}  # contributions
         self._ratio = 1.0 + base.extra  # estimated noise over the base
         self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)
         self.causes: Names = self._fit.causes | self.read_off.keys()
-        out = self._held_out(study.nominal)
+        out = predict_held_out(study.nominal)
         self._ids = [run.id for run in study.nominal.problem.data.runs]
         self._turns: Turns = turns_of(study.nominal, {run for run in self._ids if run not in out.residuals})
         self._excess: dict[Fit, float] = {}
@@ -355,7 +365,7 @@ class _Models:
     @property
     def words(self) -> str:
         """The kind of readings held out of the fits."""
-        runs = len(self._held_out(self._study.nominal).residuals)
+        runs = len(predict_held_out(self._study.nominal).residuals)
         if runs == len(self._ids):
             return ON_RUNS
         return ON_STRETCHES if runs == 0 else ON_BOTH
@@ -405,15 +415,10 @@ class _Models:
 
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))
-        found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
+        found = seen | predict_held_out(fitted).residuals | predict_stretches(fitted, self._turns)
         still = {run.id: run.scaled(run.reading) for run in fitted.problem.data.runs}
         # a prediction that diverges counts as no prediction
         return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
-
-    def _held_out(self, fitted: Fit) -> HeldOut:
-        if fitted not in self._known:
-            self._known[fitted] = predict_held_out(fitted)
-        return self._known[fitted]
 
     def _in_samples(self, residuals: Mapping[str, Array]) -> float:
         return self._weighted({run: float(np.mean(r**2)) - 1.0 for run, r in residuals.items()})

@@ -36,11 +36,11 @@ def closing(study: Study) -> Closing:
     """The gap before and after by MuJoCo, and as the causes are added."""
     base, chosen = excess_base(study), study.chosen
     nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    chosen_out = predict_held_out(chosen)
     begun = time.perf_counter()
     shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
     reported = time.perf_counter()
-    steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
+    steps = waterfall(study, base)
     gap = held_out_totals(gap_summary(study, base, shown), steps)
     gap = replace(gap, closed_ahead=share_ahead(study, nominal_out.residuals.keys()))
     seconds = {"confirmation": reported - begun, "waterfall": time.perf_counter() - reported}

@@ -1,8 +1,8 @@
-"""Friction of any form in MuJoCo: its own element as far as it applies, and the plugin for the rest."""
+"""Friction of any form in MuJoCo: its own elements as far as they apply, and the plugin for the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.rig import JointLaw
 
 _AGAINST_RATE = "friction's dependence on the rate"
 _AGAINST_LOAD = "friction's dependence on gravity's moment"
-_LOAD = "-sign(r)*mu*abs(K*sin(b-k)+L*sin(b-l))"
+_LOAD = "-sign(r)*mu*abs(K*sin(b-k))"
 _FACTORS = {  # on the friction, by the term of the moment law
     "friction_exponent": "(abs(r)/2)^n",
     "friction_saturation": "tanh(abs(r)/v0)",
@@ -30,18 +30,59 @@ class NativeFriction:
     """Friction as written into a model, in the units of the law.
 
     Args:
-        loss: ``frictionloss`` of the joint, N m.
+        loss: sliding friction of the joint, N m.
+        presliding: deflection at which a contact of that friction slides, rad or m; 0: ``frictionloss`` has none.
         damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
         program: of a further moment of the plugin; empty: none.
-        contact: numerics of the plugin's own friction, with their values and units; empty: none.
+        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty: none.
         differences: where the native element follows another law, and causes left out.
     """
 
     loss: float = 0.0
+    presliding: float = 0.0
     damping: Array = field(default_factory=lambda: np.zeros(3))
     program: tuple[float, ...] = ()
     contact: tuple[tuple[str, float, str], ...] = ()
     differences: tuple[Fact, ...] = ()
+
+
+@dataclass(frozen=True)
+class Carried:
+    """The load that a joint carries: means over the distance travelled in the runs.
+
+    Args:
+        whole: the greater of gravity's moment and an actuator's, N m.
+        beyond: its excess over gravity's, N m.
+    """
+
+    whole: float = 0.0
+    beyond: float = 0.0
+
+    @classmethod
+    def over(cls, parameters: Mapping[str, float], runs: Sequence[tuple[Array, Array]]) -> Carried:
+        """The load of friction in some runs.
+
+        Args:
+            parameters: of the moment law, by name.
+            runs: angle from rest, rad, and moment of an actuator, N m, each of shape (n,).
+        """
+        size, rest = _weight(parameters)
+        gravity, driven, travel = [], [], []
+        for angle, moment in runs:
+            gravity.append(np.abs(size * np.sin(angle - rest)))
+            driven.append(np.abs(moment))
+            travel.append(np.abs(np.gradient(angle)))
+        weight, share = np.concatenate(gravity), np.concatenate(travel)
+        whole = np.maximum(weight, np.concatenate(driven))
+        share /= max(float(share.sum()), 1e-300)
+        return cls(float(share @ whole), float(share @ (whole - weight)))
+
+
+def _weight(parameters: Mapping[str, float]) -> tuple[float, float]:
+    """Gravity's moments as one: the greatest moment, N m, and the angle of its rest, rad."""
+    given = [(parameters.get(size, 0.0), parameters.get(rest, 0.0)) for size, rest in WEIGHTS]
+    found = sum(size * np.exp(-1j * rest) for size, rest in given)
+    return float(np.abs(found)), -float(np.angle(found))
 
 
 def nearest_polynomial(powers: Array, wanted: Array, least: Array) -> Array:
@@ -63,13 +104,20 @@ def nearest_polynomial(powers: Array, wanted: Array, least: Array) -> Array:
 
 
 def native_friction(
-    parameters: Mapping[str, float], rates: Array, law: JointLaw, damping: float, may_miss: float
+    parameters: Mapping[str, float],
+    rates: Array,
+    law: JointLaw,
+    damping: float,
+    may_miss: float,
+    carried: Carried = Carried(),
 ) -> NativeFriction:
     """The friction of a moment law in the elements of MuJoCo.
 
-    Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial damping where their error
-    is within the allowance. Else ``frictionloss`` is the friction at rest, and the plugin
-    adds the rest, which is zero there. The plugin has its own presliding contact.
+    Presliding friction is that of a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
+    damping of its own. Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial
+    damping where their error is within the allowance. Else ``frictionloss`` is the friction at rest, and the plugin
+    adds the rest, which is zero there. Friction that grows with gravity's moment needs the plugin too. An
+    actuator's moment is not known to it: the mean of its part is added to the friction.
 
     Args:
         parameters: of the moment law, by name.
@@ -77,25 +125,16 @@ def native_friction(
         law: of the joint as the model has it.
         damping: to be written in addition to that of the joint, N m s/rad.
         may_miss: greatest error of a polynomial, as a share of the greatest friction; infinite: no plugin.
+        carried: in the runs, by friction that depends on the load.
     """
     friction = friction_of(parameters)
-    if friction.load and may_miss == np.inf:
-        plain = native_friction({**parameters, "friction_load": 0.0}, rates, law, damping, may_miss)
-        return replace(plain, differences=(*plain.differences, Fact("friction against load")))
     if friction.load:
-        rest = {name: value for name, value in parameters.items() if name != "friction_load"}
-        return _with_load(parameters, native_friction(rest, rates, law, damping, may_miss), law)
+        return _with_load(parameters, rates, law, damping, may_miss, carried)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
-    if moment == 0.0 or not (terms or friction.presliding):
-        return NativeFriction(moment)
+    if moment == 0.0 or not terms:
+        return NativeFriction(moment, friction.presliding)
     if law.slide:
-        left_out = "friction against rate" if terms else "presliding"
-        return NativeFriction(moment, differences=(Fact(left_out),))
-    if not terms and may_miss == np.inf:
-        return NativeFriction(moment)
-    if not terms:
-        contact = (("friction_moment", moment, "N m"), ("presliding", friction.presliding, "rad"))
-        return NativeFriction(contact=contact, differences=(_by_plugin("friction's presliding"),))
+        return NativeFriction(moment, differences=(Fact("friction against rate"),))
     wanted = friction.sliding(rates)
     powers = np.vander(rates / rates[-1], 4, increasing=True)
     least = np.array([0.0, -(law.damping + damping) * rates[-1], -np.inf, -np.inf])
@@ -107,7 +146,7 @@ def native_friction(
         may_miss == np.inf or (found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0)
     ):
         figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
-        return NativeFriction(float(found[0]), found[1:], differences=(Fact("polynomial", figures),))
+        return NativeFriction(float(found[0]), damping=found[1:], differences=(Fact("polynomial", figures),))
     values = {"F": moment, "F0": friction.at_rest} | {
         symbol: getattr(friction, name) for symbol, name in _SYMBOLS.items()
     }
@@ -116,22 +155,47 @@ def native_friction(
     return NativeFriction(friction.at_rest, program=program, differences=(_by_plugin(_AGAINST_RATE),))
 
 
-def _with_load(parameters: Mapping[str, float], plain: NativeFriction, law: JointLaw) -> NativeFriction:
-    """Friction with the part that grows with gravity's moment, which the plugin adds.
+def _with_load(
+    parameters: Mapping[str, float],
+    rates: Array,
+    law: JointLaw,
+    damping: float,
+    may_miss: float,
+    carried: Carried,
+) -> NativeFriction:
+    """Friction that grows with the load; arguments of `native_friction`.
 
-    At rest that part does not hold the joint: gravity exceeds it, and ``frictionloss`` holds what remains. A part
-    that grows with an actuator's moment is left out.
+    A sliding contact: the plugin adds the part of gravity's moment to ``frictionloss``. At rest that part does not
+    hold the joint, since gravity exceeds it, and ``frictionloss`` holds what remains. A contact that deflects is
+    the plugin's own, with the whole friction. The part that the plugin cannot have is added as its mean.
     """
-    names = [name for weight in WEIGHTS for name in weight]
-    values = {symbol: parameters.get(name, 0.0) for symbol, name in zip("KkLl", names, strict=True)}
-    if law.slide or plain.program or plain.contact or not (values["K"] or values["L"]):
-        return replace(plain, differences=(*plain.differences, Fact("friction against load")))
-    values["mu"] = parameters["friction_load"]
+    share, (size, rest) = parameters["friction_load"], _weight(parameters)
+
+    def beside(mean: float) -> NativeFriction:
+        moment = parameters.get("friction_moment", 0.0) + share * mean
+        plain = {**parameters, "friction_load": 0.0, "friction_moment": moment}
+        return native_friction(plain, rates, law, damping, may_miss)
+
+    found = beside(carried.beyond)
+    if law.slide or may_miss == np.inf or found.program or not size:
+        found = beside(carried.whole)
+        return replace(found, differences=(*found.differences, Fact("friction against load")))
+    said = [_by_plugin(_AGAINST_LOAD)]
+    if carried.beyond:
+        said.append(Fact("friction against load"))
+    differences = (*found.differences, *said)
+    if found.presliding:
+        contact = (
+            ("friction_moment", found.loss, "N m"),
+            ("presliding", found.presliding, "rad"),
+            ("friction_load", share, "1"),
+            ("load_stiffness", size, "N m"),
+            ("load_angle", rest, "rad"),
+        )
+        return NativeFriction(contact=contact, differences=differences)
+    values = {"mu": share, "K": size, "k": rest}
     program = parse(_LOAD, frozenset({"r", "b", *values})).program(values, {"r": "rate", "b": "angle"})
-    found = [_by_plugin(_AGAINST_LOAD)]
-    if law.actuator is not None:
-        found.append(Fact("friction against load"))
-    return replace(plain, program=program, differences=(*plain.differences, *found))
+    return replace(found, program=program, differences=differences)
 
 
 def _by_plugin(moment: str) -> Fact:

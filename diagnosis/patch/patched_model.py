@@ -29,7 +29,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.patch.native_actuator import controlled, native_actuator
-from diagnosis.patch.native_friction import native_friction, nearest_polynomial
+from diagnosis.patch.native_friction import Carried, native_friction, nearest_polynomial
 from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.search.study import Study
 from tunnel_sim.engine.joint_model import JointModel
@@ -150,10 +150,13 @@ def found_law(
             else:
                 program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
                 differences.append(Fact("no native element", {"moment": words}))
-    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss)
+    loads = _loads(problem, common, release) if physics.parameters.get("friction_load", 0.0) else ()
+    carried = Carried.over(physics.parameters, loads) if loads else Carried()
+    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss, carried)
     damping += friction.damping
     program = _added(program, friction.program)
     differences += friction.differences
+    rest = law.rest + data.similarity.rest
     units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
     k0, k1, k2, k3 = (to_own_unit(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
     c0, c1, c2 = (to_own_unit(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
@@ -162,13 +165,29 @@ def found_law(
         spring=(k0, k1, k2, k3),
         damping=(c0, c1, c2),
         friction=to_own_unit(friction.loss, "N m"),
-        program=_own_program(program, law.rest + data.similarity.rest, to_own_unit) if program else (),
-        contact=tuple((name, to_own_unit(value, unit)) for name, value, unit in friction.contact),
+        presliding=to_own_unit(friction.presliding, "rad"),
+        program=_own_program(program, rest, to_own_unit) if program else (),
+        contact=tuple(
+            (name, to_own_unit(value, unit) + (rest if name == "load_angle" else 0.0))
+            for name, value, unit in friction.contact
+        ),
         actuator=actuator,
         kp=None if kp is None else to_own_unit(kp, "N m/rad"),
         noise=noise,
     )
     return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
+
+
+def _loads(problem: Problem, common: Array, release: Array) -> list[tuple[Array, Array]]:
+    """Every run's angle from rest, rad, and its actuator's moment, N m, each of shape (n,)."""
+    zero, found = problem.zero(common, release), list[tuple[Array, Array]]()
+    for run in problem.data.runs:
+        drive, moment = problem.chain(common, release, run).physics().drive, np.zeros(run.reading.size)
+        if drive is not None and drive.through_actuator:
+            acting = drive.acting
+            moment = acting.scale * np.interp(run.times - acting.delay, acting.time_s, acting.values)
+        found.append((run.reading - zero, moment))
+    return found
 
 
 def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | None) -> list[Fact]:
@@ -222,6 +241,7 @@ Simulate = Callable[[Array, Start, float], Motion]
 
 _RELEASE_STEPS = 2  # Gauss–Newton steps of a run's start in the engine
 _SHIFT = 1e-4  # of the start, for its derivatives
+_NO_DROP = 1e-6  # of the mean squared residual: a step that promises less is not simulated
 
 
 def native_closure(
@@ -298,12 +318,15 @@ def _restarted(
         return engine_residual(problem, common, per_run, index, simulate, native)
 
     best = left(own)
-    for _ in range(_RELEASE_STEPS):
-        # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
-        size = max(abs(float(own[0])), 1e-3)
-        steps = _SHIFT * size * np.array([1.0, 10.0])
-        slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
-        move = np.linalg.lstsq(np.array(slopes).T[seen], best[seen], rcond=1e-10)[0]
+    # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
+    size = max(abs(float(own[0])), 1e-3)
+    steps = _SHIFT * size * np.array([1.0, 10.0])
+    slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+    columns = np.array(slopes).T[seen]
+    for _ in range(_RELEASE_STEPS):  # the start moves too little to change them
+        move = np.linalg.lstsq(columns, best[seen], rcond=1e-10)[0]
+        if np.sum((columns @ move) ** 2) <= _NO_DROP * np.sum(best[seen] ** 2):
+            break
         trial = own + np.concatenate([move, np.zeros(own.size - 2)])
         moved = left(trial)
         if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
@@ -383,7 +406,7 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     """
     chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    chosen_out = predict_held_out(chosen)
     found, needs_plugin = _written_model(study, model, nominal_out, chosen_out)
     if not needs_plugin:
         return found
@@ -436,7 +459,7 @@ def _written_model(
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     identified = law(chosen.point.common)
     differences = identified.differences
-    if identified.patch.friction > 0.0:
+    if identified.patch.friction > 0.0 and identified.patch.presliding == 0.0:
         creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
         if creep > 0.0:
             unit = "m" if model.law.slide else "rad"

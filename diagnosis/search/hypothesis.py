@@ -292,8 +292,14 @@ def with_forms(
             continue
         textbook = deepest(textbook)
         ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
+        tried: dict[tuple[Form, ...], Fit | None] = {}
         for forms in _choices(textbook):
-            freed = _free_forms(textbook, forms)
+            parts = [fit for part, fit in tried.items() if _within(part, forms)]
+            if parts and parts[0] is None:
+                continue  # forms together; the first gains alone, while it may hide the others
+            gained = (fit for fit in parts if fit is not None)
+            start = min(gained, key=lambda fit: fit.total, default=textbook)
+            tried[forms] = freed = _free_forms(start, forms)
             if freed is None:
                 continue
             needed = _needed(freed, forms, chosen.form_needed * textbook.excess * textbook.count)
@@ -313,14 +319,22 @@ def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
     return itertools.product(*by_effect) if by_effect else iter(())
 
 
+def _within(part: Sequence[Form], forms: Sequence[Form]) -> bool:
+    """Whether the form of every effect has that of another choice within it."""
+    return all(set(one) <= set(other) for one, other in zip(part, forms, strict=True))
+
+
 def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
-    """The forms of every effect that the runs can show; where one of them is free already, that one alone."""
+    """The forms of every effect that the runs can show; where some are free already, the largest of these alone."""
     free, load_varies = fitted.problem.free_forms, fitted.problem.carries_load
     by_effect = [
         [tuple(f"{kind.name}.{name}" for name in form) for form in kind.shown_forms(load_varies=load_varies)]
         for kind in fitted.problem.effects
     ]
-    return [[form for form in forms if set(form) <= set(free)] or forms for forms in by_effect if forms]
+    known = ([form for form in forms if set(form) <= set(free)] for forms in by_effect)
+    return [
+        [max(kept, key=len)] if kept else forms for kept, forms in zip(known, by_effect, strict=True) if forms
+    ]
 
 
 def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:

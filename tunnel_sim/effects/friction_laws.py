@@ -113,8 +113,9 @@ class CoulombFriction(Effect):
 
     @classmethod
     def forms(cls) -> tuple[tuple[str, ...], ...]:
-        """The contact's deflection, each dependence on the rate, and that on the load."""
-        return ("presliding",), ("exponent",), ("saturation",), ("peak", "peak_rate"), ("load",)
+        """The contact's deflection, each dependence on the rate, that on the load, and it with the deflection."""
+        by_rate = ("exponent",), ("saturation",), ("peak", "peak_rate")
+        return ("presliding",), *by_rate, ("load",), ("presliding", "load")
 
     @property
     def is_null(self) -> bool:
@@ -123,8 +124,11 @@ class CoulombFriction(Effect):
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """The friction, and its dependence on the rate or the load."""
+        """The friction, the deflection of its contact, and its dependence on the rate or the load."""
         words = super().phrase(values, stds, text)
+        presliding, std = values.get("presliding", 0.0), stds.get("presliding")
+        if std is not None and presliding > _SHOWN * std:
+            words = f"{words} whose contact deflects by {text(presliding, std, 'rad')} before it slides,"
         if (load := values.get("load", 0.0)) > 0.0:
             std = stds.get("load")
             share = text(100.0 * load, None if std is None else 100.0 * std, "%")
@@ -138,10 +142,7 @@ class CoulombFriction(Effect):
             std, rate = stds.get("peak"), text(values["peak_rate"], stds.get("peak_rate"), "rad/s")
             more = text(100.0 * peak, None if std is None else 100.0 * std, "%")
             return f"{words} and up to {more} more below a rate of {rate}"
-        presliding, std = values.get("presliding", 0.0), stds.get("presliding")
-        if std is not None and presliding > _SHOWN * std:
-            return f"{words} whose contact deflects by {text(presliding, std, 'rad')} before it slides"
-        return words
+        return words.removesuffix(",")
 
     def stands(self, stiffness: float) -> float:
         """The angle at which the spring's moment equals the friction at rest, rad; 0 where the latter vanishes."""

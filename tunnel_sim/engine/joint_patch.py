@@ -25,6 +25,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, shown
 _AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
 _SPARE = 2  # samples of a delayed control beyond the delay: both neighbours of a time between samples
 _SLOW = 1e-9  # rad/s: slower than any creep
+_NO_MOTOR = 1e-9  # N m/A: of a motor that is a friction alone; MuJoCo wants more than 0
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
 
 
@@ -56,6 +57,7 @@ class JointPatch:
         spring: added restoring moment, the coefficients of 1, b, b² and b³, N m, N m/rad, N m/rad² and N m/rad³.
         damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
         friction: the whole moment of dry friction, N m.
+        presliding: deflection at which its contact slides, rad; 0: none.
         program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
         kp: of the position servo that drives the joint, N m/rad; None: as in the model.
         contact: numerics of the plugin's own friction, by name, N m and rad; empty: ``friction`` is all.
@@ -66,6 +68,7 @@ class JointPatch:
     spring: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 0.0
+    presliding: float = 0.0
     program: tuple[float, ...] = ()
     contact: tuple[tuple[str, float], ...] = ()
     actuator: ActuatorPatch | None = None
@@ -117,9 +120,7 @@ def patched(
     _write_spring(spec, before, model, patch, weight)
     joint.damping = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]]) + patch.damping
     joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
-    joint.frictionloss = patch.friction
-    if patch.friction != before.dof_frictionloss[0]:
-        joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
+    _write_friction(spec, before, model, patch)
     if patch.actuator is not None:
         _write_actuator(spec, patch.actuator)
     if patch.kp is not None and model.law.actuator is not None:
@@ -157,7 +158,7 @@ def patched(
             # no key frame holds the history of a delayed control: the note on it takes this control
             key.ctrl = [first if i == patch.actuator.index else 0.0 for i in range(before.nu)]
             if patch.actuator.lag > 0.0:
-                key.act = [first]
+                key.act = [first, *([0.0] if patch.presliding > 0.0 else [])]
     with _refusals(model):
         after = spec.compile()
     old, new = _attributes(before), _attributes(after)
@@ -168,6 +169,31 @@ def patched(
         if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
         and (spring or name != "joint springref")
     )
+
+
+def _write_friction(
+    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
+) -> None:
+    """Friction as ``frictionloss``, or with presliding as that of a motor without a control.
+
+    MuJoCo has LuGre's friction in motors alone. Without a damping of its own and a rise near rest it is Dahl's. The
+    deflection is limited from below so that the oscillation of the contact is stable with the model's steps.
+    """
+    joint, friction = spec.joint(model.joint), patch.friction
+    joint.frictionloss = friction if patch.presliding == 0.0 else 0.0
+    if joint.frictionloss != before.dof_frictionloss[0]:
+        joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
+    if patch.presliding == 0.0 or friction == 0.0:
+        return
+    actuator = spec.add_actuator()
+    actuator.name = f"{model.joint}_friction"
+    actuator.trntype, actuator.target = mujoco.mjtTrn.mjTRN_JOINT, model.joint
+    least = friction * spec.option.timestep**2 / (2.0 * patch.inertia)
+    stiffness = friction / max(patch.presliding, least)
+    actuator.set_to_dcmotor(
+        motorconst=(_NO_MOTOR, _NO_MOTOR), resistance=1.0, lugre=(stiffness, 0.0, friction, friction, 1.0),
+        ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),
+    )  # fmt: skip
 
 
 def _write_actuator(spec: mujoco.MjSpec, patch: ActuatorPatch) -> None:
@@ -332,12 +358,15 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
     damping = model.dof_damping[0], *model.dof_dampingpoly[0]
     affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
     constant = np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0])
+    rubs = model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_DCMOTOR)
     attributes = {
         ("joint armature", "kg m2"): [model.dof_armature[0]],
         ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
         ("joint springref", "rad"): [model.qpos_spring[0]],
         ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
         ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
+        ("dcmotor lugre friction", "N m"): [np.sum(model.actuator_biasprm[rubs, 3])],
+        ("dcmotor lugre stiffness", "N m/rad"): [np.sum(model.actuator_dynprm[rubs, 5])],
         ("actuator moment without control", "N m"): [constant],
         **{
             (f"actuator {model.actuator(i).name or i + 1} {name}", unit): values

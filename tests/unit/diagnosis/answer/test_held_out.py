@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diagnosis.answer import held_out
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
@@ -70,6 +71,12 @@ def best(base):
 def excess(fitted):
     """Of the runs held out of a fit, by id: mean squared scaled residual minus one."""
     return {run: np.mean(left**2) - 1.0 for run, left in predict_held_out(fitted).residuals.items()}
+
+
+def test_a_fit_predicts_held_out_runs_once(best, monkeypatch):
+    known = predict_held_out(best)
+    monkeypatch.setattr(held_out, "fit_seen", lambda *_: pytest.fail("fitted anew"))
+    assert predict_held_out(best) is known
 
 
 def test_the_right_effect_predicts_runs_it_has_not_seen(base, best):

@@ -36,8 +36,8 @@ def both(data, base):
 def held_out(monkeypatch, idle):
     """Let the held-out excess of both effects be 0.1, and of the cause alone ``idle``."""
 
-    def waterfall(study, base, known):
-        del base, known
+    def waterfall(study, base):
+        del base
         if study.fitted == ("unknown",):
             return Waterfall((Step(None, 30.0),))
         if study.fitted != (IDLE, CAUSE):

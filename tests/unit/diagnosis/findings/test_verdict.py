@@ -212,6 +212,10 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
             Predictions(held_out=0.98, patched=0.02),
             "explains only 2.0 % of the gap when written into the model",
         ),
+        (
+            Predictions(held_out=0.98, untested=0.02),
+            "leaves 2.0 % of the gap, and the model can have only the mean",
+        ),
         (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing"),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09), ""),
         (Predictions(), ""),

@@ -40,7 +40,7 @@ def both(base):
 
 
 def test_the_cause_that_closes_most_comes_first_and_the_idle_one_is_not_missed(data, base, both):
-    found = waterfall(studied(data, base, (CAUSE, IDLE), both), NO_BASE, {})
+    found = waterfall(studied(data, base, (CAUSE, IDLE), both), NO_BASE)
     assert [step.effect for step in found.steps] == [None, CAUSE, IDLE]
     before, one, all_ = (step.excess for step in found.steps)
     chance = 4.0 * np.sqrt(2.0 / base.count)
@@ -56,7 +56,7 @@ def test_a_hum_is_a_step_of_its_own_power(data, base, both):
     amplitude = 1e-3
     power = 0.5 * amplitude**2 / NOISE**2
     study = studied(data, base, (CAUSE, IDLE, HUM), both)
-    found = waterfall(study, replace(NO_BASE, hum=power), {})
+    found = waterfall(study, replace(NO_BASE, hum=power))
     steps = {step.effect: step.excess for step in found.steps}
     assert list(steps) == [None, CAUSE, HUM, IDLE]
     assert steps[CAUSE] - steps[HUM] == pytest.approx(power)
@@ -65,7 +65,7 @@ def test_a_hum_is_a_step_of_its_own_power(data, base, both):
 
 def test_an_unknown_gap_has_the_nominal_model_only(data, base):
     study = replace(studied(data, base), answers=(answer(("unknown",), 0.2, 1.0),))
-    found = waterfall(study, replace(NO_BASE, hum=0.5), {})
+    found = waterfall(study, replace(NO_BASE, hum=0.5))
     assert [step.effect for step in found.steps] == [None]
     assert found.steps[0].excess > base.excess
     assert found.without == {}
@@ -100,7 +100,7 @@ def test_a_single_run_is_held_out_by_stretches_of_time(data):
     alone = replace(data, runs=data.runs[:1])
     base = nominal(alone)
     best = added(base, CAUSE)
-    found = waterfall(studied(alone, base, (CAUSE,), best), NO_BASE, {})
+    found = waterfall(studied(alone, base, (CAUSE,), best), NO_BASE)
     assert found.held_out == "on held-out stretches of time"
     assert found.steps[0].excess > base.excess  # predicted, not fitted
     assert abs(found.steps[1].excess) < 4.0 * np.sqrt(2.0 / base.count)
@@ -121,7 +121,7 @@ def test_runs_that_are_the_only_ones_of_their_kind_are_held_out_in_time(data):
     few = replace(data, runs=(*data.runs[:3], replace(data.runs[1], id="again")))
     base = nominal(few)
     assert 0 < len(predict_held_out(base).residuals) < 4
-    found = waterfall(studied(few, base), NO_BASE, {})
+    found = waterfall(studied(few, base), NO_BASE)
     assert "only one of its kind" in found.held_out
     assert np.isfinite(found.steps[0].excess)
 
@@ -153,7 +153,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     )
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, random=random),))
-    found = waterfall(study, replace(NO_BASE, hum=2.0), {})
+    found = waterfall(study, replace(NO_BASE, hum=2.0))
     residuals = predict_held_out(best).residuals
     still = {run: float(np.mean(left**2)) - 1.0 for run, left in residuals.items()}
     off = [still[run.id] for run in data.runs if not run.wind_on]

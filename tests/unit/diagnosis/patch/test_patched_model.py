@@ -63,7 +63,9 @@ def pendulum(folder: Path, friction: float = 0.0) -> tuple[Campaign, Path]:
         ("quadratic_damping", (0.02, 3.0), 0.05, ""),  # the cube of the rate is native
         ("structural_damping", (0.05,), 0.05, ""),
         ("coulomb_friction", (0.1,), 0.5, ""),
-        ("coulomb_friction", (0.1, 0.01), 0.05, "no native element"),  # each form, by the plugin
+        ("coulomb_friction", (0.1, 0.01), 0.1, ""),
+        ("coulomb_friction", (0.1, 0.01, 0.0, 0.0, 0.0, 0.2, 0.1), 0.1, "no native element"),  # under load
+        ("coulomb_friction", (0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.1), 0.1, "no native element"),
         ("coulomb_friction", (0.1, 0.0, 0.3), 0.05, "no native element"),
         ("coulomb_friction", (0.1, 0.0, 0.0, 0.1), 0.05, "no native element"),
         ("coulomb_friction", (0.1, 0.0, 0.0, 0.0, 0.8, 0.3), 0.5, "no native element"),

@@ -233,19 +233,24 @@ def test_the_form_of_friction_is_said(form: dict[str, float], said: str) -> None
 
 
 def test_a_presliding_range_is_said_where_it_is_more_than_its_error() -> None:
-    def said(std: float | None) -> str:
-        given = {"friction_moment": 0.02, "presliding": 0.01}
+    def said(std: float | None, **form: float) -> str:
+        given = {"friction_moment": 0.02, "presliding": 0.01, **form}
         return effect_class("coulomb_friction").phrase(
             given, {"presliding": std}, lambda v, _std, unit: f"{v:g} {unit}"
         )
 
     assert said(0.001) == "dry friction of 0.02 N m whose contact deflects by 0.01 rad before it slides"
     assert said(0.006) == said(None) == "dry friction of 0.02 N m"
+    assert said(0.001, load=0.08) == (
+        "dry friction of 0.02 N m whose contact deflects by 0.01 rad before it slides, and 8 % of the moment "
+        "carried by the joint"
+    )
 
 
 def test_a_form_of_the_load_shows_only_where_the_load_varies() -> None:
     friction = effect_class("coulomb_friction")
-    assert set(friction.forms()) - set(friction.shown_forms(load_varies=False)) == {("load",)}
+    hidden = set(friction.forms()) - set(friction.shown_forms(load_varies=False))
+    assert hidden == {("load",), ("presliding", "load")}
     assert all(kind.shown_forms(load_varies=True) == kind.forms() for kind in ALL_EFFECTS)
 
 
