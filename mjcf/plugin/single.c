@@ -205,5 +205,5 @@ void vwt_step_alone(const vwt_parameters* p, const vwt_run* run, double h, vwt_p
   alone->begun = 1;
   alone->sample = one.sample;
   const int changed = at->rate != 0 || before.rate != 0 || at->angle != before.angle || at->lagged != before.lagged;
-  alone->rests = !changed && !(one.c.law.features & (SHEDDING | DRIVE | PROGRAM | TWIST));
+  alone->rests = !changed && !(one.c.law.features & (SHEDDING | WIND | DRIVE | PROGRAM | TWIST));
 }
