@@ -37,15 +37,14 @@ INLINE Lane by_library(int count, double (*function)(double), Lane x) {
 }
 
 // The wind's speed at a time, m/s.
-INLINE Lane speed_at(const Lanes* c, Lane time) {
+INLINE Lane speed_at(const Runs* c, Lane time) {
   for (int k = 0; k < VWT_LANES; k++) {
-    const vwt_run* run = c->run[k];
-    time[k] = fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time[k]));
+    time[k] = wind_at(c->run[k], time[k]);
   }
   return time;
 }
 
-CLONED void vwt_program_lanes(const Lanes* c, const Lane* time, const Lane* angle, const Lane* rate, Lane* value) {
+CLONED void vwt_program_lanes(const Runs* c, const Lane* time, const Lane* angle, const Lane* rate, Lane* value) {
   const Lane none = {0}, one = none + 1;
   const double* code = c->run[0]->program;
   const int count = (int)c->run[0]->program_count;

@@ -9,7 +9,7 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed) {
 // Moments of the lag's kernel, w[n] = integral of z exp(-z (1 - u)) u^n over u from 0 to 1, n = 0..3.
 // Integration by parts gives w[n] = 1 - n w[n-1]/z. The recursion runs upwards for large z, and downwards from a
 // series for small z, so that no digits are lost for any step.
-void vwt_lag_weights(double z, double w[4]) {
+static void set_weights(double z, double w[4]) {
   if (z > 1) {
     w[0] = -expm1(-z);
     for (int n = 1; n < 4; n++) {
@@ -32,8 +32,18 @@ void vwt_lag_weights(double z, double w[4]) {
   }
 }
 
+void vwt_set_lag(vwt_lag* lag, double time, double duration) {
+  const double ratio = time != 0 && duration > 0 ? duration / fabs(time) : 0;
+  lag->time = time;
+  if (ratio != lag->ratio) {
+    lag->ratio = ratio;
+    set_weights(ratio, lag->w);
+  }
+}
+
 // dw[n]/dz, from the same series and recursions.
-void vwt_lag_weight_slopes(double z, const double w[4], double slopes[4]) {
+void vwt_lag_weight_slopes(const vwt_lag* lag, double slopes[4]) {
+  const double z = lag->ratio, *w = lag->w;
   if (z > 1) {
     slopes[0] = exp(-z);
     for (int n = 1; n < 4; n++) {
@@ -54,15 +64,9 @@ void vwt_lag_weight_slopes(double z, const double w[4], double slopes[4]) {
 
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
                        double angle1, double rate1) {
-  if (lag_time == 0) {
-    return angle1;
-  }
-  if (!(duration > 0)) {
-    return lagged;
-  }
-  double w[4];
-  vwt_lag_weights(duration / fabs(lag_time), w);
-  return vwt_lag_weighted(w, lagged, duration, angle0, rate0, angle1, rate1);
+  vwt_lag lag = {0};
+  vwt_set_lag(&lag, lag_time, duration);
+  return lag_time == 0 ? angle1 : vwt_lag_weighted(lag.w, lagged, duration, angle0, rate0, angle1, rate1);
 }
 
 double vwt_lag_weighted(const double w[4], double lagged, double duration, double angle0, double rate0,

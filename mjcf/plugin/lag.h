@@ -17,9 +17,13 @@ double vwt_lag_time(const vwt_parameters* p, double wind_speed);
 double vwt_lag_advance(double lag_time, double lagged, double duration, double angle0, double rate0,
                        double angle1, double rate1);
 
-// The same in two parts, for steps of equal length: weights from duration/|lag_time| > 0, and the state with them.
-void vwt_lag_weights(double z, double w[4]);
-void vwt_lag_weight_slopes(double z, const double w[4], double slopes[4]);  // by z
+// The same in two parts, for steps of equal length: the lag over a duration, and the state with its weights.
+typedef struct {
+  double time, ratio, w[4];  // s, 0 without a lag; duration/|time|, on which the weights depend; all 0: to be set
+} vwt_lag;
+
+void vwt_set_lag(vwt_lag* lag, double time, double duration);
+void vwt_lag_weight_slopes(const vwt_lag* lag, double slopes[4]);  // by the ratio
 double vwt_lag_weighted(const double w[4], double lagged, double duration, double angle0, double rate0,
                         double angle1, double rate1);
 

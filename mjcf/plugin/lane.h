@@ -22,6 +22,13 @@ INLINE Lane with_sign(Lane size, Lane x) { return (Lane)((Mask)size | ((Mask)x &
 INLINE Lane choose(Mask where, Lane one, Lane other) {
   return (Lane)((where & (Mask)one) | (~where & (Mask)other));
 }
+INLINE long long all(Mask where) {
+  long long out = -1;
+  for (int k = 0; k < WIDTH; k++) {
+    out &= where[k];
+  }
+  return out;
+}
 #else
 enum { WIDTH = 1 };
 typedef double Lane;
@@ -32,6 +39,7 @@ typedef int Mask;
 INLINE Lane size_of(Lane x) { return fabs(x); }
 INLINE Lane with_sign(Lane size, Lane x) { return copysign(size, x); }
 INLINE Lane choose(Mask where, Lane one, Lane other) { return where ? one : other; }
+INLINE int all(Mask where) { return where; }
 #endif
 
 #endif  // VWT_LANE_H_

@@ -1,6 +1,6 @@
-// The moment law, written once for every width: one run (moment.c), or LAW_LANES runs side by side (lanes.h). A file
-// includes it for one width. Both widths do the same operations in the same order, so that their bits are the same but
-// for elementary functions.
+// The moment law, written once for every width: one run, or LAW_LANES runs side by side. A file includes it for one
+// width. Both widths do the same operations in the same order, so that their bits are the same but for elementary
+// functions.
 // A term whose coefficient is zero vanishes: one run skips it, lanes add zero.
 
 #ifndef VWT_LAW_H_
@@ -15,7 +15,7 @@
 
 // What a law has that takes long: an elementary function, or a loop. The first five: powers with a free exponent; ROOT,
 // SATURATION, PEAK and LOAD: of the friction; WIND: of samples; DRIVE: a drive; TWIST: a rod that twists; DAHL:
-// Dahl's friction; PROGRAM: a moment by expression
+// Dahl's friction; PROGRAM: a moment by expression; FORCED: turbulence, or a moment of the surroundings
 enum {
   STEEPENING = 1,
   THICKENING = 2,
@@ -35,7 +35,8 @@ enum {
   TWIST = 16384,
   DAHL = 32768,
   PROGRAM = 65536,
-  ANY = 131071
+  FORCED = 131072,
+  ANY = 262143
 };
 
 // The coefficients of the law, by lane.
@@ -44,8 +45,7 @@ typedef struct {
   const vwt_parameters* p[WIDTH];
   Lane moment_cubic, damping_quadratic, flow_angle;
   Lane steepening, thickening, rate, cube, square;  // free exponents; 0: that of the textbook
-  Lane lag;                    // s, in a constant wind
-  Lane shedding, turn, phase;  // of the vortices in a constant wind: N m, rad/s and rad
+  Lane phase;                                       // rad, of the vortices
   Lane spring, quadratic_damping, loss, cubic, quadratic, free_play, gravity, gravity_angle;
 } Coefficients;
 
@@ -58,6 +58,11 @@ typedef struct {
 typedef struct {
   Lane stiffness, damping;
 } Air;
+
+// Lag and vortices at a time: s, N m and rad/s.
+typedef struct {
+  Lane lag, shedding, turn;
+} Wake;
 
 // Powers of angle and rate, none negative.
 typedef struct {
@@ -100,6 +105,7 @@ INLINE void set_coefficients(Coefficients* c, int k, const vwt_parameters* p) {
   AT(c->rate, k) = exponent_of(p->quadratic_damping_exponent, 2);
   AT(c->cube, k) = exponent_of(p->stiffness_cubic_exponent, 3);
   AT(c->square, k) = exponent_of(p->stiffness_quadratic_exponent, 2);
+  AT(c->phase, k) = p->shedding_phase;
   AT(c->spring, k) = spring;
   AT(c->quadratic_damping, k) = p->quadratic_damping;
   AT(c->loss, k) = p->loss_factor != 0 ? p->loss_factor * sqrt(spring * p->yaw_inertia) : 0;  // eta Kr/wn at rest
@@ -131,14 +137,12 @@ INLINE void set_air(Air* air, int k, const vwt_parameters* p, double wind) {
   AT(air->damping, k) = flow * p->reference_length * p->cn_r;
 }
 
-// Lag and vortices in a wind.
-INLINE void set_wake(Coefficients* c, int k, const vwt_parameters* p, double wind) {
+INLINE void set_wake(Wake* wake, int k, const vwt_parameters* p, double wind) {
   const double turns = 6.283185307179586476925286766559;
   const int sheds = p->shedding_amplitude != 0 && p->width > 0 && wind > 0;
-  AT(c->lag, k) = p->aero_lag != 0 ? vwt_lag_time(p, wind) : 0;
-  AT(c->shedding, k) = sheds ? flow_at(p, wind) * wind * p->shedding_amplitude : 0;
-  AT(c->turn, k) = sheds ? turns * p->strouhal_number * wind / p->width : 0;
-  AT(c->phase, k) = p->shedding_phase;
+  AT(wake->lag, k) = p->aero_lag != 0 ? vwt_lag_time(p, wind) : 0;
+  AT(wake->shedding, k) = sheds ? flow_at(p, wind) * wind * p->shedding_amplitude : 0;
+  AT(wake->turn, k) = sheds ? turns * p->strouhal_number * wind / p->width : 0;
 }
 
 // A power of x >= 0: that of the textbook, 2 or 3, or, where some are free, one with another exponent, equal at the
@@ -158,21 +162,21 @@ INLINE Lane power_of_angle(int free, Lane x, int textbook, Lane exponent) {
 
 // What the air sees as the body's angle: the lag's state, or for a lead its mirror image about the angle, because the
 // equation of the lag is unstable with a negative time constant, or the angle itself.
-INLINE Lane seen_at(const Coefficients* c, int features, Lane body, Lane lagged) {
-  if (!(features & LAG) || !ACTS(c->lag)) {
+INLINE Lane seen_at(const Wake* wake, int features, Lane body, Lane lagged) {
+  if (!(features & LAG) || !ACTS(wake->lag)) {
     return body;
   }
-  return choose(c->lag > 0, lagged, choose(c->lag < 0, 2 * body - lagged, body));
+  return choose(wake->lag > 0, lagged, choose(wake->lag < 0, 2 * body - lagged, body));
 }
 
-INLINE Lane shed_at(const Coefficients* c, Lane time) {
-  return ACTS(c->shedding) ? c->shedding * sine(c->turn * time + c->phase) : (Lane){0};
+INLINE Lane shed_at(const Coefficients* c, const Wake* wake, Lane time) {
+  return ACTS(wake->shedding) ? wake->shedding * sine(wake->turn * time + c->phase) : (Lane){0};
 }
 
 // Moment of the air on the body, with the powers in it; `shed` and `lagged` are read only with the features they belong
 // to.
-INLINE Lane moment_of_air(const Coefficients* c, const Air* air, int features, Lane body, Lane rate, Lane shed,
-                       Lane lagged, Powers* powers) {
+INLINE Lane moment_of_air(const Coefficients* c, const Air* air, const Wake* wake, int features, Lane body, Lane rate,
+                          Lane shed, Lane lagged, Powers* powers) {
   Lane steepening = (Lane){0} + 1, thickening = steepening;
   if (ACTS(c->moment_cubic)) {
     powers->steepening = power_of_angle(features & STEEPENING, size_of(body), 2, c->steepening);
@@ -182,9 +186,9 @@ INLINE Lane moment_of_air(const Coefficients* c, const Air* air, int features, L
     powers->thickening = power_of_angle(features & THICKENING, size_of(body), 2, c->thickening);
     thickening += c->damping_quadratic * powers->thickening;
   }
-  const Lane moment = air->stiffness * (seen_at(c, features, body, lagged) * steepening + c->flow_angle) +
+  const Lane moment = air->stiffness * (seen_at(wake, features, body, lagged) * steepening + c->flow_angle) +
                       air->damping * thickening * rate;
-  return features & SHEDDING && ACTS(c->shedding) ? moment + shed : moment;
+  return features & SHEDDING && ACTS(wake->shedding) ? moment + shed : moment;
 }
 
 // The part of the deflection that the free play takes up.
@@ -252,6 +256,28 @@ INLINE Factors factors_of(const Friction* f, int features, Lane along) {
 INLINE Lane friction_level(const Friction* f, int features, Lane along, Lane load) {
   const Factors factors = factors_of(f, features, along);
   return (f->moment + f->load * load) * factors.power * factors.turn * factors.peak;
+}
+
+// Dahl's deflection after a motion over `distance` in the direction `side`, 1 or -1.
+INLINE Lane slid(Lane range, Lane deflection, Lane side, Lane distance) {
+#ifdef LAW_LANES
+  const Lane end = side * range, moved = end + (deflection - end) * exponential(-distance / range);
+  return choose(distance > 0, moved, deflection);
+#else
+  return distance > 0 ? deflection - (side * range - deflection) * expm1(-distance / range) : deflection;
+#endif
+}
+
+// Dahl's deflection after `duration`, as vwt_presliding_advance.
+INLINE Lane deflection_after(Lane range, Lane deflection, Lane duration, Lane angle0, Lane rate0, Lane angle1,
+                             Lane rate1) {
+  const Lane none = {0}, one = none + 1, change = angle1 - angle0;
+  const Mask forwards = (rate0 > 0) | ((rate0 == 0) & (change > 0)), reverses = rate0 * rate1 < 0;
+  // The distance after the reversal is computed from the end of the step, so that the deflection is a smooth function
+  // of the end point. The stages of the Runge-Kutta method, which do not lie on one path, need this.
+  const Lane side = choose(forwards, one, -one), apart = choose(reverses, size_of(rate1 - rate0), one);
+  const Lane back = choose(reverses, duration * rate1 * rate1 / (2 * apart), none);
+  return slid(range, slid(range, deflection, side, side * change + back), -side, back);
 }
 
 #endif  // VWT_LAW_H_

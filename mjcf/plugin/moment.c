@@ -10,12 +10,13 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   }
   Coefficients c;
   Air air;
+  Wake wake;
   Powers powers;
   set_coefficients(&c, 0, p);
-  set_wake(&c, 0, p, s->wind_speed);
   set_air(&air, 0, p, s->wind_speed);
-  const double shed = shed_at(&c, s->time), forcing = flow_at(p, s->wind_speed) * s->wind_speed * s->forcing;
-  return moment_of_air(&c, &air, ANY, s->angle, s->rate, shed, s->lagged, &powers) + forcing;
+  set_wake(&wake, 0, p, s->wind_speed);
+  const double shed = shed_at(&c, &wake, s->time), forcing = flow_at(p, s->wind_speed) * s->wind_speed * s->forcing;
+  return moment_of_air(&c, &air, &wake, ANY, s->angle, s->rate, shed, s->lagged, &powers) + forcing;
 }
 
 double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate) {
@@ -80,18 +81,7 @@ double vwt_presliding_range(const vwt_parameters* p, double inertia, double dura
   return fmax(p->presliding, greatest_friction(p) * duration * duration / (2 * inertia));  // 2 rad in a step
 }
 
-// Deflection after a motion over `distance` in the direction `side`, 1 or -1.
-static double slide(double range, double deflection, int side, double distance) {
-  return distance > 0 ? deflection - (side * range - deflection) * expm1(-distance / range) : deflection;
-}
-
 double vwt_presliding_advance(double range, double deflection, double duration, double angle0, double rate0,
                               double angle1, double rate1) {
-  const double change = angle1 - angle0;
-  const int side = rate0 > 0 || (rate0 == 0 && change > 0) ? 1 : -1;
-  // The distance after the reversal is computed from the end of the step, so that the deflection is a smooth function
-  // of the end point. The stages of the Runge-Kutta method, which do not lie on one path, need this.
-  const double back = rate0 * rate1 < 0 ? duration * rate1 * rate1 / (2 * fabs(rate1 - rate0)) : 0;
-  const double turned = slide(range, deflection, side, side * change + back);
-  return slide(range, turned, -side, back);
+  return deflection_after(range, deflection, duration, angle0, rate0, angle1, rate1);
 }

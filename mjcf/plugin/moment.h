@@ -1,7 +1,7 @@
 // The moment law of the rig: all moments of air and mechanism except those of the linear spring and damper.
 //
-// It does not depend on MuJoCo. The engine plugin (binding.c) and the forward integrator (forward.c) both call
-// these functions, so each term is implemented once. Angles in rad; moments in N m, positive in the direction of yaw.
+// It does not depend on MuJoCo. The engine plugin calls these functions; they and the forward integrator have the terms
+// of law.h, so each is implemented once. Angles in rad; moments in N m, positive in the direction of yaw.
 
 #ifndef VWT_MOMENT_H_
 #define VWT_MOMENT_H_

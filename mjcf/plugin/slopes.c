@@ -16,7 +16,7 @@ typedef struct {
 } Row;
 
 // The row of a sum of the end's angle and rate with the weights `angle` and `rate`: the stages backwards.
-INLINE Row row_of(const Stage at[4], const LagSlopes* half, const LagSlopes* whole, Lane h, Lane middle, int features,
+INLINE Row row_of(const Slopes at[4], const LagSlopes* half, const LagSlopes* whole, Lane h, Lane middle, int features,
                   double angle, double rate) {
   Lane by_angle[4], by_rate[4];
   for (int i = 0; i < 4; i++) {
@@ -53,35 +53,32 @@ INLINE Row row_of(const Stage at[4], const LagSlopes* half, const LagSlopes* who
   return out;
 }
 
-// The motion after a step without a reversal, and the change there; arithmetic of the motion as in lanes.c.
-INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane middle, const LagSlopes* half,
-                    const LagSlopes* whole, int width, const int* columns, Change* change, Lane* angle, Lane* rate) {
-  const Lanes* c = law->c;
+// The motion after a step without a reversal, and the change there.
+INLINE Motion advance(const Law* law, const State* s, int features, Lane h, Lane middle, const LagSlopes* half,
+                      const LagSlopes* whole, int width, const int* columns, Change* change) {
+  const Runs* c = law->c;
   const int lags = features & LAG;
   const Input in = input_of(c, features, s->start, middle);
-  Lane input = input_at(&in, features, s->start);
-  Stage at[4];
-  const Lane a1 = evaluate(law, s->slip, features, s->start, s->angle, s->rate, s->lagged, input, &at[0]);
-  const Lane y2 = s->angle + middle * s->rate, r2 = s->rate + middle * a1;
-  Lane lagged = lags ? lagged_at(c, s, half->w, middle, y2, r2) : (Lane){0};
-  input = input_at(&in, features, s->start + middle);
-  const Lane a2 = evaluate(law, s->slip, features, s->start + middle, y2, r2, lagged, input, &at[1]);
-  const Lane y3 = s->angle + middle * r2, r3 = s->rate + middle * a2;
-  lagged = lags ? lagged_at(c, s, half->w, middle, y3, r3) : (Lane){0};
-  const Lane a3 = evaluate(law, s->slip, features, s->start + middle, y3, r3, lagged, input, &at[2]);
-  const Lane y4 = s->angle + h * r3, r4 = s->rate + h * a3;
-  lagged = lags ? lagged_at(c, s, whole->w, h, y4, r4) : (Lane){0};
-  input = input_at(&in, features, s->start + h);
-  const Lane a4 = evaluate(law, s->slip, features, s->start + h, y4, r4, lagged, input, &at[3]);
-  *angle = s->angle + h * ((s->rate + 2 * (r2 + r3) + r4) / 6);
-  *rate = s->rate + h * ((a1 + 2 * (a2 + a3) + a4) / 6);
+  Slopes at[4];
+  Motion y = s->y, k[4];
+  Instant now = instant_at(c, &in, features, s->start);
+  k[0] = evaluate(law, s->slip, features, &now, &y, s->lagged, &at[0]);
+  now = instant_at(c, &in, features, s->start + middle);
+  y = along(features, &s->y, middle, &k[0]);
+  k[1] = evaluate(law, s->slip, features, &now, &y, lagged_there(c, s, features, half->lag, middle, &y), &at[1]);
+  y = along(features, &s->y, middle, &k[1]);
+  k[2] = evaluate(law, s->slip, features, &now, &y, lagged_there(c, s, features, half->lag, middle, &y), &at[2]);
+  now = instant_at(c, &in, features, s->start + h);
+  y = along(features, &s->y, h, &k[2]);
+  k[3] = evaluate(law, s->slip, features, &now, &y, lagged_there(c, s, features, whole->lag, h, &y), &at[3]);
+  const Motion to = end_of(s, features, h, k);
   Lane by_lag_after = {0};
   if (lags) {
     at[0].by_lag = (Lane){0};
-    at[1].by_lag = at[1].by_lagged * by_lag(c, s, half, middle, y2, r2);
-    at[2].by_lag = at[2].by_lagged * by_lag(c, s, half, middle, y3, r3);
-    at[3].by_lag = at[3].by_lagged * by_lag(c, s, whole, h, y4, r4);
-    by_lag_after = by_lag(c, s, whole, h, *angle, *rate);
+    at[1].by_lag = at[1].by_lagged * by_lag(c, s, half, middle, at[1].angle, at[1].rate);
+    at[2].by_lag = at[2].by_lagged * by_lag(c, s, half, middle, at[2].angle, at[2].rate);
+    at[3].by_lag = at[3].by_lagged * by_lag(c, s, whole, h, at[3].angle, at[3].rate);
+    by_lag_after = by_lag(c, s, whole, h, to.angle, to.rate);
   }
   const Row of_angle = row_of(at, half, whole, h, middle, features, 1, 0);
   const Row of_rate = row_of(at, half, whole, h, middle, features, 0, 1);
@@ -110,6 +107,7 @@ INLINE void advance(const Law* law, const State* s, int features, Lane h, Lane m
       }
     }
   }
+  return to;
 }
 
 // The change over the stretches of a step in those lanes that have any; the other lanes keep theirs.
@@ -117,7 +115,7 @@ INLINE void pass(const Law* law, const State* before, int features, const Passag
                  const int* columns, Change* change) {
   for (int i = 0; i < VWT_MOST_STRETCHES; i++) {
     State s = *before;
-    Lane h = {0}, kept = (Lane){0} + 1, angle, rate;
+    Lane h = {0}, kept = (Lane){0} + 1;
     int found = 0, moves = 0;
     for (int k = 0; k < VWT_LANES; k++) {
       if (i >= passages[k].count) {
@@ -129,8 +127,8 @@ INLINE void pass(const Law* law, const State* before, int features, const Passag
       if (at->slip != 0) {  // else it rests
         moves = 1;
         s.start[k] = at->start;
-        s.angle[k] = at->angle;
-        s.rate[k] = at->rate;
+        s.y.angle[k] = at->angle;
+        s.y.rate[k] = at->rate;
         s.lagged[k] = at->lagged;
         s.slip[k] = at->slip;
         h[k] = at->duration;
@@ -145,7 +143,7 @@ INLINE void pass(const Law* law, const State* before, int features, const Passag
         half = lag_slopes(law->c, h / 2);
         whole = lag_slopes(law->c, h);
       }
-      advance(law, &s, features, h, h / 2, &half, &whole, width, columns, change, &angle, &rate);
+      advance(law, &s, features, h, h / 2, &half, &whole, width, columns, change);
     }
     for (int j = 0; j < width; j++) {
       change->rate[j] *= kept;
@@ -159,9 +157,9 @@ typedef struct {
   LagSlopes half, whole;
 } Asked;
 
-INLINE void step(const Law* law, const Asked* asked, State* s, int features, Step* alone, Passage* passages,
+INLINE void step(const Law* law, const Asked* asked, State* s, int features, Alone* alone, Passage* passages,
                  Change* change) {
-  const Lanes* c = law->c;
+  const Runs* c = law->c;
   const State before = *s;
   Change old;
   for (int i = 0; c->rubs && i < asked->width; i++) {
@@ -169,26 +167,12 @@ INLINE void step(const Law* law, const Asked* asked, State* s, int features, Ste
     old.rate[i] = change->rate[i];
     old.lagged[i] = change->lagged[i];
   }
-  advance(law, &before, features, c->whole_step, c->half_step, &asked->half, &asked->whole, asked->width,
-          asked->columns, change, &s->angle, &s->rate);
-  if (features & LAG) {
-    s->lagged = lagged_at(c, &before, c->whole, c->whole_step, s->angle, s->rate);
-  }
-  const Mask turns = turning(c, &before, s->rate);
-  if (!c->rubs || !any(turns)) {
+  const Motion to = advance(law, &before, features, c->whole_step, c->half_step, &asked->half, &asked->whole,
+                            asked->width, asked->columns, change);
+  move(c, s, features, c->whole_step, c->whole, &to);
+  const Mask turns = turn(c, &before, s, alone);
+  if (all(~turns)) {
     return;
-  }
-  for (int k = 0; k < VWT_LANES; k++) {
-    passages[k].count = 0;
-    if (!turns[k]) {
-      continue;
-    }
-    s->angle[k] = before.angle[k];
-    s->rate[k] = before.rate[k];
-    s->lagged[k] = before.lagged[k];
-    if (k < c->count && !before.rests[k]) {
-      step_alone(c, s, k, &alone[k]);
-    }
   }
   for (int i = 0; i < asked->width; i++) {
     change->angle[i] = choose(turns, old.angle[i], change->angle[i]);
@@ -225,20 +209,19 @@ INLINE void see(const Law* law, const Asked* asked, int features, const State* s
     out->rate[i] = change->rate[i];
   }
   if (asked->pace >= 0) {
-    const Lane none = {0}, shed = features & SHEDDING ? shed_at(&law->c->law, s->start) : none;
-    const Air air = air_at(law->c, features, s->start);
+    const Lane none = {0};
     const Input in = input_of(law->c, features, s->start, law->c->half_step);
-    const Lane input = input_at(&in, features, s->start);
-    const Lane a = acceleration_at(law->c, &air, s->slip, features, s->start, s->angle, s->rate, shed,
-                                   s->lagged, input);
-    const Mask rests = law->c->dry & (s->rate == 0);
-    out->angle[asked->pace] = s->start * s->rate;
+    const Instant now = instant_at(law->c, &in, features, s->start);
+    Powers powers;
+    const Lane a = slope_at(law->c, features, &now, &s->y, s->lagged, s->slip, &powers).rate;
+    const Mask rests = law->c->dry & (s->y.rate == 0);
+    out->angle[asked->pace] = s->start * s->y.rate;
     out->rate[asked->pace] = choose(rests, none, s->start * a);
   }
 }
 
 // Writes a sample of the motions, and its change.
-INLINE void put(const Out* out, const Lanes* c, int at, Lane angle, Lane rate, const Seen* change) {
+INLINE void put(const Out* out, const Runs* c, int at, Lane angle, Lane rate, const Seen* change) {
   for (int k = 0; k < c->count; k++) {
     if (at >= c->run[k]->samples) {
       continue;
@@ -253,7 +236,7 @@ INLINE void put(const Out* out, const Lanes* c, int at, Lane angle, Lane rate, c
 }
 
 // Writes the change of the mean of a block from the changes at its ends.
-INLINE void put_means(const Out* out, const Lanes* c, int at, const Seen* from, const Seen* to) {
+INLINE void put_means(const Out* out, const Runs* c, int at, const Seen* from, const Seen* to) {
   Lane w[4] = {{0}};
   const int place = at < out->weighed ? at : 0;
   for (int n = 0; n < 4; n++) {
@@ -271,15 +254,6 @@ INLINE void put_means(const Out* out, const Lanes* c, int at, const Seen* from, 
   }
 }
 
-// A cubic (Hermite) between the ends of a step, as vwt_fill.
-INLINE void between(Lane h, double u, Lane angle0, Lane rate0, Lane angle1, Lane rate1, Lane* angle, Lane* rate) {
-  const Lane change = angle1 - angle0, c1 = h * rate0;
-  const Lane c2 = 3 * change - h * (2 * rate0 + rate1);
-  const Lane c3 = h * (rate0 + rate1) - 2 * change;
-  *angle = angle0 + u * (c1 + u * (c2 + u * c3));
-  *rate = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
-}
-
 // Whether a run's motion has derivatives here: friction as a root of the rate is infinitely steep at a reversal, that
 // with a load has none by gravity's terms, and Dahl's none yet.
 static int is_smooth(const vwt_parameters* p) {
@@ -288,7 +262,7 @@ static int is_smooth(const vwt_parameters* p) {
 }
 
 // Whether a term of one lane has a derivative.
-static int exists(const Lanes* c, int k, int term) {
+static int exists(const Runs* c, int k, int term) {
   const vwt_parameters* p = c->law.p[k];
   switch (term) {
     case VWT_TERM_friction:
@@ -305,12 +279,12 @@ static int exists(const Lanes* c, int k, int term) {
     case VWT_TERM_shedding_sine:
     case VWT_TERM_shedding_cosine:
     case VWT_TERM_turn:
-      return c->law.shedding[k] != 0;
+      return c->wake.shedding[k] != 0;
     case VWT_TERM_seen:
-      return c->law.lag[k] != 0 || is_sampled(c, k);
+      return c->wake.lag[k] != 0 || is_sampled(c, k);
     case VWT_TERM_lag:
     case VWT_TERM_start_lagged:
-      return c->law.lag[k] != 0;
+      return c->wake.lag[k] != 0;
     case VWT_TERM_air_rate:
       return is_sampled(c, k);
     default:
@@ -318,11 +292,11 @@ static int exists(const Lanes* c, int k, int term) {
   }
 }
 
-INLINE int integrate(const Law* law, const Asked* asked, State* s, int features, Step* alone, Passage* passages,
-                     const vwt_run* like, const Out* out) {
-  const Lanes* c = law->c;
-  const int samples = most_samples(c), steps = (int)like->steps, width = asked->width;
-  const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
+INLINE int differentiated(const Law* law, const Asked* asked, State* s, int features, Alone* alone, Passage* passages,
+                     const Out* out) {
+  const Runs* c = law->c;
+  const int samples = most_samples(c), steps = (int)c->run[0]->steps, width = asked->width;
+  const int stride = strides(c->run[0]);
   Change change;
   for (int i = 0; i < width; i++) {
     const int term = asked->columns[i];
@@ -338,7 +312,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
   }
   Seen first, last, next, seen;
   see(law, asked, features, s, &change, &seen);
-  put(out, c, 0, s->angle, s->rate, &seen);
+  put(out, c, 0, s->y.angle, s->y.rate, &seen);
   for (int i = 0; i + 1 < samples; i += stride) {
     const State before = *s;
     copy(width, &seen, &first);
@@ -347,20 +321,19 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
       step(law, asked, s, features, alone, passages, &change);
       s->start = (i * (double)steps + stride * (j + 1)) * c->step;  // no drift of the clock
     }
-    for (int k = 0; k < c->count; k++) {
-      if (i + 1 < c->run[k]->samples && !(fabs(s->angle[k]) < 1e6)) {
-        return 1 + k;
-      }
+    const int failed = grown(c, i + 1, s->y.angle);
+    if (failed) {
+      return failed;
     }
     see(law, asked, features, s, &change, &seen);
     for (int j = 1; j < stride && i + j < samples; j++) {
       const double u = j / (double)stride;
       Lane y, r;
-      between(c->whole_step, u, before.angle, before.rate, s->angle, s->rate, &y, &r);
+      between(c->whole_step, u, before.y.angle, before.y.rate, s->y.angle, s->y.rate, &y, &r);
       for (int n = 0; n < width; n++) {
         const int longer = n == asked->pace;  // the rates times the step change with the step too
-        const Lane rate0 = longer ? first.rate[n] + before.rate : first.rate[n];
-        const Lane rate1 = longer ? seen.rate[n] + s->rate : seen.rate[n];
+        const Lane rate0 = longer ? first.rate[n] + before.y.rate : first.rate[n];
+        const Lane rate1 = longer ? seen.rate[n] + s->y.rate : seen.rate[n];
         between(c->whole_step, u, first.angle[n], rate0, seen.angle[n], rate1, &next.angle[n], &next.rate[n]);
         next.rate[n] = longer ? next.rate[n] - r : next.rate[n];
       }
@@ -371,7 +344,7 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
       }
     }
     if (i + stride < samples) {
-      put(out, c, i + stride, s->angle, s->rate, &seen);
+      put(out, c, i + stride, s->y.angle, s->y.rate, &seen);
       if (out->weights) {
         put_means(out, c, i + stride - 1, &last, &seen);
       }
@@ -382,12 +355,11 @@ INLINE int integrate(const Law* law, const Asked* asked, State* s, int features,
 
 CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, int width,
                                   const int* columns, const double* const* changes, const Out* out) {
-  Lanes c = {.count = count};
-  State s = {.rests = {0}};
-  LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
-  Step alone[VWT_LANES];
+  Runs c = {.count = 0};
+  State s;
+  Alone alone[VWT_LANES] = {{0}};
   Passage passages[VWT_LANES];
-  release(count, parameters, runs, &c, &s, alone, weights);
+  release(count, parameters, runs, &c, &s);
   for (int k = 0; k < VWT_LANES; k++) {
     alone[k].passage = &passages[k];
   }
@@ -403,8 +375,9 @@ CLONED static int slopes_of_lanes(int count, const vwt_parameters* parameters, c
     asked.half = lag_slopes(&c, c.half_step);
     asked.whole = lag_slopes(&c, c.whole_step);
   }
-  return law.features == 0 ? integrate(&law, &asked, &s, 0, alone, passages, runs, out)
-                           : integrate(&law, &asked, &s, law.features, alone, passages, runs, out);
+  const int features = law.features & ~(FORCED | TWIST | DAHL | PROGRAM | LOAD);  // vwt_slopes refuses these
+  return features == 0 ? differentiated(&law, &asked, &s, 0, alone, passages, out)
+                       : differentiated(&law, &asked, &s, features, alone, passages, out);
 }
 
 int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs, int size, int width,
@@ -436,10 +409,10 @@ int vwt_slopes(int count, const vwt_parameters* parameters, const vwt_run* runs,
 
 void vwt_terms(int count, const vwt_parameters* parameters, const vwt_run* runs, double* values) {
   for (int i = 0; i < count; i += VWT_LANES) {
-    Lanes c = {.count = 1};
+    Runs c = {.count = 1};
     for (int k = 0; k < VWT_LANES; k++) {
       const int at = i + k < count ? i + k : i;
-      set_lane(&c, k, &parameters[at], &runs[at]);
+      set_run(&c, k, &parameters[at], &runs[at]);
     }
     const Law law = law_of(&c);
     for (int k = 0; k < VWT_LANES && i + k < count; k++) {

@@ -10,7 +10,7 @@
 // Exponents that act, the inverse of the inertia, what turns the air's terms into those of the angle, and the law; also
 // the changes of samples.
 typedef struct {
-  const Lanes* c;
+  const Runs* c;
   int features;
   const double* changes[VWT_LANES];
   Lane inverse;
@@ -22,21 +22,21 @@ typedef struct {
 // rate there, and of its weights by the lag.
 typedef struct {
   Lane lagged, angle0, rate0, angle1, rate1, weights[4];
-  double w[VWT_LANES][4];
+  vwt_lag lag[VWT_LANES];
 } LagSlopes;
 
 // A stage of a step, and the derivatives of the acceleration there.
 typedef struct {
   Lane angle, rate, time, seen, input, deflection;
   Air air;
+  Powers powers;
   Lane speed, pressure;  // of a wind of samples, m/s and (m/s)2; 1 in a constant wind
   Lane by_speed;         // of the acceleration, in a wind of samples
   Lane by_input;         // of the acceleration, in a driven run
-  Powers powers;
   Lane by_angle, by_rate, by_lagged, by_lag;
   Lane level;              // of the friction per unit of its moment
   Lane by_friction[4];     // of the acceleration by exponent, saturation, peak rate and peak
-} Stage;
+} Slopes;
 
 // A small change of the motion by column, per unit of the column's term.
 enum { VWT_MOST_COLUMNS = VWT_TERM_COUNT + VWT_MOST_CHANGES };
@@ -44,9 +44,9 @@ typedef struct {
   Lane angle[VWT_MOST_COLUMNS], rate[VWT_MOST_COLUMNS], lagged[VWT_MOST_COLUMNS];
 } Change;
 
-static int is_sampled(const Lanes* c, int k) { return c->run[k]->wind_count > 1; }
+static int is_sampled(const Runs* c, int k) { return c->run[k]->wind_count > 1; }
 
-static int is_driven(const Lanes* c, int k) { return c->run[k]->moment_count > 0; }
+static int is_driven(const Runs* c, int k) { return c->run[k]->moment_count > 0; }
 
 // What the air's stiffness and damping have in common with those at any other speed, kg/m; times the model's length.
 static double flow_of(const vwt_parameters* p) {
@@ -55,7 +55,7 @@ static double flow_of(const vwt_parameters* p) {
 
 static double acting(double exponent, double textbook) { return exponent != 0 ? exponent : textbook; }
 
-static Law law_of(const Lanes* c) {
+static Law law_of(const Runs* c) {
   Law law = {.c = c, .features = c->law.features, .inverse = 1 / c->inertia};
   for (int k = 0; k < VWT_LANES; k++) {
     const vwt_parameters* p = c->law.p[k];
@@ -73,33 +73,32 @@ static Law law_of(const Lanes* c) {
   return law;
 }
 
-INLINE LagSlopes lag_slopes(const Lanes* c, Lane duration) {
+INLINE LagSlopes lag_slopes(const Runs* c, Lane duration) {
   LagSlopes out = {0};
   for (int k = 0; k < VWT_LANES; k++) {
-    if (c->law.lag[k] == 0) {
+    const double time = c->wake.lag[k], h = duration[k], *w = out.lag[k].w;
+    double slopes[4];
+    if (time == 0) {
       continue;
     }
-    const double time = fabs(c->law.lag[k]), h = duration[k], z = h / time;
-    double* w = out.w[k];
-    double slopes[4];
-    vwt_lag_weights(z, w);
-    vwt_lag_weight_slopes(z, w, slopes);
+    vwt_set_lag(&out.lag[k], time, h);
+    vwt_lag_weight_slopes(&out.lag[k], slopes);
     out.lagged[k] = 1 - w[0];
     out.angle0[k] = c->body[k] * (w[0] - 3 * w[2] + 2 * w[3]);
     out.rate0[k] = c->body[k] * h * (w[1] - 2 * w[2] + w[3]);
     out.angle1[k] = c->body[k] * (3 * w[2] - 2 * w[3]);
     out.rate1[k] = c->body[k] * h * (w[3] - w[2]);
     for (int n = 0; n < 4; n++) {
-      out.weights[n][k] = -slopes[n] * z / c->law.lag[k];  // dz/dlag, whose sign is that of a lead too
+      out.weights[n][k] = -slopes[n] * out.lag[k].ratio / time;  // dz/dlag, whose sign is that of a lead too
     }
   }
   return out;
 }
 
 // The derivative of the lag's state by the lag, over a path from the step's start.
-INLINE Lane by_lag(const Lanes* c, const State* s, const LagSlopes* l, Lane h, Lane angle, Lane rate) {
-  const Lane change = c->body * (angle - s->angle), rate0 = c->body * s->rate, rate1 = c->body * rate;
-  return l->weights[0] * (c->body * s->angle - s->lagged) + l->weights[1] * h * rate0 +
+INLINE Lane by_lag(const Runs* c, const State* s, const LagSlopes* l, Lane h, Lane angle, Lane rate) {
+  const Lane change = c->body * (angle - s->y.angle), rate0 = c->body * s->y.rate, rate1 = c->body * rate;
+  return l->weights[0] * (c->body * s->y.angle - s->lagged) + l->weights[1] * h * rate0 +
          l->weights[2] * (3 * change - h * (2 * rate0 + rate1)) +
          l->weights[3] * (h * (rate0 + rate1) - 2 * change);
 }
@@ -116,15 +115,15 @@ INLINE Lane log_of(Lane x, double reference) {
 }
 
 // The derivative of the friction's level by the rate in its own direction, and what belongs to its form.
-INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
+INLINE Lane rub(const Law* law, int features, Lane slip, Slopes* at) {
   const Friction* f = &law->c->friction;
   const Lane none = {0}, one = none + 1;
-  if (!(law->features & RATE)) {
+  if (!(features & RATE)) {
     at->level = one;
     return none;
   }
   const Lane along = slip * at->rate, size = size_of(along);
-  const Factors by = factors_of(f, law->features, along);
+  const Factors by = factors_of(f, features, along);
   const Mask slips = (f->moment > 0) & (slip != 0), saturates = f->saturation > 0, peaks = f->peak_rate > 0;
   const Lane saturation = choose(saturates, f->saturation, one), peak_rate = choose(peaks, f->peak_rate, one);
   const Lane steepness = choose(saturates, (1 - by.turn * by.turn) / saturation, none);
@@ -141,16 +140,15 @@ INLINE Lane rub(const Law* law, Lane slip, Stage* at) {
 }
 
 // The wind's speed at a stage, and the derivative of the acceleration by it.
-INLINE void blow(const Law* law, Stage* at) {
-  const Lanes* c = law->c;
+INLINE void blow(const Law* law, Slopes* at) {
+  const Runs* c = law->c;
   at->speed = at->pressure = (Lane){0} + 1;
   at->by_speed = (Lane){0};
   for (int k = 0; k < VWT_LANES; k++) {
     if (!is_sampled(c, k)) {
       continue;
     }
-    const vwt_run* run = c->run[k];
-    const double wind = fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, at->time[k]));
+    const double wind = wind_at(c->run[k], at->time[k]);
     const double moment = at->seen[k] * (1 + c->law.moment_cubic[k] * at->powers.steepening[k]) + c->law.flow_angle[k];
     const double loss = (1 + c->law.damping_quadratic[k] * at->powers.thickening[k]) * c->body[k] * at->rate[k];
     const double flow = flow_of(c->law.p[k]), length = c->law.p[k]->reference_length;
@@ -162,22 +160,21 @@ INLINE void blow(const Law* law, Stage* at) {
   }
 }
 
-// The acceleration at a stage, and its derivatives by the motion there.
-INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane angle, Lane rate, Lane lagged, Lane input,
-                     Stage* at) {
-  const Lanes* c = law->c;
-  const Lane none = {0}, body = c->body * angle, size = size_of(body);
-  const Lane deflection = deflection_at(c, features, angle, input), bend = size_of(deflection);
+// The slope at a stage, and the derivatives of the acceleration by the motion there.
+INLINE Motion evaluate(const Law* law, Lane slip, int features, const Instant* now, const Motion* y, Lane lagged,
+                       Slopes* at) {
+  const Runs* c = law->c;
+  const Lane none = {0}, angle = y->angle, rate = y->rate, body = c->body * angle, size = size_of(body);
+  const Lane deflection = deflection_at(c, features, angle, now->input), bend = size_of(deflection);
+  const Air air = now->air;
   at->angle = angle;
   at->rate = rate;
-  at->time = time;
-  at->input = input;
+  at->time = now->time;
+  at->input = now->input;
   at->deflection = deflection;
-  at->seen = seen_at(&c->law, features, body, lagged);
-  at->air = air_at(c, features, time);
-  const Air air = at->air;
-  const Lane shed = features & SHEDDING ? shed_at(&c->law, time) : none;
-  const Lane found = acceleration(c, &air, slip, features, time, angle, rate, shed, lagged, input, &at->powers);
+  at->seen = seen_at(&c->wake, features, body, lagged);
+  at->air = air;
+  const Motion found = slope_at(c, features, now, y, lagged, slip, &at->powers);
   const Powers* p = &at->powers;
   Lane steepening = 2 * size, thickening = steepening, turning_rate = 2 * size_of(rate), cube = 3 * p->square,
        square = 2 * bend;
@@ -194,8 +191,8 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     cube = steepness(p->cube, bend, law->cube);
     square = steepness(p->square, bend, law->square);
   }
-  const Lane leads = choose(c->law.lag < 0, 2 * c->body, c->body);
-  const Lane seen_by_angle = features & LAG ? choose(c->law.lag > 0, none, leads) : c->body;
+  const Lane leads = choose(c->wake.lag < 0, 2 * c->body, c->body);
+  const Lane seen_by_angle = features & LAG ? choose(c->wake.lag > 0, none, leads) : c->body;
   if (features & WIND) {
     blow(law, at);
   }
@@ -215,18 +212,18 @@ INLINE Lane evaluate(const Law* law, Lane slip, int features, Lane time, Lane an
     by_angle -= c->law.gravity * cosine(angle - c->law.gravity_angle);
   }
   Lane by_rate = c->body * air.damping * (1 + c->law.damping_quadratic * p->thickening) * c->body;
-  by_rate -= c->law.quadratic_damping * turning_rate + c->law.loss + c->damping + slip * slip * rub(law, slip, at);
+  by_rate -= c->law.quadratic_damping * turning_rate + c->law.loss + c->damping + slip * slip * rub(law, features, slip, at);
   at->by_angle = by_angle * law->inverse;
   at->by_rate = by_rate * law->inverse;
   if (features & LAG) {
-    const Lane side = choose(c->law.lag > 0, none + 1, choose(c->law.lag < 0, none - 1, none));
+    const Lane side = choose(c->wake.lag > 0, none + 1, choose(c->wake.lag < 0, none - 1, none));
     at->by_lagged = side * c->body * steep * law->inverse;
   }
   return found;
 }
 
 // The derivative of the acceleration at a stage along a change of the samples of its wind or its drive.
-INLINE Lane by_samples(const Law* law, int change, const Input* in, const Stage* at) {
+INLINE Lane by_samples(const Law* law, int change, const Input* in, const Slopes* at) {
   Lane out = {0};
   for (int k = 0; k < VWT_LANES; k++) {
     const vwt_run* run = law->c->run[k];
@@ -242,10 +239,11 @@ INLINE Lane by_samples(const Law* law, int change, const Input* in, const Stage*
 }
 
 // The derivative of the acceleration at a stage by a term, `features` those of the law.
-INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Input* in, const Stage* at) {
-  const Lanes* c = law->c;
+INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Input* in, const Slopes* at) {
+  const Runs* c = law->c;
   const Lane none = {0}, angle = at->angle, rate = at->rate, bend = at->deflection;
   const Powers* p = &at->powers;
+  const Wake* wake = &c->wake;
   const Lane speed = features & WIND ? at->speed : none + 1, pressure = features & WIND ? at->pressure : none + 1;
   if (term >= VWT_TERM_COUNT) {
     return by_samples(law, term - VWT_TERM_COUNT, in, at);
@@ -282,9 +280,9 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
     case VWT_TERM_friction:
       return -slip * at->level;
     case VWT_TERM_shedding_sine:
-      return sine(c->law.turn * at->time);
+      return sine(wake->turn * at->time);
     case VWT_TERM_shedding_cosine:
-      return cosine(c->law.turn * at->time);
+      return cosine(wake->turn * at->time);
     case VWT_TERM_steepening_exponent:
       return law->inverse * c->body * at->air.stiffness * c->law.moment_cubic * at->seen * p->steepening *
              log_of(size_of(angle), VWT_ANGLE_REFERENCE);
@@ -301,19 +299,19 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
     case VWT_TERM_gap:
       return choose(size_of(bend) > c->law.free_play, with_sign(law->inverse * c->law.spring, bend), none);
     case VWT_TERM_friction_exponent:
-      return law->features & RATE
+      return features & RATE
                  ? at->by_friction[0]
                  : -slip * law->inverse * c->friction.moment * log_of(size_of(rate), VWT_RATE_REFERENCE);
     case VWT_TERM_friction_saturation:
-      return law->features & RATE ? at->by_friction[1] : none;
+      return features & RATE ? at->by_friction[1] : none;
     case VWT_TERM_friction_peak_rate:
-      return law->features & RATE ? at->by_friction[2] : none;
+      return features & RATE ? at->by_friction[2] : none;
     case VWT_TERM_friction_peak:
-      return law->features & RATE ? at->by_friction[3] : none;
+      return features & RATE ? at->by_friction[3] : none;
     case VWT_TERM_lag:
       return at->by_lag;
     case VWT_TERM_turn:
-      return law->inverse * c->body * c->law.shedding * at->time * cosine(c->law.turn * at->time + c->law.phase);
+      return law->inverse * c->body * wake->shedding * at->time * cosine(wake->turn * at->time + c->law.phase);
     default:  // of the start
       return none;
   }
@@ -321,9 +319,9 @@ INLINE Lane by_term(const Law* law, int features, int term, Lane slip, const Inp
 
 // The values of the terms of one lane.
 static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
-  const Lanes* c = law->c;
+  const Runs* c = law->c;
   const vwt_parameters* p = c->law.p[k];
-  const int lags = c->law.lag[k] != 0, sampled = is_sampled(c, k);
+  const int lags = c->wake.lag[k] != 0, sampled = is_sampled(c, k);
   const double inverse = law->inverse[k], body = c->body[k], flow = flow_of(p);
   const double air = body * (sampled ? flow * p->cn_beta : c->air.stiffness[k]) * inverse;
   const double air_rate = body * body * (sampled ? flow * p->reference_length * p->cn_r : c->air.damping[k]) * inverse;
@@ -342,8 +340,8 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_gravity_sine] = c->law.gravity[k] * inverse * cos(c->law.gravity_angle[k]);
   out[VWT_TERM_gravity_cosine] = c->law.gravity[k] * inverse * sin(c->law.gravity_angle[k]);
   out[VWT_TERM_friction] = c->friction.moment[k] * inverse;
-  out[VWT_TERM_shedding_sine] = body * c->law.shedding[k] * inverse * cos(c->law.phase[k]);
-  out[VWT_TERM_shedding_cosine] = body * c->law.shedding[k] * inverse * sin(c->law.phase[k]);
+  out[VWT_TERM_shedding_sine] = body * c->wake.shedding[k] * inverse * cos(c->law.phase[k]);
+  out[VWT_TERM_shedding_cosine] = body * c->wake.shedding[k] * inverse * sin(c->law.phase[k]);
   out[VWT_TERM_steepening_exponent] = law->steepening[k];
   out[VWT_TERM_thickening_exponent] = law->thickening[k];
   out[VWT_TERM_rate_exponent] = law->rate[k];
@@ -355,8 +353,8 @@ static void set_terms(const Law* law, int k, const vwt_run* run, double* out) {
   out[VWT_TERM_friction_peak_rate] = c->friction.peak_rate[k];
   out[VWT_TERM_friction_peak] = p->friction_peak;
   out[VWT_TERM_friction_load] = p->friction_load;
-  out[VWT_TERM_lag] = c->law.lag[k];
-  out[VWT_TERM_turn] = c->law.turn[k];
+  out[VWT_TERM_lag] = c->wake.lag[k];
+  out[VWT_TERM_turn] = c->wake.turn[k];
   out[VWT_TERM_pace] = log(run->step);
   out[VWT_TERM_start_angle] = run->angle;
   out[VWT_TERM_start_rate] = run->rate;
