@@ -150,7 +150,10 @@ class ReynoldsDependence(Effect):
     condition = "wind_on"
     size = "a Cnβ that changes by {per_e_fold} per e-fold of the wind speed"
     advice = "State Cnβ for every wind speed, or measure at the Reynolds number of interest"
-    equation = "Cnβ (1 + k ln(V/V0)) instead of Cnβ; V0: mean wind speed of the campaign's wind-on runs"
+    equation = (
+        "Cnβ (1 + k ln(V/V0)) instead of Cnβ; V0: mean wind speed of the campaign's wind-on runs, 20 m/s for a run "
+        "without a campaign"
+    )
     signature = (
         "The aerodynamic stiffness is not proportional to the square of the speed, and the damping is as "
         "without it."

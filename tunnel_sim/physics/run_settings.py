@@ -124,7 +124,6 @@ class RunSettings:
         mechanical_damping: Cr, N m s/rad.
         wind_speed: V, m/s; ignored where ``series`` gives it.
         air_density: ρ, kg/m³.
-        mean_speed: mean stated speed of the campaign's runs with the wind on, m/s.
         release_angle: rad, of the body.
         release_rate: rad/s; the rig itself releases from rest.
         duration, timestep: of the run, and of an integration step, s.
@@ -133,6 +132,7 @@ class RunSettings:
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient, and
             ``ambient``, a moment on the body that needs no wind, in N m.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
+        mean_speed: mean stated speed of the campaign's runs with the wind on, m/s.
     """
 
     spring_stiffness: float
@@ -141,7 +141,6 @@ class RunSettings:
     mechanical_damping: float
     wind_speed: float = 0.0
     air_density: float = 0.0
-    mean_speed: float = REFERENCE_SPEED
     release_angle: float = 0.0
     release_rate: float = 0.0
     duration: float = 10.0
@@ -151,6 +150,7 @@ class RunSettings:
     rod_twist: RodTwist | None = None
     program: tuple[float, ...] = ()
     drive: DriveMoment | None = None
+    mean_speed: float = REFERENCE_SPEED
 
     def __post_init__(self) -> None:
         """Check names and numbers. The plugin checks the bounds of the law's parameters."""

@@ -24,6 +24,7 @@ FIELDS = {
 
 #: Decisions that more than one function has to know: the reason why they are one.
 KNOWN_IN_SEVERAL = {
+    "patch_excused": "below it an unwritten part excuses the patched model, from it on a mean leaves a doubt",
     "rivals_from": "a rival is stated by its name, and in the sentence with its probability",
     "detection_rate": "the rate of the test is also what a campaign without a gap is said to have",
     "grown_from": "on whole runs and on stretches",

@@ -21,7 +21,7 @@ from tunnel_sim.physics.moment_law import state_names
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.004}
 STATED: dict[str, Any] = {
     "spring": 5,
-    "wind_speed": 20.0,
+    "wind_speed": 21.0,  # not the reference of speed-dependent forms
     "release_angle": 0.3,
     "truth": TRUTH,
     "effects": {},
