@@ -201,7 +201,7 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
         if answer.effects == UNKNOWN:
             answers.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
-        name = " + ".join(sorted({*study.beside, *answer.effects}))
+        name = " + ".join(sorted({*study.beside, *answer.effects} or _scatter(study)))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
         answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer, errors)))
     if not study.answers:
@@ -216,6 +216,12 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
     total = sum(candidate.probability for candidate in answers)
     first, *others = (replace(c, probability=c.probability / total) for c in answers)
     return (first, *sorted(others, key=lambda c: -c.probability))
+
+
+def _scatter(study: Study) -> set[str]:
+    """The chance differences that the runs may have: all that an answer without effects explains a gap by."""
+    windy = any(run.wind_on for run in study.campaign.runs)
+    return {kind.name for kind in known_effects() if kind.scatters and kind.acts(wind_on=windy)}
 
 
 def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:
