@@ -147,6 +147,13 @@ def _on_the_cut(
     elif piece.last < raw.cleaned.time_s.size:
         why = "with the motion or before the next run"
         remarks.append(ImportRemark(f"ends at {last} s, {why}", f"ends {why}"))
+    if piece.again:
+        again = clock_text(float(raw.cleaned.file_time_s[piece.again]))
+        remarks.append(
+            doubt(
+                f"a second release at {again} s, though the file names one run; --end {name}={again} ends it there"
+            )
+        )
     for level, samples in clipped(reading):
         until = clock_text(float(clock[samples[-1]]))
         cut = (

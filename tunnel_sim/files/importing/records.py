@@ -237,8 +237,9 @@ def _pieces(raw: RawRecord, choices: ImportChoices) -> list[RecordPiece]:
     if not raw.whole:
         return pieces
     runs = [piece for piece in pieces if not piece.doubt]
-    first = runs[0] if len(runs) == 1 else RecordPiece(0, 0)
-    return [RecordPiece(first.first, time.size, held=first.held)]
+    if len(runs) > 1:
+        return [RecordPiece(0, time.size, again=runs[1].first)]
+    return [RecordPiece(one.first, time.size, held=one.held) for one in runs] or [RecordPiece(0, time.size)]
 
 
 def _refusal(faults: Sequence[TunnelError]) -> TunnelError:

@@ -56,6 +56,7 @@ class RecordPiece:
         doubt: why it is left out, although the motion decays; empty: it is a run.
         held: by which a hand held the body after the largest reading, s; these samples are left out.
         stopped: whether something ends the motion before the record ends.
+        again: index of a second release within the run, where the file names it as one; 0: there is none.
     """
 
     first: int
@@ -63,6 +64,7 @@ class RecordPiece:
     doubt: str = ""
     held: float = 0.0
     stopped: bool = False
+    again: int = 0
 
 
 def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[RecordPiece]:

@@ -113,6 +113,18 @@ def test_a_run_that_a_plan_names_begins_where_the_body_is_released(tmp_path: Pat
     np.testing.assert_allclose(found.campaign.runs[1].record.yaw_rad, ANGLE, atol=1e-12)
 
 
+def test_a_second_release_in_a_run_that_a_plan_names_is_said(tmp_path: Path) -> None:
+    twice = np.concatenate([ANGLE, np.linspace(ANGLE[-1], ANGLE[0], 100), np.full(100, ANGLE[0]), ANGLE])
+    rows = [("t [s]", "yaw [rad]"), *zip(np.arange(twice.size) / 200.0, twice, strict=True)]
+    plan = [("Run", "Sheet", "Kr"), (7, "A", 16.12), (8, "B", 44.84)]
+    found = read_records([book(tmp_path, {"Plan": plan, "A": rows, "B": None})])
+    assert [run.id for run in found.campaign.runs] == ["7", "8"]
+    (said,) = (line for line in found.summary()[1] if "second release" in line)
+    time = float(said.partition("--end 7=")[2].split()[0])
+    assert said.startswith("7: ")
+    assert abs(time - (ANGLE.size + 200) / 200.0) < 0.05
+
+
 def test_sheets_of_one_layout_are_one_remark(tmp_path: Path) -> None:
     found = read_records([book(tmp_path, dict.fromkeys("ABCDE"))])
     (line,) = (line for line in found.remarks() if "workbook" in line)
