@@ -294,6 +294,9 @@ def doubts_of(part: ImportedRun, imported: Imported) -> tuple[str, ...]:
     followed = any(other.raw is part.raw and other.piece.first >= part.piece.last for other in imported.parts)
     if part.piece.stopped and not followed:
         found.append(f"something stops the body at {time[-1]:.2f} s; check the end")
+    if part.piece.again:
+        again = part.raw.cleaned.file_time_s[part.piece.again]
+        found.append(f"the body is released again at {again:.2f} s; move the end before it")
     if cut := clipped(part.reading):
         levels = " and ".join(f"{level:.3g}" for level, _ in cut)
         last = max(float(time[samples[-1]]) for _, samples in cut)

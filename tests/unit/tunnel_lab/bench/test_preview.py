@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -201,3 +202,11 @@ def test_a_page_speaks_of_fields_and_not_of_options() -> None:
         ("diagnose again with --effects-file", "diagnose again with --effects-file"),
     ):
         assert page_words(line) == words
+
+
+def test_a_second_release_in_a_run_that_a_file_names_is_to_be_judged(session: Session) -> None:
+    imported = preview.read(session)[0]
+    (part,) = imported.parts
+    named = replace(part, piece=replace(part.piece, again=1000))
+    (said,) = preview.doubts_of(named, imported)
+    assert said == "the body is released again at 5.00 s; move the end before it"
