@@ -54,7 +54,7 @@ def demo(
     stated. The records alone are then identified and diagnosed: the causes, their
     sizes, and the share of the gap that they explain on held-out runs. The report
     (report.html), the plan, the campaign, and both answers as JSON are written to
-    FOLDER. It takes 10 s of one processor core, and longer beside other work.
+    FOLDER. It takes 9 s on an idle server core, and longer beside other work.
 
     With --estimators, three estimators identify the paper's campaign, without
     faults, instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are shown
