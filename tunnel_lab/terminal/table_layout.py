@@ -95,7 +95,7 @@ def without_shared(table: TextTable) -> tuple[TextTable, str]:
     if len(table.rows) < 2:
         return table, ""
     cells = list(zip(*table.rows, strict=True))
-    kept = [at for at, column in enumerate(cells) if at == 0 or len(set(column) - {""}) > 1]
+    kept = [at for at, column in enumerate(cells) if at == 0 or len(set(column)) > 1]
     shared = [
         f"{_on_one_line(table.columns[at])} {_on_one_line(max(column))}"
         for at, column in enumerate(cells)

@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from identification.show.blocks import Paragraph
+from identification.show.blocks import Paragraph, TextTable
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
 from tests.support.gone_reader import unheard
 from tunnel_lab.terminal.outputs import say_written, show
+from tunnel_lab.terminal.table_layout import without_shared
 
 ROOT = Path(__file__).parents[4]
 
@@ -135,3 +136,11 @@ def test_a_folder_is_refused_before_the_work(tunnel: Tunnel, tmp_path: Path, com
     status, out, err = tunnel(*words, "--json", tmp_path)
     assert (status, out) == (2, "")
     assert err == f"tunnel: {tmp_path}: is a folder, not a file; name a file\n"
+
+
+def test_a_column_with_an_empty_cell_is_not_said_of_all_rows() -> None:
+    table = TextTable("Runs", ("run", "note", "rate"), (("a", "odd", "100 Hz"), ("b", "", "100 Hz")))
+    narrow, shared = without_shared(table)
+    assert narrow.columns == ("run", "note")
+    assert narrow.rows == (("a", "odd"), ("b", ""))
+    assert shared == "In all rows: rate 100 Hz"
