@@ -277,8 +277,7 @@ class Estimate:
             given = document[name]
             row: dict[str, Any] = {"quantity": name}
             if given is not None:
-                reach = 1.96 * given["std"]
-                low, high = given.get("interval") or (given["value"] - reach, given["value"] + reach)
+                low, high = getattr(self, name).ends
                 row |= {key: given[key] for key in ("value", "std", "unit")} | {"low": low, "high": high}
             rows.append(row)
         numbers = dict.fromkeys(("value", "std"), pl.Float64)

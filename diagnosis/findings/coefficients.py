@@ -27,8 +27,8 @@ from identification.show.numbers import (
     unit_mark,
     with_std,
 )
-from identification.show.quantity import Quantity
-from identification.show.style import INTERVAL, figure, grid, styled
+from identification.show.quantity import INTERVAL, Quantity
+from identification.show.style import figure, grid, styled
 from tunnel_sim.effects.base import Effect
 from tunnel_sim.effects.registry import effect_class, known_effects
 from tunnel_sim.vocabulary.dimensions import beside
@@ -125,11 +125,9 @@ def _interval(given: Quantity | None) -> str:
     """The central interval of 0.95, with as many digits as its width allows."""
     if given is None or not given.std:
         return "–"
-    reach = 1.96 * given.std
-    width = with_std(given.value, reach).partition("± ")[2]
+    width = with_std(given.value, INTERVAL * given.std).partition("± ")[2]
     places = len(width.partition(".")[2]) if width.replace(".", "").isdigit() else None
-    ends = given.interval or (given.value - reach, given.value + reach)
-    return " to ".join(significant(end) if places is None else f"{end:.{places}f}" for end in ends)
+    return " to ".join(significant(end) if places is None else f"{end:.{places}f}" for end in given.ends)
 
 
 SOURCES = {

@@ -17,7 +17,8 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from identification.show.drawing import AFTER, INK, NARROW, PAPER
 from identification.show.numbers import plain, unit_mark
-from identification.show.style import INTERVAL, figure, grid, log_axis, styled
+from identification.show.quantity import INTERVAL
+from identification.show.style import figure, grid, log_axis, styled
 from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.files.writing import as_json

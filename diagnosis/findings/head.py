@@ -34,7 +34,7 @@ from identification.show.numbers import (
     to_interval,
     unit_mark,
 )
-from identification.show.quantity import Quantity
+from identification.show.quantity import INTERVAL, Quantity
 from tunnel_sim.vocabulary.dimensions import beside
 
 
@@ -244,7 +244,7 @@ def _coefficient(one: Quantity, before: Quantity | None) -> str:
     unit = "" if one.unit in ("1", "1/rad") else unit_mark(beside(one.unit))
     if before is None or not before.determined:
         return f"{text}{unit}"
-    change, reach = abs(before.value - one.value), 1.96 * (one.std or 0.0)
+    change, reach = abs(before.value - one.value), INTERVAL * (one.std or 0.0)
     if change <= max(reach, _UNCHANGED * abs(one.value)):
         return f"{text}{unit}, unchanged"
     return f"{text}{unit} instead of {before.value:.{places}f}"

@@ -313,6 +313,5 @@ def _becomes(name: str, given: Quantity, part: float) -> str:
 
 def reach_of(given: Quantity) -> float:
     """Half the width of the 95 % interval, in the coefficient's unit."""
-    if given.interval is not None:
-        return 0.5 * (given.interval[1] - given.interval[0])
-    return 1.96 * (given.std or 0.0)
+    low, high = given.ends
+    return 0.5 * (high - low)

@@ -23,9 +23,9 @@ from identification.show.drawing import (
     colour_bar,
     faded,
 )
+from identification.show.quantity import INTERVAL
 from identification.show.style import (
     COLOURS,
-    INTERVAL,
     MARKERS,
     figure,
     figure_text,

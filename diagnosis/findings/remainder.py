@@ -38,7 +38,8 @@ from identification.show.numbers import (
     unit_shown,
     with_std,
 )
-from identification.show.style import INTERVAL, figure, grid, styled
+from identification.show.quantity import INTERVAL
+from identification.show.style import figure, grid, styled
 from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 

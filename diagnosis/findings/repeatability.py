@@ -20,8 +20,8 @@ from diagnosis.settings.words import WordsSettings
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
 from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std
-from identification.show.quantity import Quantity
-from identification.show.style import INTERVAL, figure, figure_text, grid, styled
+from identification.show.quantity import INTERVAL, Quantity
+from identification.show.style import figure, figure_text, grid, styled
 from identification.status import SYSTEMATIC
 from tunnel_sim.vocabulary.quantities import Share
 

@@ -12,8 +12,8 @@ from diagnosis.findings.judged import Judged
 from identification.show.blocks import Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
 from identification.show.numbers import estimated, listed, significant, with_std
-from identification.show.quantity import Quantity
-from identification.show.style import INTERVAL, figure, grid, styled
+from identification.show.quantity import INTERVAL, Quantity
+from identification.show.style import figure, grid, styled
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 
 if TYPE_CHECKING:
@@ -111,9 +111,7 @@ def _times(given: Quantity, factor: float) -> Quantity:
 
 def _ends(given: Quantity) -> tuple[float, float] | None:
     """Ends of the 95 % interval, N m; None where it is not known."""
-    if given.interval is not None or given.std is None:
-        return given.interval
-    return given.value - INTERVAL * given.std, given.value + INTERVAL * given.std
+    return given.interval if given.std is None else given.ends
 
 
 def _shown(given: Quantity) -> str:

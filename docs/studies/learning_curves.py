@@ -26,7 +26,8 @@ from gymnasium.wrappers.vector import NormalizeObservation
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_agent import CAMPAIGNS, TRAINING, make, model_of
 from docs.studies.campaign_policies import replaced
-from identification.show.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, save, styled
+from identification.show.quantity import INTERVAL
+from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, save, styled
 from tunnel_lab.envs.excitation import Resonant
 from tunnel_lab.envs.policies import greedy, scripted, trained
 from tunnel_sim.files.writing import write_whole

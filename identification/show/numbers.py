@@ -334,10 +334,7 @@ def to_interval(given: Quantity) -> tuple[str, int]:
     Returns:
         Text such as ``0.432 ± 0.013``, or ``0.43 (0.41 to 0.46)`` for an interval that is not symmetric.
     """
-    low, high = given.interval or (
-        given.value - 1.96 * (given.std or 0.0),
-        given.value + 1.96 * (given.std or 0.0),
-    )
+    low, high = given.ends
     reach = 0.5 * (high - low)
     last = (
         max(_exponent(reach, 2) - 1, _exponent(given.value, 4) - 3)

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
     from pydantic import ConfigDict
 
+INTERVAL = 1.96
+"""Standard deviations on either side of a 95 % interval."""
 _FINITE: ConfigDict = {"allow_inf_nan": False}
 
 
@@ -53,6 +55,12 @@ class Quantity(AsNumber):
     bound: str | None = None
     determined: bool = True
     shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The ends of the 95 % interval, in ``unit``; both the value where its deviation is not known."""
+        reach = INTERVAL * (self.std or 0.0)
+        return self.interval or (self.value - reach, self.value + reach)
 
     @property
     def known_std(self) -> float:

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 WIDTH = 7.2
 """Width of a figure that fills a page, inches."""
-INTERVAL = 1.96
-"""Standard deviations on either side of a 95 % interval."""
 _FEW_DECADES = 2.5
 _STEPS = ((1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
 _DIGIT, _POWER = 0.075, 0.24  # inches: a digit of a label, and a label such as 10² with the gap after it

@@ -16,10 +16,10 @@ from identification.estimate import Estimate, WindowEstimate
 from identification.neural.networks import Networks, held_out_points, shipped_networks
 from identification.neural.three_cycles import cycles_time, network_inputs
 from identification.show.numbers import concise, significant
+from identification.show.quantity import INTERVAL
 from identification.show.style import (
     BLUE,
     COLOURS,
-    INTERVAL,
     MARKERS,
     VERMILION,
     WIDTH,

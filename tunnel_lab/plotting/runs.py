@@ -14,11 +14,10 @@ import numpy as np
 
 from identification.printing import SYMBOLS
 from identification.show.numbers import unit_mark
-from identification.show.quantity import Quantity
+from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import (
     BLUE,
     COLOURS,
-    INTERVAL,
     MARKERS,
     VERMILION,
     WIDTH,
