@@ -300,7 +300,7 @@ def with_forms(
             gained = (fit for fit in parts if fit is not None)
             start = min(gained, key=lambda fit: fit.total, default=textbook)
             tried[forms] = freed = _free_forms(start, forms)
-            if freed is None:
+            if freed is None or (parts and not _explains_more(freed, start)):
                 continue
             needed = _needed(freed, forms, chosen.form_needed * textbook.excess * textbook.count)
             if needed and needed != forms:
@@ -394,7 +394,7 @@ def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
 
     Where the noise is overestimated, a wrong form may leave less than the noise as a whole.
     """
-    by_effect, weighing, best = _forms_by_effect(fitted), fitted.settings.weighing, _first_forms(fitted)
+    by_effect, best = _forms_by_effect(fitted), _first_forms(fitted)
 
     def total(forms: tuple[Form, ...]) -> float:
         freed = _free_forms(fitted, forms)
@@ -406,10 +406,24 @@ def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
     for place, forms in enumerate(by_effect):
         for form in forms[1:]:
             tried = (*best[:place], form, *best[place + 1 :])
-            gain = fitted.settings.search.form_needed * (least - fitted.count)
-            if (left := total(tried)) < least - max(gain, weighing.needless_chi2):
+            if (left := total(tried)) < _worth_a_form(fitted, least):
                 best, least = tried, left
     return best
+
+
+def _worth_a_form(fitted: Fit, least: float) -> float:
+    """χ² below which another form explains more than chance, and much of what is left, dimensionless.
+
+    Args:
+        least: χ² with the forms so far.
+    """
+    gain = fitted.settings.search.form_needed * (least - fitted.count)
+    return least - max(gain, fitted.settings.weighing.needless_chi2)
+
+
+def _explains_more(together: Fit, alone: Fit) -> bool:
+    """Whether forms together explain more than the part of them that gains most."""
+    return together.total < _worth_a_form(alone, alone.total)
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -17,6 +18,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.patch.native_friction import Carried, native_friction
 from diagnosis.search import hypothesis
 from diagnosis.search.hypothesis import Hypothesis, _choices, with_forms
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.robot_joints import LEVEL, MOTOR, NOISE, RATE, TIME, multisine, robot
 from tests.support.gap_campaigns import campaign, nominal
@@ -84,6 +86,16 @@ def test_forms_together_are_tried_where_the_first_gains_alone_and_from_there(mon
     gains = True
     with_forms([Hypothesis(("gravity_stiffness", "coulomb_friction"), found)], gap, 0.0)
     assert any(tried)  # the last from a fit that has a form
+
+
+@pytest.mark.parametrize(
+    ("alone", "together", "kept"),
+    [(26e6, 25.9e6, False), (26e6, 5e6, True), (1030.0, 1015.0, False), (1030.0, 1005.0, True)],
+    ids=["a little of a large gap", "most of it", "chance", "more than chance"],
+)
+def test_forms_together_are_kept_where_they_explain_much_more_than_one(alone, together, kept):
+    one = SimpleNamespace(total=alone, count=1000, settings=Settings())
+    assert hypothesis._explains_more(SimpleNamespace(total=together), one) == kept
 
 
 def test_the_patch_adds_what_gravity_adds_and_leaves_out_what_a_drive_does():
