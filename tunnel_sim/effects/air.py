@@ -170,6 +170,21 @@ class ReynoldsDependence(Effect):
         scale=0.05, lower=-5.0, upper=5.0, relative=True,
     )  # fmt: skip
 
+    def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """The coefficient at the mean speed depends on the form between the speeds of the runs.
+
+        A power law and a change that saturates within half an e-fold are fitted as the logarithm is, with weights
+        as of the moments. The truth may be between either of them and the logarithm: a rectangular half-width.
+        """
+        if len(runs) < 2:
+            return 0.0, 0.0
+        moment = np.array([run.per_cn_beta for run in runs])
+        speed = moment / np.array([run.per_cn_r for run in runs])
+        folds = np.log(speed / np.mean(speed))
+        forms = np.expm1(self.per_e_fold * folds), self.per_e_fold * 0.5 * np.tanh(folds / 0.5)
+        at_mean = np.polyfit(folds, np.stack(forms, axis=1), 1, w=moment)[1]
+        return float(np.max(np.abs(at_mean))) * abs(cn_beta) / sqrt(3.0), 0.0
+
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
         """None with one wind speed, whose Cnβ it leaves as it is."""

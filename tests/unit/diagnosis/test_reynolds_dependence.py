@@ -5,11 +5,12 @@ from __future__ import annotations
 from itertools import product
 from math import log, radians
 
+import numpy as np
 import pytest
 
 from diagnosis import diagnose
 from tunnel_sim.effects import effect_class, effect_from
-from tunnel_sim.effects.parameters import Circumstances
+from tunnel_sim.effects.parameters import Circumstances, WindOnRun
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, simulate_campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 
@@ -75,3 +76,19 @@ def test_one_speed_cannot_show_it(speeds):
         )
         == ()
     )
+
+
+@pytest.mark.parametrize("rate", [0.3, -0.3])
+def test_the_form_between_two_speeds_counts_in_the_coefficient_at_the_mean(rate):
+    """Closed form: a line through a power law at x1 and x2 misses it at 0 by k² |x1 x2|/2 to second order."""
+    speeds = np.array([15.0, 25.0])
+    runs = [WindOnRun(16.0, 12.0, 13.0, 0.0135 * speed**2, 0.0085 * speed) for speed in speeds]
+    of_beta, of_r = effect_from("reynolds_dependence", {"per_e_fold": rate}).unseen_form(0.47, runs)
+    first, second = np.log(speeds / 20.0)
+    assert of_beta == pytest.approx(0.47 * 0.5 * rate**2 * abs(first * second) / np.sqrt(3.0), rel=0.1)
+    assert of_r == 0.0
+
+
+def test_one_run_has_no_form_between_speeds():
+    run = WindOnRun(16.0, 12.0, 13.0, 5.4, 0.17)
+    assert effect_from("reynolds_dependence", {"per_e_fold": 0.3}).unseen_form(0.47, [run]) == (0.0, 0.0)
