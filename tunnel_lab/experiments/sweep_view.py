@@ -18,6 +18,7 @@ import polars as pl
 from identification.scoring import Score, score
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import concise, significant, unit
+from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
 from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text, trials_of
@@ -30,7 +31,7 @@ from tunnel_sim.vocabulary.text_cells import as_text_cell
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from identification.show.quantity import INTERVAL, Quantity
+    from identification.show.quantity import Quantity
 
 
 OVERALL = "all"
