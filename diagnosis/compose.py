@@ -215,10 +215,8 @@ def _caveats(
     named: _Named,
 ) -> tuple[Fact, ...]:
     """All caveats of an answer, in the order in which they are listed."""
-    noise, data, settings = study.prepared.noise, study.campaign, study.settings
-    of_answer = cautions(
-        data, noise, closes.gap.runs, closes.confirmation, named=study.named, settings=settings
-    )
+    noise, data = study.prepared.noise, study.campaign
+    of_answer = cautions(data, noise, closes.gap.runs, closes.confirmation, named=study.named)
     zeros = zeros_apart(study) if named.unsure else ()
     return (
         *chosen.left_out,
@@ -285,12 +283,12 @@ def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFo
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(survey, chosen.interval_share, chosen) or survey.time_interval,
+        time_s=blow_interval(survey, chosen.interval_share) or survey.time_interval,
         amplitude_rad=survey.amplitude_interval,
         frequency_hz=survey.frequency_interval,
     )
     kinds, scattering = [effect_class(name) for name in compared], bool(study.scattering)
-    said = described(where, place, kinds, study.settings, scattering=scattering, explained=explained)
+    said = described(where, place, kinds, chosen, scattering=scattering, explained=explained)
     return where, maps, said
 
 
@@ -341,7 +339,7 @@ def _named(
         ),
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
         rest=rest,
-        immaterial={} if material else immaterial(before, after, settings.words),
+        immaterial={} if material else immaterial(before, after),
     )
 
 
@@ -468,7 +466,7 @@ def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
     """Second modes of single runs, where a set with one was weighed: only then its share of the gap is known."""
     modes = {kind.name for kind in known_effects() if kind.line == "ringing"}
     tried = any(modes.intersection(answer.effects) for answer in study.answers)
-    return second_modes(chosen.campaign, study.settings.words) if tried else ()
+    return second_modes(chosen.campaign) if tried else ()
 
 
 def _from_outside(study: Study) -> tuple[Fact, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,26 @@ from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.record import Array
+
+SMALL_CAUSES: Final = 3
+"""Maximum number of unnamed small causes considered together, in effects. Judgement (decision 0028). Time
+against coverage."""
+SMALL_CAUSES_TRIED: Final = 8
+"""Number of effects in the sets of small causes: those that lower χ² most individually. Judgement (decision
+0028). Time against coverage."""
+MISFIT_DEGREES: Final = 6.0
+"""Effective degrees of freedom of the error of a real model. Judgement (decision 0028). One for every channel
+of the residuals."""
+DISPERSION_STDS: Final = 2.0
+"""Margin of χ² of the campaign over its expectation that counts as chance, where the misfit is treated as
+noise, in standard deviations. Convention."""
+SCATTER_STDS: Final = 2.0
+"""Margin of χ² of the campaign over its expectation that counts as chance, for the scatter of the runs, in
+standard deviations. Convention."""
+MOVE_STDS: Final = 2.0
+"""Maximum chance difference between the two halves of the data, in standard deviations. Convention."""
+LEAST_HALF: Final = 0.1
+"""Minimum share of the information on a coefficient in each half of the data. Judgement."""
 
 _DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
 _SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
@@ -79,7 +100,6 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
         The move in the quantity's unit, less the contribution of noise (2 standard deviations, in quadrature);
         0 where noise explains it.
     """
-    chosen = fit.settings.answer
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     # the remaining step of the fit itself
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
@@ -109,10 +129,10 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
         middle = order[rank[min(at, rank.size - 1)]]
         for low in (order < middle, order <= middle):  # runs of equal order are not divided
             share = float(weight[low].sum()) / max(total, 1e-300)
-            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half has no information
+            if LEAST_HALF < share < 1.0 - LEAST_HALF:  # else one half has no information
                 both = 2.0 * share * (1.0 - share)
                 moved = float(pull[low].sum()) / both
-                chance = chosen.move_stds**2 * total / (2.0 * both)
+                chance = MOVE_STDS**2 * total / (2.0 * both)
                 found = max(found, math.sqrt(max(moved**2 - chance, 0.0)))
     return found
 
@@ -229,17 +249,17 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     zero = np.zeros(formal.size)
     steps_taken = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
     tried = np.argsort(-(score**2) / np.maximum(np.diag(gram), 1e-300), kind="stable")[
-        : settings.small_causes_tried
+        :SMALL_CAUSES_TRIED
     ].tolist()
-    sizes = range(1, settings.small_causes + 1)
+    sizes = range(1, SMALL_CAUSES + 1)
     sets = [list(chosen) for size in sizes for chosen in combinations(tried, size)]
     steps = (_step(gram, score, causes, chosen, settings.small_form_std) for chosen in sets)
     steps_taken += [step for step in steps if step is not None]
     excess = fit.total - fit.count - np.array([step.drop for step in steps_taken])
     price = settings.small_cause_price * np.array([np.count_nonzero(step.sizes) for step in steps_taken])
     best = float(excess[np.argmin(excess + price)])
-    beyond = max(best - settings.dispersion_stds * math.sqrt(2.0 * fit.count), 0.0)
-    odds = -0.5 * (excess / (1.0 + beyond / settings.misfit_degrees) + price)
+    beyond = max(best - DISPERSION_STDS * math.sqrt(2.0 * fit.count), 0.0)
+    odds = -0.5 * (excess / (1.0 + beyond / MISFIT_DEGREES) + price)
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
     mean_sizes = weights @ np.array([step.sizes for step in steps_taken])
@@ -328,7 +348,7 @@ def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     """Standard deviations from the scatter of the runs; 0 where chance explains the residual."""
     names, runs = coefficients_of(fit), fit.problem.data.runs
     excess = sum(float(residual @ residual) for residual in residuals) - fit.count
-    if excess <= fit.settings.answer.scatter_stds * math.sqrt(2.0 * fit.count):
+    if excess <= SCATTER_STDS * math.sqrt(2.0 * fit.count):
         return np.zeros(len(names))
     windy = sum(run.wind_on for run in runs)
     informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -30,6 +30,13 @@ from tunnel_sim.vocabulary.dimensions import beside
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+ANSWERS_LISTED: Final = 6
+"""Maximum number of answers in a table. Judgement."""
+ANSWER_LISTED: Final = 0.005
+"""Minimum probability of an answer in a table. Judgement."""
+ANSWER_DRAWN: Final = 0.01
+"""Minimum probability of an answer in the charts of the report. Judgement."""
+
 
 def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     """The answers of a document, the most probable first.
@@ -44,8 +51,8 @@ def candidates_table(
     candidates: Sequence[Candidate], repeated: RunRepeatability, judged: Judged
 ) -> TextTable:
     """The answers considered and their shares of the gap, most probable first; a last row counts the others."""
-    rows, given, chosen = [], ranked(candidates), judged.settings.words
-    probable = [c for c in given[: chosen.answers_listed] if c.probability >= chosen.answer_listed]
+    rows, given = [], ranked(candidates)
+    probable = [c for c in given[:ANSWERS_LISTED] if c.probability >= ANSWER_LISTED]
     shown = probable or given[:1]
     for candidate in shown:
         fitted = candidate.effect not in ("none", "unknown")
@@ -116,10 +123,9 @@ _LABEL = 24  # characters in a line of a label
 
 
 @styled
-def candidates_figure(candidates: Sequence[Candidate], judged: Judged) -> Figure | None:
+def candidates_figure(candidates: Sequence[Candidate]) -> Figure | None:
     """The answers that are not improbable; None for fewer than two, where words suffice."""
-    least = judged.settings.words.answer_drawn
-    shown = [c for c in ranked(candidates)[:SHOWN] if c.probability >= least]
+    shown = [c for c in ranked(candidates)[:SHOWN] if c.probability >= ANSWER_DRAWN]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(answer_name(candidate.effect)), _LABEL) for candidate in shown]

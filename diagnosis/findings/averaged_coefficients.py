@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
@@ -33,6 +34,12 @@ from identification.statistics import density_rounding
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+
+SKEWED_FROM: Final = 0.1
+"""Deviation of the ends of the interval from those of a normal distribution above which the interval is
+stated, in standard deviations. Judgement."""
+SMALL_CAUSES_FROM: Final = 0.05
+"""Minimum probability of an answer for small causes beside it. Judgement."""
 
 _REACH = 8.5  # standard deviations beyond which a normal distribution has no probability in 64 bits
 _MOST_STEPS = 500
@@ -141,7 +148,6 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     """
     chosen = study.stated
     even = study.settings.weighing.even_share / max(len(study.answers), 1)
-    least = study.settings.answer.small_causes_from
     others, probability_of_answer, unknown = [], 1.0, 0.0
     for place, answer in enumerate(study.answers):
         probability, fit = max(answer.probability - even, 0.0), answer.fit(study.nominal)
@@ -150,7 +156,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
-            small = beside(fit, starts_beside(fit, kinds)) if probability >= least else None
+            small = beside(fit, starts_beside(fit, kinds)) if probability >= SMALL_CAUSES_FROM else None
             share, alternatives = _by_choice(answer, fit, probability, kinds)
             others += [Possible(probability * share, fit, answer.textbook_of(fit), small), *alternatives]
     answer = study.answer or Answer((), 1.0, 1.0)
@@ -357,7 +363,7 @@ class Central:
         reach = 0.5 * (high - low)
         std = reach / float(ndtri(1.0 - tail))
         skew = max(abs(low - middle + reach), abs(high - middle - reach))
-        return cls(middle, std, (low, high) if skew > chosen.skewed_from * std else None)
+        return cls(middle, std, (low, high) if skew > SKEWED_FROM * std else None)
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, Quantity]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -29,6 +29,10 @@ from tunnel_sim.effects import known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.vocabulary.record import Array
+
+UNDETERMINED_FROM: Final = 10.0
+"""Ratio of the standard deviation to the value and the typical size of a parameter above which it is not
+determined. Judgement. Even its order of magnitude is then unknown."""
 
 
 @dataclass(frozen=True)
@@ -267,8 +271,7 @@ def _parameters(
             further = errors.get(name, 0.0) if fit is study.chosen else 0.0
             std = None if bound else math.hypot(fit.std(name) * inflate, further)
             given = Quantity(fit.value(name), std, infos[name].unit, bound=bound)
-            undetermined = study.settings.answer.undetermined_from
-            estimates[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
+            estimates[name] = meant_parameter(given, infos[name], problem.data.swing, UNDETERMINED_FROM)
         for one in problem.scatter:
             if one.shown:
                 spread = one.kind.parameters()[0]

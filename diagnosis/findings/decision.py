@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from diagnosis.settings import AnswerSettings
 from identification.show.numbers import share
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
+
+PREDICTED_FROM: Final = 0.1
+"""Minimum share of the gap on held-out readings that a decided answer must explain. Judgement. An answer that
+predicts less is fitted to chance."""
+LEFT_OF_SWING: Final = 0.1
+"""Maximum root mean square residual of a decided answer, as a share of that of the readings about their mean.
+Judgement. A model that misses a tenth of the motion lacks a part of it."""
+IN_COMMON: Final = 0.9
+"""Minimum probability of an effect or a channel that is common to the likely answers. Convention."""
 
 
 @dataclass(frozen=True)
@@ -70,17 +79,17 @@ class Predictions:
     left: float | None = None
     elsewhere: bool = False
 
-    def doubts(self, chosen: AnswerSettings) -> tuple[Doubt, ...]:
+    def doubts(self) -> tuple[Doubt, ...]:
         """The reasons not to decide on the answer, the most basic first."""
         shares = {"held out": self.held_out, "ahead": self.ahead, "patched": self.patched}
         found = [
             Doubt(kind, explained)
             for kind, explained in shares.items()
-            if explained is not None and explained < chosen.predicted_from
+            if explained is not None and explained < PREDICTED_FROM
         ]
         if self.untested is not None:
             found.append(Doubt("untested", self.untested))
-        if self.left is not None and self.left > chosen.left_of_swing:
+        if self.left is not None and self.left > LEFT_OF_SWING:
             found.append(Doubt("left", self.left))
         if self.elsewhere:
             found.append(Doubt("elsewhere", None))
@@ -149,16 +158,16 @@ def decision(
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
     first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
-    doubts = predictions.doubts(chosen) if probable and names_effects else ()
+    doubts = predictions.doubts() if probable and names_effects else ()
     return Decision(
         decided=probable and not doubts,
         unpredictive=first if doubts else "",
         doubts=doubts,
         credible=tuple(credible),
-        effects=_common(causes, chosen.in_common),
+        effects=_common(causes, IN_COMMON),
         channels=_common(
             [({channel_of[name] for name in names & proper}, value) for names, value in causes],
-            chosen.in_common,
+            IN_COMMON,
         ),
     )
 

@@ -14,10 +14,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from diagnosis.answer.linear_theory import (
+    DISPERSION_STDS,
+    MISFIT_DEGREES,
     Starts,
     coefficients_of,
     influences,
@@ -35,6 +38,13 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import own_gain
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.record import Array
+
+HIDDEN_STDS: Final = 2.0
+"""Distance of the upper limit of an undetected effect from its most probable size, in standard deviations.
+Convention."""
+HIDDEN_ABSORBED: Final = 0.0001
+"""Unabsorbed share of a change below which the runs do not show the effect. Judgement. The accuracy of linear
+theory."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +84,9 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     Returns:
         In the given order, without effects that the runs cannot show.
     """
-    chosen = fit.settings.answer
     total = fit.total if left is None else sum(float(r @ r) for r in left)
-    beyond = max(total - fit.count - chosen.dispersion_stds * np.sqrt(2.0 * fit.count), 0.0)
-    reach = chosen.hidden_stds**2 * (1.0 + beyond / chosen.misfit_degrees)
+    beyond = max(total - fit.count - DISPERSION_STDS * np.sqrt(2.0 * fit.count), 0.0)
+    reach = HIDDEN_STDS**2 * (1.0 + beyond / MISFIT_DEGREES)
     names, influence = coefficients_of(fit), influences(fit)
     hidden, units = [], fit.problem.data.model.coefficient_units
     for kind, points in starts:
@@ -99,7 +108,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
                 name: Quantity(float(abs(move)), None, units[name])
                 for name, move in zip(names, largest.moves, strict=True)
             }
-            stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one, _ in sizes) / reach))
+            stds = HIDDEN_STDS * float(np.sqrt(max(one.drop for one, _ in sizes) / reach))
             hidden.append(Hidden(kind.name, severity.name, size, moves, stds))
     return tuple(hidden)
 
@@ -204,11 +213,11 @@ def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: 
     """
     if start.scaled is None:
         return None
-    found, least = None, fit.settings.answer.hidden_absorbed
+    found = None
     for number in range(_ROUNDS if start.second_order else 1):
         size = float(start.point.common[start.scaled])
         # at a trial's size, a small share means that the runs cannot show the effect; later the size is small
-        found = _within(fit, start, influence, reach, least if number == 0 else 0.0)
+        found = _within(fit, start, influence, reach, HIDDEN_ABSORBED if number == 0 else 0.0)
         if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
             break
         common = start.point.common.copy()

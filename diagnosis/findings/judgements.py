@@ -4,21 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.findings.closure import Confirmation, RunGap
+from diagnosis.findings.reported import INTEGRATOR_TOLERANCE
 from diagnosis.findings.terms import MISFITS
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import Settings, WordsSettings
 from identification.show.numbers import plain, probability, share
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
+
+RUNS_WITHOUT_CAUTION: Final = 3
+"""Number of runs below which a caution is given. Judgement."""
+NOISE_CONTRADICTED: Final = 3.0
+"""Error factor of the stated noise above which a caution is given. Judgement. Rounding to one digit can cause
+half of it."""
+SAME_RELEASE: Final = 1.1
+"""Maximum ratio of the largest to the smallest swing of runs of one release amplitude. Judgement. Releases by
+hand to one mark scatter by a few per cent."""
+NEARLY_EXPLAINS: Final = 0.8
+"""Minimum share of an unexplained gap that effects must explain to be mentioned. Judgement."""
+NEARLY_ALIKE: Final = 0.02
+"""Maximum shortfall of a rival that explains as much. Judgement."""
+NEARLY_RIVAL: Final = 0.5
+"""Minimum probability of that rival, relative to the mentioned effects, to be the reason for naming none.
+Judgement."""
+NEARLY_MISFIT_STDS: Final = 2.0
+"""Margin of χ² of a channel over its expectation above which its misfit is the reason for naming none, in
+standard deviations. Convention."""
+IMMATERIAL: Final = 0.01
+"""Maximum relative change of the coefficients by an immaterial gap. Convention. Derivatives are quoted to one
+per cent."""
+ZEROS_CLOSE: Final = 0.5
+"""Minimum share of an unexplained gap that a zero per run must explain to be mentioned. Convention. Most of
+it."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +95,6 @@ def cautions(
     confirmation: Confirmation,
     *,
     named: bool,
-    settings: Settings,
 ) -> tuple[Fact, ...]:
     """The caveats of an answer.
 
@@ -78,18 +103,18 @@ def cautions(
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
-    facts, chosen = [], settings.words
+    facts = []
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
         facts.append(Fact("one spring assumed"))
-    facts += noise.cautions(chosen.noise_contradicted)
+    facts += noise.cautions(NOISE_CONTRADICTED)
     if confirmation.failure:
         facts.append(Fact("not followed", {"failure": confirmation.failure}))
     elif not confirmation.agrees:
         figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
-        beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
+        beside = {"run": confirmation.run, "tolerance": INTEGRATOR_TOLERANCE}
         facts.append(Fact("not confirmed", figures | beside))
     windy = any(run.wind_on for run in campaign.runs)
-    if len(campaign.runs) < chosen.runs_without_caution:
+    if len(campaign.runs) < RUNS_WITHOUT_CAUTION:
         kind = {"driven": campaign.driven, "windy": windy}
         facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]
@@ -125,7 +150,7 @@ def one_amplitude(study: Study) -> tuple[Fact, ...]:
         return ()
     conditions = {(run.spring_stiffness, run.wind_speed) for run in runs}
     releases = [float(np.max(np.abs(run.reading - np.median(run.reading)))) for run in runs]
-    if len(conditions) > 1 or max(releases) > study.settings.words.same_release * min(releases):
+    if len(conditions) > 1 or max(releases) > SAME_RELEASE * min(releases):
         return ()
     return (Fact("one amplitude", {"parameters": names}),)
 
@@ -140,40 +165,37 @@ def zeros_apart(study: Study) -> tuple[Fact, ...]:
     whole = float(sum(left @ left - left.size for left in nominal.residuals))
     by_chance = float(chdtrc(means.size, means.sum()))
     share = float(means.sum() - means.size) / whole if whole > 0.0 else 0.0
-    if len(means) < 2 or by_chance >= chosen.zeros_rate or share < chosen.zeros_close:
+    if len(means) < 2 or by_chance >= chosen.zeros_rate or share < ZEROS_CLOSE:
         return ()
     return (Fact("zeros apart", {"share": min(share, 1.0)}),)
 
 
 def nearly(study: Study) -> Nearly | None:
     """The effects that explain most of a gap without being named; None where there are none."""
-    chosen = study.settings.words
     sets = [answer for answer in study.answers if answer.effects not in ((), UNKNOWN)]
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
-    if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - NEARLY_EXPLAINS:
         return None
     found = Nearly(first.effects, 1.0 - first.share, first.probability)
     if study.gap.test.noisy and first.probability == 0.0:
         return replace(found, noisy=True)
-    alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
+    alike = [a for a in sets if a is not first and a.share <= first.share + NEARLY_ALIKE]
     rival = max(alike, key=lambda answer: answer.probability, default=None)
-    if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
+    if rival is not None and rival.probability >= NEARLY_RIVAL * first.probability:
         return replace(found, rival=rival.effects, rival_probability=rival.probability)
     fitted = first.hypothesis
     if fitted is None:
         return found
-    chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
+    chance = NEARLY_MISFIT_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
     left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]
     return replace(found, misfit=tuple(left))
 
 
-def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> dict[str, float]:
+def immaterial(before: Estimates, after: Estimates) -> dict[str, float]:
     """By coefficient, the relative change by the causes; empty where any change is material."""
     known = {name: given for name, given in after.items() if given.std and given.value and name in before}
     moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
-    limits = {
-        name: min(chosen.immaterial * abs(given.value), given.std or 0.0) for name, given in known.items()
-    }
+    limits = {name: min(IMMATERIAL * abs(given.value), given.std or 0.0) for name, given in known.items()}
     if any(moves[name] > limit for name, limit in limits.items()):
         return {}
     return {name: moves[name] / abs(given.value) for name, given in known.items()}

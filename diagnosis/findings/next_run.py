@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -14,11 +15,14 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
-from diagnosis.settings import AnswerSettings
 from identification.show.numbers import reading_shown
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
+
+SEPARATED_BY: Final = 3.0
+"""Minimum difference between two answers for a run to distinguish them, in standard deviations. Convention.
+Odds of about 100:1."""
 
 _ANGLES = (1.0, 0.4)  # of the largest swing of the runs
 _DURATIONS = (10.0, 30.0)  # s
@@ -83,9 +87,9 @@ class NextRun:
             self.separation,
         )
 
-    def distinguishes(self, chosen: AnswerSettings) -> bool:
+    def distinguishes(self) -> bool:
         """Whether the run distinguishes its answers."""
-        return self.separation >= chosen.separated_by
+        return self.separation >= SEPARATED_BY
 
     def too_close(self) -> str:
         """The statement that no run distinguishes two answers."""

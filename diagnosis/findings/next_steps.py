@@ -162,7 +162,7 @@ def _expected(answer: Findings) -> str:
 def run_to_make(answer: Findings) -> NextRun | None:
     """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
     run = answer.next_run
-    return run if run is not None and run.distinguishes(answer.settings.answer) else None
+    return run if run is not None and run.distinguishes() else None
 
 
 def unplannable(answer: Findings) -> str:

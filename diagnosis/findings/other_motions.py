@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from diagnosis.settings import WordsSettings
 from identification.examination.self_excited import in_limit_cycle
 from identification.show.numbers import reading_shown
 from identification.signal.frequency import starting_frequency, thinned_reading
@@ -16,6 +16,13 @@ from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
+
+SECOND_MODE_LEFT: Final = 0.5
+"""Maximum ratio of the residual with two free decays to the residual with one, for a second mode to be named.
+Judgement."""
+SECOND_MODE_CYCLES: Final = 3.0
+"""Minimum number of cycles of a mode within its lifetime and within its record. Judgement. Fewer do not
+distinguish an oscillation from a drift or an impulse."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,7 @@ class _Modes:
     left: float  # sum of squared residuals, rad²
 
 
-def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, ...]:
+def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
     """Find a second mode in each run that shows one.
 
     Returns:
@@ -87,14 +94,14 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, .
             hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
             vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
             one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
-            if one is None or two is None or two.left > chosen.second_mode_left * one.left:
+            if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left:
                 continue
             if two.rate.min() < 0.0:
                 continue
             order = np.argsort(np.abs(two.frequency - one.frequency[0]))
             resolution = float(two.rate.sum()) / np.pi
             lifetime = np.minimum(1.0 / np.maximum(two.rate, 1e-300), interval * values.size)
-            if np.any(two.frequency * lifetime < chosen.second_mode_cycles):
+            if np.any(two.frequency * lifetime < SECOND_MODE_CYCLES):
                 continue  # an impulse or a drift, and no oscillation
             turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:

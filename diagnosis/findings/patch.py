@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from diagnosis.findings.judged import Judged
 from diagnosis.findings.next_step import NextStep
@@ -10,6 +11,12 @@ from diagnosis.patch.written_model import PatchedModel, WrittenAttribute
 from identification.show.blocks import TextTable
 from identification.show.numbers import listed, reading_shown, significant, unit_mark, with_std
 from tunnel_sim.vocabulary.dimensions import beside
+
+FILE_OFF_STDS: Final = 2.0
+"""Maximum deviation of a coefficient, in standard deviations, at which the value in the model's file fits.
+Convention."""
+FILE_OFF_SHARE: Final = 0.01
+"""Maximum deviation of a coefficient, as a share, at which the value in the file fits. Judgement."""
 
 #: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
 _FREE = {
@@ -35,8 +42,7 @@ def corrected(model: PatchedModel | None, judged: Judged) -> list[tuple[WrittenA
         if free not in model.free or known is None or known.std is None:
             continue
         change = abs(one.after[0] - one.before[0])
-        chosen = judged.settings.words
-        if change > max(chosen.file_off_stds * known.std, chosen.file_off_share * abs(known.value)):
+        if change > max(FILE_OFF_STDS * known.std, FILE_OFF_SHARE * abs(known.value)):
             found.append((one, known.std))
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import degrees
-from typing import Any
+from typing import Any, Final
 
 from diagnosis.findings.finding import Picture
 from diagnosis.findings.judged import Judged
@@ -21,11 +21,16 @@ from diagnosis.findings.place_figures import (
 )
 from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, scattering
 from diagnosis.model.fact import Fact
-from diagnosis.settings.words import WordsSettings
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
 from identification.show.blocks import TextTable
 from identification.show.numbers import p_text, part, plain, reading_shown, share, significant, unit_shown
 from tunnel_sim.effects.registry import effect_class
+
+RUNS_LISTED: Final = 12
+"""Maximum number of runs in a sentence. Judgement."""
+ONE_WIND: Final = 0.02
+"""Ratio of the powers with and without wind below which nearly all of the gap belongs to one of them.
+Judgement."""
 
 _WIND = "whether it needs wind cannot be determined"
 
@@ -75,10 +80,9 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
         return ""
     if isinstance(place, Nowhere):
         return _nowhere(place)
-    settings = judged.settings
-    parts = [f"{_which_runs(where, place, settings.words)}."]
+    parts = [f"{_which_runs(where, place)}."]
     if places := _places(where, place):
-        most = part(settings.where.interval_share).capitalize()
+        most = part(judged.settings.where.interval_share).capitalize()
         parts.append(f"{most} of the gap lie {', '.join(places)}.")
     if place.bands:
         largest_first = sorted(place.bands.items(), key=lambda item: -item[1])
@@ -115,11 +119,11 @@ def _nowhere(found: Nowhere) -> str:
     return f"{runs} consistent with the noise ({chance})."
 
 
-def _which_runs(where: Where, place: PlaceFound, chosen: WordsSettings) -> str:
+def _which_runs(where: Where, place: PlaceFound) -> str:
     """The runs that show the gap, and the ratio between wind on and off."""
     runs, count = where.runs, place.runs
     share = f"{100.0 * place.share:.0f} % of the gap"
-    named = f" ({', '.join(runs)})" if len(runs) <= chosen.runs_listed else ""
+    named = f" ({', '.join(runs)})" if len(runs) <= RUNS_LISTED else ""
     if not runs:
         text = (
             f"No single run is beyond chance (false-alarm rate {100.0 * place.false_alarm_rate:.0f} % over all "
@@ -134,7 +138,7 @@ def _which_runs(where: Where, place: PlaceFound, chosen: WordsSettings) -> str:
     wind = place.wind
     if runs and len(wind) == 2:
         more, less = sorted(("on", "off"), key=lambda state: -wind[state])
-        if wind[less] < chosen.one_wind * wind[more]:
+        if wind[less] < ONE_WIND * wind[more]:
             text += f"; nearly all of it with the wind {more}"
         else:
             ratio = wind[more] / wind[less]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import degrees
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.special import chdtrc
@@ -21,6 +21,7 @@ from diagnosis.findings.terms import KINDS, scattering
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.noise.gap import gap_test
 from diagnosis.remainder.closable import Closable, Curve, Law, Line
+from diagnosis.remainder.explain import COMMON_FIRST
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
@@ -45,6 +46,14 @@ from tunnel_sim.vocabulary.dimensions import beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MATERIAL_SHARE: Final = 0.01
+"""Minimum relative change of a coefficient for the residual gap to be material. Convention. Derivatives are
+quoted to one per cent."""
+
+NOISE_STDS: Final = 2.0
+"""Margin of the upper bound on the explainable share, where the residual is noise, in standard deviations.
+Convention."""
 
 
 @dataclass(frozen=True)
@@ -159,8 +168,7 @@ def remainder(
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
         # by its standard deviation, or by a share, where the runs determine it
-        least = chosen.material_share
-        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
         moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
     return Remainder(
         significant=beyond_chance,
@@ -186,14 +194,13 @@ def closable_words(found: Closable | None, judged: Judged) -> str:
     left = "the residual gap" if named else f"the gap{beyond}"
     ceilings = found.ceilings
     if found.kind == "noise":
-        chosen = judged.settings.remainder
-        most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
-        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
+        most = max((one for one in ceilings if one.determined()), key=lambda one: one.closed)
+        bound = percent(max(most.closed, 0.0) + NOISE_STDS * most.std)
         return (
             f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(judged, found.kind, ceilings)
+    of_others = _measured_otherwise(found.kind, ceilings)
     return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found.line)])
 
 
@@ -251,20 +258,19 @@ def formula_line(found: Closable | None, judged: Judged) -> str:
     )
 
 
-def _measured_otherwise(judged: Judged, kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
+def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
     """The kind that explains more than the named one, on other held-out readings, and why it is not named.
 
     Empty where no kind does.
     """
-    chosen = judged.settings.remainder
     best = next(one for one in ceilings if one.kind == kind)
-    others = (one for one in ceilings if one.determined(chosen) and one.held_out != best.held_out)
+    others = (one for one in ceilings if one.determined() and one.held_out != best.held_out)
     most = max(others, key=lambda one: one.closed, default=best)
     if most.closed <= best.closed:
         return []
     return [
         f"{KINDS[most.kind].capitalize()} would explain {percent(most.closed, most.std)}, measured on "
-        f"{most.held_out}. A law common to all runs is preferred if it explains {part(chosen.common_first)} of "
+        f"{most.held_out}. A law common to all runs is preferred if it explains {part(COMMON_FIRST)} of "
         "that share or more, since it can be a property of the rig."
     ]
 
@@ -300,18 +306,17 @@ def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged
     return ""
 
 
-def closable_table(found: Closable | None, judged: Judged) -> TextTable:
+def closable_table(found: Closable | None) -> TextTable:
     """Share that each kind could explain, in per cent, the named kind first.
 
     A table without rows where nothing remains beyond chance.
     """
-    chosen = judged.settings.remainder
     kind = "" if found is None else found.kind
     ceilings = sorted(found.ceilings if found else (), key=lambda one: one.kind != kind)
     rows = [
         (
             KINDS[one.kind],
-            percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
+            percent(max(one.closed, 0.0), one.std) if one.determined() else "not determined",
             one.held_out,
         )
         for one in ceilings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from diagnosis.findings.next_step import NextStep
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings.words import WordsSettings
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
 from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std
@@ -28,6 +27,13 @@ from tunnel_sim.vocabulary.quantities import Share
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+WIDTH_KNOWN_WITHIN: Final = 10.0
+"""Ratio of the ends of the interval of a width above which the width is poorly known. Convention. An order of
+magnitude."""
+DEVIATION_NAMED: Final = 3.0
+"""Minimum deviation of the frequency or damping of an outlying run to be stated, in the scatter of the
+others, in standard deviations. Convention."""
 
 _MEANT = (
     "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
@@ -155,7 +161,7 @@ class RunRepeatability(Pictured):
         said += map(trend_words, trends.values())
         if not scattered:
             said.append("The intervals of the coefficients allow for it.")
-        return " ".join([*said, *_told_apart(self.spreads, judged.settings.words)])
+        return " ".join([*said, *_told_apart(self.spreads)])
 
     def systematic(self, judged: Judged) -> list[str]:
         """Words for what the examination found of a pattern in the runs' differences; and the patterns' effects."""
@@ -192,8 +198,7 @@ class RunRepeatability(Pictured):
             value, std, band = own.deviation(name)
             usual = max(band, std, 1e-300)
             parts.append((abs(value) / usual, f"{name} {percent_of(value, sign=True)}"))
-        least = judged.settings.words.deviation_named
-        far = [text for stds, text in parts if stds >= least] or [max(parts)[1]]
+        far = [text for stds, text in parts if stds >= DEVIATION_NAMED] or [max(parts)[1]]
         said = f"Run {run} deviates far beyond the others: {' and '.join(far)} relative to the model of all runs."
         return " ".join(filter(None, (said, self._without_outlier(judged, self.without_outlier))))
 
@@ -223,7 +228,7 @@ class RunRepeatability(Pictured):
             if run
             else []
         )
-        poorly = _told_apart(self.spreads, judged.settings.words)
+        poorly = _told_apart(self.spreads)
         named = {SCATTERS[name] for name in scattering(judged.causes)}
         if poorly and "wind_speed" not in named:  # whose advice includes this
             steps.append(
@@ -359,12 +364,12 @@ def _signed(value: float, std: float) -> str:
     return f"{'−' if value < 0.0 else '+'}{text}"
 
 
-def _told_apart(spreads: Sequence[Spread], chosen: WordsSettings) -> list[str]:
+def _told_apart(spreads: Sequence[Spread]) -> list[str]:
     """The statement that the runs hardly distinguish two quantities, where so."""
     both = [one for one in spreads if SCATTERS[one.effect] in ("wind_speed", "spring_stiffness")]
     if len(both) < 2 or not any(one.shown for one in both):
         return []
-    poorly = [one for one in both if _ratio(one.interval) > chosen.width_known_within and one.shown]
+    poorly = [one for one in both if _ratio(one.interval) > WIDTH_KNOWN_WITHIN and one.shown]
     hidden = [one for one in both if not one.shown and one.stated is None]
     if hidden:
         other = NUMBERS[SCATTERS[hidden[0].effect]]

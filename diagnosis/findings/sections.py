@@ -7,6 +7,7 @@ shows all of them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.cards import cause_cards, effect_cards
@@ -42,6 +43,9 @@ from identification.show.blocks import (
 )
 from identification.show.numbers import held_out_excess, probability, share, significant
 from tunnel_sim.vocabulary.campaign import Campaign
+
+EFFECT_LISTED: Final = 0.01
+"""Minimum probability of an effect in the list of causes. Judgement."""
 
 
 def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Section, ...]:
@@ -120,7 +124,7 @@ def _which(answer: Findings) -> Section:
         (
             captioned("which"),
             candidates_table(answer.candidates, answer.repeated, answer),
-            Paragraph(inclusion_line(answer.inclusion, answer.settings.words.effect_listed)),
+            Paragraph(inclusion_line(answer.inclusion, EFFECT_LISTED)),
             *(Paragraph(line) for line in rival_lines(answer)),
             *effect_cards(answer),
             *pictured(answer, "friction"),
@@ -167,7 +171,7 @@ def _closable(answer: Findings) -> Section:
         "What could explain the residual gap",
         (
             Paragraph(closable_line(answer.closable, answer.rest, answer)),
-            closable_table(answer.closable, answer),
+            closable_table(answer.closable),
             Paragraph(formula_line(answer.closable, answer)),
             *drawn,
         ),

@@ -32,7 +32,7 @@ def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
             apart = shapes | (covariance[place] >= 0.0) if not shapes[place] else np.full(len(names), True)
             apart[place] = False
             covariance[place, apart] = covariance[apart, place] = 0.0
-    found = trade_off(names, covariance, of, Setting.of(campaign), fit.settings.answer.trades_off_from)
+    found = trade_off(names, covariance, of, Setting.of(campaign))
     if found is None or any(of[name].amplitude is None for name in found.parameters):
         return found
     return replace(found, together=_together(fit, campaign, found.parameters))

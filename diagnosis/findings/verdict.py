@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.disturbed_runs import disturbed_words
@@ -33,6 +33,9 @@ from identification.show.numbers import (
     times_noise,
 )
 from tunnel_sim.effects import effect_class, known_effects, the_effect
+
+ANSWERS_NAMED: Final = 5
+"""Maximum number of likely answers in a sentence. Judgement."""
 
 
 def headline(answer: Findings) -> tuple[str, str]:
@@ -175,7 +178,7 @@ def undecided_words(answer: Findings) -> str:
         if name not in named:
             parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts)}. " if parts else ""
-    most = likeliest(answer, answer.settings.words.answers_named)
+    most = likeliest(answer, ANSWERS_NAMED)
     together = probability(sum(value for _, value in credible))
     if answer.decision.unpredictive:
         best = among_answers(answer.decision.unpredictive).capitalize()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,13 @@ from numpy.typing import NDArray
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
 from diagnosis.model.data import folds
-from diagnosis.settings import RemainderSettings
 from tunnel_sim.vocabulary.record import Array
+
+KNOWN_TO: Final = 0.5
+"""Maximum standard deviation of a law's explained share for the share to be determined. Judgement."""
+CLOSES_AT_MOST: Final = 1.5
+"""Maximum explained share of a law that counts as determined. Judgement. Laws may explain more than all of a
+small excess."""
 
 KINDS = (
     "angle", "rate", "state", "wind", "time", "reading", "line", "between", "event", "wander", "noise",
@@ -40,9 +46,9 @@ class Ceiling:
     std: float
     held_out: str
 
-    def determined(self, chosen: RemainderSettings) -> bool:
+    def determined(self) -> bool:
         """Whether the share is known well enough; laws may explain more than all of a small excess."""
-        return self.std < chosen.known_to and self.closed < chosen.closes_at_most
+        return self.std < KNOWN_TO and self.closed < CLOSES_AT_MOST
 
 
 _WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response

@@ -8,6 +8,7 @@ with the motion instead.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 from scipy.special import chdtri
@@ -19,6 +20,10 @@ from diagnosis.remainder.closable import Closable
 from diagnosis.remainder.formula import Formula, FormulaTerm, Proposal, predicted_drop, propose
 from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.study import Study
+
+LAWS_FITTED: Final = 3
+"""Number of laws that are fitted to driven runs, those of greatest predicted drop of χ² first. Judgement.
+Time against coverage."""
 
 _OF_RATE = ("abs(r)*r", "r^3", "sign(r)")
 _OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
@@ -49,7 +54,7 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
     laws.sort(key=lambda law: -predicted_drop(base, law[1], law[0]))
     found = [
         (kind, proposal)
-        for kind, formula in laws[: settings.laws_fitted]
+        for kind, formula in laws[:LAWS_FITTED]
         if (proposal := propose(base, formula, kind)) is not None
     ]
     if not found:
@@ -59,7 +64,7 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
     if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(laws)):
         return None
     closed, std, held_out = held_out_share(base, best.fit)
-    law = stated_law(base, best, study.similarity, closed, std)
+    law = stated_law(best, study.similarity, closed, std)
     if law is None:
         return None
     return Closable(

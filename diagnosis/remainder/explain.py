@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -24,6 +24,24 @@ from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
 from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array
+
+CLOSABLE_FROM: Final = 0.1
+"""Minimum share of the residual explained by some law to be more than noise. Judgement."""
+COMMON_FIRST: Final = 0.8
+"""Share of a law of all runs, relative to laws of single runs, above which it is preferred. Judgement."""
+CLOSES_ALIKE: Final = 0.02
+"""Maximum shortfall of a simpler law for it to be preferred. Judgement."""
+NAMED_ALIKE: Final = 0.02
+"""Maximum shortfall of a law to be called indistinguishable. Judgement."""
+EVENTS_FROM: Final = 0.1
+"""Minimum part of a run to be listed as an event, as a share of the largest part. Judgement."""
+EVENT_SHARE: Final = 0.8
+"""Share of the energy of an event within the stated times. Judgement."""
+STEADY_LINE_CONTRAST: Final = 8.0
+"""Minimum ratio of the power of a steady line to the power nearby. Judgement. The skirt of a resonance has
+less."""
+STEADY_LINE_HALVES: Final = 0.8
+"""Minimum share of a line in one half of a run that the other half must predict. Judgement."""
 
 Events = tuple[Mapping[str, Any], ...]
 """By run, the largest part first: ``run``, its ``share`` of the explained part, and ``from_s`` and ``to_s`` since
@@ -60,7 +78,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     single = {} if line is None else {"line": line.evidence}
     single |= {kind: unexplained.single(kind) for kind in SINGLE}
     chosen = study.settings.remainder
-    kind = chosen_kind(common, single, chosen)
+    kind = chosen_kind(common, single)
     if kind is None:
         return None
     law, shape = None, None
@@ -80,7 +98,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
-    alike, next_most = _others(kind, ceilings, chosen)
+    alike, next_most = _others(kind, ceilings)
     return Closable(
         excess=fitted.excess / fitted.problem.data.mean_block,
         ceilings=ceilings,
@@ -94,25 +112,23 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     )
 
 
-def chosen_kind(
-    common: Mapping[str, Evidence], single: Mapping[str, Evidence], chosen: RemainderSettings
-) -> str | None:
+def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str | None:
     """The simplest kind of `KINDS` that explains about as much as any; simpler common laws come first.
 
     None where only kinds of undetermined shares could explain more than a small share.
     """
     of_all, of_one = (
-        {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined(chosen)}
+        {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined()}
         for kinds in (common, single)
     )
     most_of_all, most_of_one = (
         max((c.closed for c in kinds.values()), default=0.0) for kinds in (of_all, of_one)
     )
-    if max(most_of_all, most_of_one) < chosen.closable_from:
+    if max(most_of_all, most_of_one) < CLOSABLE_FROM:
         return "noise" if len(of_all) + len(of_one) == len(common) + len(single) else None
-    among = of_all if most_of_all >= chosen.common_first * most_of_one else of_one
+    among = of_all if most_of_all >= COMMON_FIRST * most_of_one else of_one
     best = max(among.values(), key=lambda one: one.closed)
-    least = best.closed - max(chosen.closes_alike, best.std)
+    least = best.closed - max(CLOSES_ALIKE, best.std)
     return next(kind for kind, one in among.items() if one.closed >= least)
 
 
@@ -123,12 +139,10 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     if proposal is None:
         return None
     closed, std, _ = held_out_share(unexplained.fit, proposal.fit)
-    return stated_law(unexplained.fit, proposal, similarity, closed, std)
+    return stated_law(proposal, similarity, closed, std)
 
 
-def _others(
-    kind: str, ceilings: tuple[Ceiling, ...], chosen: RemainderSettings
-) -> tuple[tuple[str, ...], float | None]:
+def _others(kind: str, ceilings: tuple[Ceiling, ...]) -> tuple[tuple[str, ...], float | None]:
     """The kinds that explain about as much as the chosen one, and the greatest share of the others.
 
     Only those others count that do not include the chosen one as a case, and that are measured in the same way.
@@ -140,9 +154,9 @@ def _others(
     others = [
         one
         for one in ceilings
-        if one.determined(chosen) and one.held_out == best.held_out and one.kind not in included
+        if one.determined() and one.held_out == best.held_out and one.kind not in included
     ]
-    least = best.closed - max(chosen.named_alike, best.std)
+    least = best.closed - max(NAMED_ALIKE, best.std)
     alike = tuple(one.kind for one in others if one.closed >= least)
     return alike, max((one.closed for one in others), default=None)
 
@@ -222,7 +236,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
     Returns:
         The times between which most of a run's part occurs.
     """
-    drops, spans, share = [], [], unexplained.fit.settings.remainder.event_share
+    drops, spans = [], []
     for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
         path = unit.path
         part = normal(unit.left(path.residual), unit.left(columns))
@@ -231,7 +245,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
         # the shortest interval of time with most of the energy
         energy = (SINGLE[kind](path, unexplained.ranges) @ solution) ** 2
         sums = np.concatenate([[0.0], np.cumsum(energy)])
-        ends = np.minimum(np.searchsorted(sums, sums[:-1] + share * sums[-1]), sums.size)
+        ends = np.minimum(np.searchsorted(sums, sums[:-1] + EVENT_SHARE * sums[-1]), sums.size)
         lengths = np.where(ends < sums.size, ends - np.arange(energy.size), energy.size + 1)
         first = int(np.argmin(lengths))
         time = path.time + path.run.start
@@ -243,7 +257,7 @@ def _listed(
     unexplained: Unexplained, drops: list[float], whole: float, spans: list[tuple[float, float]]
 ) -> Events:
     ranked = sorted(zip(unexplained.paths, drops, spans, strict=True), key=lambda one: -one[1])
-    least = unexplained.fit.settings.remainder.events_from * max(drops)
+    least = EVENTS_FROM * max(drops)
     return tuple(
         {"run": path.run.id, "share": drop / whole, "from_s": first, "to_s": last}
         for path, drop, (first, last) in ranked
@@ -301,7 +315,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
             before = float(residual[own] @ residual[own])
             predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
             fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
-    if predicted / max(fitted, 1e-300) < unexplained.fit.settings.remainder.steady_line_halves:
+    if predicted / max(fitted, 1e-300) < STEADY_LINE_HALVES:
         return None
     drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
@@ -359,7 +373,7 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
         chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
     best = int(np.argmin(chance))
     chosen = unexplained.fit.settings.remainder
-    clear = power[best] >= chosen.steady_line_contrast * 2.0 * count[best]
+    clear = power[best] >= STEADY_LINE_CONTRAST * 2.0 * count[best]
     if not clear or chance[best] + np.log(grid.size) > np.log(chosen.steady_line_rate):
         return None, 1.0
     return float(grid[best]), float(floors[best] / count[best])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from itertools import product as combinations
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from scipy.special import chdtri
@@ -28,6 +28,19 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.dimensions import Dimension, dimension, dimension_text, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+TERM_GAIN: Final = 0.02
+"""Minimum part of the explainable share that a further term must add. Judgement."""
+FORMULA_OPEN: Final = 0.02
+"""Maximum part of the explainable share that a complete formula may miss. Judgement."""
+WIDER_OPEN: Final = 0.02
+"""Part of the explainable share missed by a formula of angle or rate above which a formula of both is tried.
+Judgement."""
+FIRST_START: Final = 0.02
+"""Maximum unexplained share of the excess at which a fitted formula needs no other starting point.
+Judgement."""
+MOST_TERMS: Final = 3
+"""Maximum number of terms in a formula. Judgement."""
 
 _NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
 _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}
@@ -178,9 +191,7 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
         The formula; None where no term is supported beyond chance, or it does not predict held-out runs.
     """
     found = _chosen(unexplained, kind, closable)
-    if kind in ("angle", "rate") and (
-        found is None or found.gained < (1.0 - unexplained.fit.settings.remainder.wider_open) * closable
-    ):
+    if kind in ("angle", "rate") and (found is None or found.gained < (1.0 - WIDER_OPEN) * closable):
         wider = _chosen(unexplained, "state", closable)
         found = found if wider is None or (found and found.gained >= wider.gained) else wider
     return found
@@ -246,8 +257,8 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
-    enough = (1.0 - settings.formula_open) * closable
-    while len(chosen) < settings.most_terms and gained < enough:
+    enough = (1.0 - FORMULA_OPEN) * closable
+    while len(chosen) < MOST_TERMS and gained < enough:
         known = [*range(c), *(c + i for i in chosen)]
         inner = whole.matrix[np.ix_(known, known)]
         width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
@@ -263,7 +274,7 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
             some = [_of(part, [*chosen, i]) for part in parts]
             after = held_out(some, unexplained.groups, None)
             tried.append((before - float(after[unexplained.seen].sum()), i))
-        if not tried or max(tried)[0] - gained < max(settings.term_gain * closable, threshold):
+        if not tried or max(tried)[0] - gained < max(TERM_GAIN * closable, threshold):
             break
         gained, best = max(tried)
         chosen.append(best)
@@ -288,7 +299,7 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
     for first in (moved, start.common) if formula.delta.any() else (start.common,):
         with suppress(FitError, np.linalg.LinAlgError):
             found.append(fit(problem, Point(first, base.point.per_run), base=base))
-            if found[-1].excess < base.settings.remainder.first_start * base.excess:
+            if found[-1].excess < FIRST_START * base.excess:
                 break
     best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
     return None if best is None or best.total >= base.total else Proposal(table, best)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
@@ -10,6 +12,9 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from diagnosis.remainder.closable import Law
 from diagnosis.remainder.formula import Proposal
+
+FORMULA_CLOSES: Final = 0.1
+"""Minimum share of the residual that a formula must explain on held-out runs. Judgement."""
 
 
 def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
@@ -26,16 +31,14 @@ def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
     return *ratio(drop, powers[0] - sizes), held_out
 
 
-def stated_law(
-    base: Fit, proposal: Proposal, similarity: Similarity, closed: float, std: float
-) -> Law | None:
+def stated_law(proposal: Proposal, similarity: Similarity, closed: float, std: float) -> Law | None:
     """The law of a proposal in the measured campaign's units; None where its share of held-out data is small.
 
     Args:
         closed: its share of held-out data.
         std: its standard deviation, a share.
     """
-    if closed < base.settings.remainder.formula_closes:
+    if closed < FORMULA_CLOSES:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):

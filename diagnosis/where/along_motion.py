@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -24,6 +25,10 @@ from identification.signal.free_decay import Decay
 from identification.signal.run_fit import fit_windows
 from tunnel_sim.files.from_json import Row, Rows
 from tunnel_sim.vocabulary.record import Array
+
+RUN_DEPARTS: Final = 1.5
+"""Ratio of the mean squared residual of a run to the noise variance above which the model does not fit the
+run. Judgement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +79,7 @@ def backbones(fit: Fit) -> list[Backbone]:
             continue
         std = float(run.noise_at(resonance(fit, index)))
         reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
-        departs = float(np.mean(fit.residuals[index] ** 2)) > fit.settings.where.run_departs
+        departs = float(np.mean(fit.residuals[index] ** 2)) > RUN_DEPARTS
         noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)
         windows = fit_windows(reading, decay, fit.zero(index), noise)
         fitted = fit_run(reading, decay).runs

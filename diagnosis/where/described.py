@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from diagnosis.model.fact import Fact
-from diagnosis.settings import Settings
+from diagnosis.settings import WhereSettings
 from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.place import Place
 from diagnosis.where.survey import Survey
 from tunnel_sim.effects import Effect
+
+PLACE_OVERRULED: Final = 0.99
+"""Minimum share of the gap on held-out readings that causes explain for the place of the gap not to
+contradict them. Judgement. Causes that predict all but a hundredth of the gap act where it is. Residuals of a
+grossly wrong model may look like another place."""
+
+INTERVAL_LOCATED: Final = 0.8
+"""Maximum length of an interval, as a share of the range, for it to locate the gap. Judgement."""
+BAND_LISTED: Final = 0.05
+"""Minimum share of the excess in a band to be listed. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +111,7 @@ def described(
     where: Where,
     place: Place,
     compared: Sequence[type[Effect]],
-    settings: Settings,
+    chosen: WhereSettings,
     *,
     scattering: bool = False,
     explained: float = 0.0,
@@ -112,22 +123,22 @@ def described(
         scattering: whether the runs differ from each other by chance in the answer.
         explained: share of the gap that they explain on held-out readings.
     """
-    maps, chosen = place.survey.maps, settings.words
+    maps = place.survey.maps
     length, greatest = float(maps.time.edges_s[-1]), float(maps.amplitude.edges_rad[-1])
-    wide = {"time_s": chosen.interval_located * length, "amplitude_rad": chosen.interval_located * greatest}
+    wide = {"time_s": INTERVAL_LOCATED * length, "amplitude_rad": INTERVAL_LOCATED * greatest}
     intervals = {
         "time_s": where.time_s, "amplitude_rad": where.amplitude_rad, "frequency_hz": where.frequency_hz,
     }  # fmt: skip
-    beyond = bands_beyond_chance(maps.bands, settings.where)
+    beyond = bands_beyond_chance(maps.bands, chosen)
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
-    shown = [b for b in maps.bands if b.band in beyond and b.excess > chosen.band_listed * whole]
+    shown = [b for b in maps.bands if b.band in beyond and b.excess > BAND_LISTED * whole]
     against = judged(where.channel, place.channel.reason.kind, compared, scattering=scattering)
-    predicted = explained >= settings.answer.place_overruled and not any(kind.random for kind in compared)
+    predicted = explained >= PLACE_OVERRULED and not any(kind.random for kind in compared)
     against = replace(against, elsewhere=against.elsewhere and not predicted)
     return PlaceFound(
         runs=len(maps.runs),
         share=sum(run.share for run in maps.runs if run.id in where.runs),
-        false_alarm_rate=settings.where.run_rate,
+        false_alarm_rate=chosen.run_rate,
         wind={group.label: group.excess for group in maps.groups if group.by == "wind"},
         narrow=tuple(
             name

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,12 @@ from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
+
+LINE_CONTRAST: Final = 8.0
+"""Minimum ratio of the power of a line in a run to the median around it. Judgement. The skirt of a resonance
+has less."""
+RUN_NOISE_STD: Final = 0.015
+"""Relative standard deviation of the noise between runs. Judgement. Quantisation colours the noise."""
 
 #: Bands by their upper edges in multiples of the run's own frequency.
 BANDS: tuple[tuple[str, float], ...] = (
@@ -92,7 +99,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise.variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, fit.settings.where.run_noise_std)) for value in relative]
+    relative = [float(np.hypot(value, RUN_NOISE_STD)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(
@@ -279,7 +286,7 @@ def residual_lines(
                 ]
             )
             around = float(np.median(beside)) if beside.size else 0.0
-            if not open_to[index] or close or local[index] < chosen.line_contrast * around:
+            if not open_to[index] or close or local[index] < LINE_CONTRAST * around:
                 continue
             near = slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
             whole = max(float(run.power.sum()) - run.power.size, excess)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -17,6 +18,42 @@ from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
 from diagnosis.where.survey import Survey, survey
 from tunnel_sim.vocabulary.campaign import Campaign
+
+NAMED_RUN: Final = 0.1
+"""Minimum excess of a further run to be named, as a share of the largest excess. Judgement."""
+ONE_RUN: Final = 0.8
+"""Share of the excess in one run above which the runs do not show whether the gap needs wind. Judgement."""
+ONE_RUN_OF: Final = 3
+"""Minimum number of runs for this test. Judgement."""
+BLOW_SHARE: Final = 0.5
+"""Minimum share of the missing moment's energy within the time of a blow. Convention. Most of it."""
+BLOW_STDS: Final = 5.0
+"""Minimum significance of the missing moment, in standard deviations. Convention."""
+BLOW_LENGTH: Final = 0.1
+"""Maximum duration of a blow, as a share of the record. Judgement."""
+BLOW_AFTER: Final = 0.05
+"""Share of the record after the release that is excluded from the search for a blow. Judgement."""
+FASTEST_MOMENT: Final = 30.0
+"""Maximum frequency of a moment; a faster line is an error of the sensor, in Hz of the similar rig. Physics.
+The inertia of the rig keeps the response to faster moments below any noise."""
+LINE_SHARE: Final = 0.25
+"""Minimum share of a run's excess in its lines for them to locate the gap. Judgement."""
+LINE_ONE_IN: Final = 3
+"""At least one run in this number must have such a line. Judgement."""
+FAST_SHARE: Final = 0.5
+"""Share of the excess above the frequency of the motion from which the gap is an error of the sensor.
+Convention. Most of it."""
+SLOW_SHARE: Final = 0.5
+"""Share of the excess below the frequency of the motion from which the gap is a shift of the centre.
+Convention. Most of it."""
+SHIFTED_CENTRE: Final = 0.05
+"""Minimum share of the excess in the second harmonic that shows a shifted centre. Judgement."""
+HARMONIC_SHARE: Final = 0.5
+"""Minimum share of the excess in harmonics for them to locate the gap. Convention. Most of it."""
+ALONE_LEAVES: Final = 0.2
+"""Maximum share of the excess that remains in fits to single runs, if every run is linear. Judgement."""
+DRIFT_RATIO: Final = 1.5
+"""Minimum ratio of the drifts of frequency and damping for the larger one to locate the gap. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +114,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> tuple[str, ...]:
     """The runs beyond chance with a good part of the largest excess among them."""
     clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < chosen.run_rate}
-    least = chosen.named_run * max(clear.values(), default=0.0)
+    least = NAMED_RUN * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
@@ -92,7 +129,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusi
     if min(run.p_value for run in shown) * len(runs) > chosen.run_rate:
         return Conclusion(None, Fact("no single run"))
     most = max(shown, key=lambda run: run.share)
-    if len(shown) >= chosen.one_run_of and most.share > chosen.one_run and most.id not in off:
+    if len(shown) >= ONE_RUN_OF and most.share > ONE_RUN and most.id not in off:
         return Conclusion(None, Fact("one run", {"run": most.id}))
     # without coefficients and a gain that these runs lack
     data = nominal.problem.data.alone(off)
@@ -108,7 +145,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusi
     return Conclusion("wind_on", Fact("wind-off runs show none", {"runs": len(off)}))
 
 
-def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[float, float] | None:
+def blow_interval(found: Survey, share: float) -> tuple[float, float] | None:
     """The time in which most of the missing moment acts, where that is a small part of the record.
 
     Args:
@@ -120,39 +157,38 @@ def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[f
     """
     edges = found.maps.time.edges_s
     interval = shortest_interval(edges, found.moment_energy, share)
-    if interval is None or found.moment_z < chosen.blow_stds:
+    if interval is None or found.moment_z < BLOW_STDS:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= chosen.blow_length * length
-    return interval if brief and interval[0] > chosen.blow_after * length else None
+    brief = interval[1] - interval[0] <= BLOW_LENGTH * length
+    return interval if brief and interval[0] > BLOW_AFTER * length else None
 
 
 def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclusion:
     """The channel on which the gap acts, from features of the residual and the inferred condition."""
-    chosen = nominal.settings.where
-    blow = blow_interval(survey, chosen.blow_share, chosen)
+    blow = blow_interval(survey, BLOW_SHARE)
     if blow is not None:
         return Conclusion("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in survey.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in survey.maps.lines if line.share > chosen.line_share]
-    if lines and len(lines) >= max(1, len(survey.maps.runs) // chosen.line_one_in):
+    lines = [line for line in survey.maps.lines if line.share > LINE_SHARE]
+    if lines and len(lines) >= max(1, len(survey.maps.runs) // LINE_ONE_IN):
         hertz = float(np.median([line.frequency_hz for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Conclusion(
-            "forcing" if similar < chosen.fastest_moment else "sensor",
+            "forcing" if similar < FASTEST_MOMENT else "sensor",
             Fact("spectral line", {"frequency_hz": hertz}),
         )
-    if excess.get("above", 0.0) > chosen.fast_share * whole:
+    if excess.get("above", 0.0) > FAST_SHARE * whole:
         return Conclusion("sensor", Fact("too fast"))
-    if excess.get("0", 0.0) > chosen.slow_share * whole:
-        if excess.get("2f0", 0.0) > chosen.shifted_centre * whole:
+    if excess.get("0", 0.0) > SLOW_SHARE * whole:
+        if excess.get("2f0", 0.0) > SHIFTED_CENTRE * whole:
             return Conclusion("stiffness", Fact("shifted centre and harmonic"))
         if condition == "wind_on":
             return Conclusion("forcing", Fact("shifted centre with wind"))
         return Conclusion("sensor", Fact("shifted centre"))
-    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > chosen.harmonic_share * whole:
+    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > HARMONIC_SHARE * whole:
         return Conclusion("sensor", Fact("harmonics"))
     apart = _between_runs(nominal, survey)
     if apart is not None:
@@ -160,9 +196,9 @@ def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclu
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Conclusion(None, Fact("every run driven"))
     frequency, damping = drift(list(survey.maps.backbones))
-    if frequency > chosen.drift_ratio * max(damping, 0.0) and frequency > 0.0:
+    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
         return Conclusion("stiffness", Fact("frequency along the decay"))
-    if damping > chosen.drift_ratio * max(frequency, 0.0) and damping > 0.0:
+    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
         return Conclusion("damping", Fact("damping along the decay"))
     return Conclusion(None, Fact("both along the decay"))
 
@@ -178,7 +214,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Conclusion | None:
         frequency = curve.alone_frequency_hz / curve.nominal_frequency_hz - 1.0
         shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if len(sizes) < 2 or left > nominal.settings.where.alone_leaves * whole:
+    if len(sizes) < 2 or left > ALONE_LEAVES * whole:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several

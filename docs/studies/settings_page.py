@@ -1,17 +1,23 @@
-"""Write the page of all settings of the diagnosis from their fields.
+"""Write the page of all numbers by which the diagnosis decides: settings, and constants of the code.
 
     python -m docs.studies.settings_page
 
-writes docs/reference/settings.md; a test compares the page with the fields.
+writes docs/reference/settings.md from the fields of the settings and from every ``NAME: Final = value`` of
+`diagnosis`, whose docstring has the meaning, the origin and the reason; a test compares the page with them.
 """
 
 from __future__ import annotations
 
-from dataclasses import Field, fields
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import Field, dataclass, fields
+from itertools import groupby, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from diagnosis import Settings
+from diagnosis.settings.origin import Origin
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "settings.md"
@@ -19,8 +25,11 @@ PAGE = ROOT / "docs" / "reference" / "settings.md"
 HEAD = """\
 # Settings of the diagnosis
 
-Every number by which the diagnosis decides, with its origin. Each number belongs to one decision. `diagnose` takes
-a copy with other values, and its document states the changed values under `provenance`:
+Every number by which the diagnosis decides, with its origin. Each number belongs to one decision.
+
+**Settings** weigh answers (a probability, a prior, a price), are the false-alarm rate of a test, or fit the
+search to a campaign. `diagnose` takes a copy with other values, and its document states the changed values under
+`provenance`:
 
 ```python
 from diagnosis import Settings, diagnose
@@ -28,14 +37,62 @@ from diagnosis import Settings, diagnose
 found = diagnose("campaign", settings=Settings().changed({"gap.detection_rate": 1e-4}))
 ```
 
+**Constants** are all other numbers that decide. They are the same for every campaign and stand beside their use.
+
 *Convention*: a customary level, or the meaning of a word. *Physics*: follows from the rig. *Estimated*: fitted to
 campaigns with known causes. *Tuned*: set by hand on campaigns with known causes. *Judgement*: chosen by reason
 alone. [Blind tests](../blind-check.md) use other campaigns. The [ablation](../ablation.md) measures the effect of
 changing the settings.
 
 The page is written by `python -m docs.studies.settings_page`. Numerical constants (grids, iterations, tolerances of
-solvers) are in the code that uses them.
+solvers) are in the code that uses them, without a place here.
 """
+
+_ORIGINS = "|".join(origin.capitalize() for origin in get_args(Origin))
+_SENTENCES = re.compile(rf"(.+?\.) (({_ORIGINS})( \(decision (\d{{4}})\))?\..*)")
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number of the code that decides.
+
+    Args:
+        file: where it stands, from the root.
+        value: in the unit that its meaning states.
+        said: its docstring on one line, empty without one.
+    """
+
+    file: str
+    name: str
+    value: float
+    said: str
+
+    @property
+    def sentences(self) -> tuple[str, str]:
+        """Meaning and origin.
+
+        Raises:
+            ValueError: when the docstring lacks one of them.
+        """
+        found = _SENTENCES.fullmatch(self.said)
+        if found is None:
+            raise ValueError(f"{self.file}: {self.name} needs a docstring '<meaning>. <Origin>. <reason>'")
+        meaning, origin, _, cited, number = found.groups()
+        return meaning, origin.replace(f"{cited}.", f". {_link(number)}", 1) if cited else origin
+
+
+def constants() -> Iterator[Constant]:
+    """Every number of the diagnosis that is annotated as ``Final``, in the order of the files."""
+    for path in sorted((ROOT / "diagnosis").rglob("*.py")):
+        body = ast.parse(path.read_text("utf-8")).body
+        for node, after in pairwise([*body, ast.Pass()]):
+            match node:
+                case ast.AnnAssign(ast.Name(name), ast.Name("Final"), ast.expr() as value):
+                    said = after.value if isinstance(after, ast.Expr) else None
+                    text = str(said.value) if isinstance(said, ast.Constant) else ""
+                    yield Constant(
+                        str(path.relative_to(ROOT)), name, ast.literal_eval(value), " ".join(text.split())
+                    )
 
 
 def page() -> str:
@@ -46,6 +103,10 @@ def page() -> str:
         title = (type(group).__doc__ or "").rstrip(".")
         parts.append(f"\n## {title}\n\n| `{stage.name}.` | value | meaning | origin |\n|---|---|---|---|\n")
         parts += [_row(one) for one in fields(group)]
+    parts.append("\n## Constants\n")
+    for file, group in groupby(constants(), lambda one: one.file):
+        parts.append(f"\n| `{file}` | value | meaning | origin |\n|---|---|---|---|\n")
+        parts += [f"| `{one.name}` | {one.value:g} | {' | '.join(one.sentences)} |\n" for one in group]
     return "".join(parts)
 
 

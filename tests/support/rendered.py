@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from diagnosis.findings import answers, closure, coefficients, place, place_figures, remainder, symbols
+from diagnosis.findings.sections import EFFECT_LISTED
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
 
@@ -24,11 +25,11 @@ def parameters_table(answer: Findings) -> TextTable:
 
 
 def inclusion_line(answer: Findings) -> str:
-    return answers.inclusion_line(answer.inclusion, answer.settings.words.effect_listed)
+    return answers.inclusion_line(answer.inclusion, EFFECT_LISTED)
 
 
 def candidates_figure(answer: Findings) -> Figure | None:
-    return answers.candidates_figure(answer.candidates, answer)
+    return answers.candidates_figure(answer.candidates)
 
 
 def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
@@ -49,7 +50,7 @@ def closable_line(answer: Findings) -> str:
 
 
 def closable_table(answer: Findings) -> TextTable:
-    return remainder.closable_table(answer.closable, answer)
+    return remainder.closable_table(answer.closable)
 
 
 def scatter_words(answer: Findings) -> str:

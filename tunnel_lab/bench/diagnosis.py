@@ -412,7 +412,7 @@ class _Rivals:
             if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                if not run.distinguishes(self._settings.answer):
+                if not run.distinguishes():
                     ui.label(run.too_close())
                 else:
                     show_run(run)

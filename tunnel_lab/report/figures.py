@@ -30,7 +30,7 @@ def diagnosis_figure(answer: Findings, name: str) -> Figure | None:
 def _makers(answer: Findings) -> dict[str, Callable[[Findings], Figure | None]]:
     """By name, in the order of the report, what draws each figure, or finds that there is none."""
     makers: dict[str, Callable[[Findings], Figure | None]] = {"fit": charts.fit_near} if answer.maps else {}
-    makers["which"] = lambda whole: candidates_figure(whole.candidates, whole)
+    makers["which"] = lambda whole: candidates_figure(whole.candidates)
     makers |= {name: partial(_drawn, drawn) for name, drawn in answer.pictures.items()}
     return dict(sorted(makers.items(), key=lambda one: _place_of(one[0])))
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis
+
+RIVAL_EXPLAINS: Final = 0.8
+"""Minimum share of a gap that an explanation outside the vocabulary must explain to be mentioned.
+Judgement."""
 
 
 class Rival:
@@ -57,5 +62,8 @@ class FoundRival:
     def fact(self, nominal: Fit, similarity: Similarity) -> Fact | None:
         """Its fact; None where its likeliest hypothesis does not explain most of the gap."""
         best = min(self.hypotheses, key=lambda one: one.fit.total)
-        least = nominal.settings.words.rival_explains
-        return None if best.fit.excess > (1.0 - least) * nominal.excess else self.rival.fact(best, similarity)
+        return (
+            None
+            if best.fit.excess > (1.0 - RIVAL_EXPLAINS) * nominal.excess
+            else self.rival.fact(best, similarity)
+        )

@@ -9,7 +9,6 @@ from diagnosis import diagnose
 from diagnosis.findings.other_motions import second_modes
 from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.search.investigate import investigate
-from diagnosis.settings import Settings
 from tests.marks import slow
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -31,7 +30,7 @@ MOTION = (0.3, 2.2, 0.1)
 
 @pytest.mark.parametrize("rate", [0.2, 0.9])
 def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rate):
-    (found,) = second_modes(campaign(MOTION, (0.02, 2.9, rate)), Settings().words)
+    (found,) = second_modes(campaign(MOTION, (0.02, 2.9, rate)))
     assert found.run == "swing"
     assert found.second.frequency_hz == pytest.approx(2.9, rel=0.01)
     assert (found.main.amplitude_rad, found.main.frequency_hz) == pytest.approx((0.3, 2.2), rel=0.02)
@@ -40,11 +39,11 @@ def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rat
 
 @pytest.mark.parametrize("others", [(), ((0.02, 6.6, 0.3),), ((0.02, 2.21, 0.1),)])
 def test_one_mode_its_harmonic_and_a_mode_that_is_not_resolved_are_not_named(others):
-    assert second_modes(campaign(MOTION, *others), Settings().words) == ()
+    assert second_modes(campaign(MOTION, *others)) == ()
 
 
 def test_what_dies_out_within_a_tenth_of_a_cycle_is_no_mode():
-    assert second_modes(campaign(MOTION, (0.1, 0.5, 5.0)), Settings().words) == ()
+    assert second_modes(campaign(MOTION, (0.1, 0.5, 5.0))) == ()
 
 
 @pytest.mark.parametrize(
@@ -56,7 +55,7 @@ def test_what_dies_out_within_a_tenth_of_a_cycle_is_no_mode():
     ],
 )
 def test_what_shows_fewer_than_three_cycles_is_no_mode(mode, seconds):
-    assert second_modes(campaign(MOTION, mode, seconds=seconds), Settings().words) == ()
+    assert second_modes(campaign(MOTION, mode, seconds=seconds)) == ()
 
 
 @pytest.mark.parametrize(

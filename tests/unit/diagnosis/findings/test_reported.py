@@ -8,7 +8,7 @@ import pytest
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.findings import reported as module
 from diagnosis.findings.judgements import cautions
-from diagnosis.findings.reported import Comparison, compare, confirm, report_fits
+from diagnosis.findings.reported import INTEGRATOR_TOLERANCE, Comparison, compare, confirm, report_fits
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
@@ -62,13 +62,9 @@ def test_the_two_models_predict_the_same_readings(name, values):
     found = compare(made, np.array([*NOMINAL, *values]), RELEASE)
     assert [d.shape for d in found.differences] == [(1000,), (1000,)]
     assert max(np.max(np.abs(d)) for d in found.differences) < 3e-5
-    verdict = confirm([found], Settings().answer.integrator_tolerance)
+    verdict = confirm([found], INTEGRATOR_TOLERANCE)
     assert verdict.agrees
-    assert (
-        verdict.rms_difference
-        < verdict.tolerance
-        == pytest.approx(Settings().answer.integrator_tolerance * NOISE / 2.0)
-    )
+    assert verdict.rms_difference < verdict.tolerance == pytest.approx(INTEGRATOR_TOLERANCE * NOISE / 2.0)
 
 
 def test_every_run_may_have_parameters_of_its_own():
@@ -94,31 +90,29 @@ def test_campaigns_that_do_not_state_their_sizes_are_predicted_too(sizes, inerti
         data=dataclasses.replace(made.data, frontal_area=sizes[0], reference_length=sizes[1], width=sizes[2]),
     )
     common = np.array([inertia, DAMPING, 0.02, -0.01, 0.001])
-    assert confirm([compare(made, common, RELEASE)], Settings().answer.integrator_tolerance).agrees
+    assert confirm([compare(made, common, RELEASE)], INTEGRATOR_TOLERANCE).agrees
 
 
 def test_what_the_sensor_does_to_samples_is_not_done_to_their_means():
     """A clipped reading bends inside a block; the mean of a block cannot show that by being clipped."""
     found = compare(problem("sensor_clipping"), np.array([*NOMINAL, 0.25]), RELEASE)
-    verdict = confirm([found], Settings().answer.integrator_tolerance)
+    verdict = confirm([found], INTEGRATOR_TOLERANCE)
     assert not verdict.agrees
     assert verdict.run == "r1"  # the one that swings beyond the limit
     exact = compare(problem("sensor_clipping", block=1), np.array([*NOMINAL, 0.25]), RELEASE)
-    assert (
-        confirm([exact], Settings().answer.integrator_tolerance).rms_difference < 0.2 * verdict.rms_difference
-    )
+    assert confirm([exact], INTEGRATOR_TOLERANCE).rms_difference < 0.2 * verdict.rms_difference
 
 
 def test_the_largest_difference_and_the_run_closest_to_its_tolerance_are_said():
     small, large = np.full(100, 1e-6), np.zeros(100)
     large[3] = 5e-6
     found = Comparison(("quiet", "loud"), [small, large], [small, large], (1e-5, 1e-3))
-    verdict = confirm([found], Settings().answer.integrator_tolerance)
+    verdict = confirm([found], INTEGRATOR_TOLERANCE)
     assert (verdict.agrees, verdict.run) == (True, "quiet")
     assert verdict.largest_difference == pytest.approx(5e-6)
     assert (verdict.rms_difference, verdict.tolerance) == (pytest.approx(1e-6), pytest.approx(1e-6))
     worse = dataclasses.replace(found, differences=[1.01 * small, large])
-    assert not confirm([found, worse], Settings().answer.integrator_tolerance).agrees
+    assert not confirm([found, worse], INTEGRATOR_TOLERANCE).agrees
 
 
 def test_a_motion_that_mujoco_cannot_follow_is_said(monkeypatch):
@@ -128,24 +122,24 @@ def test_a_motion_that_mujoco_cannot_follow_is_said(monkeypatch):
     monkeypatch.setattr(module, "mujoco_blocks", refuse)
     found = compare(problem(), np.array(NOMINAL), RELEASE)
     assert not np.any(found.differences)
-    verdict = confirm([found], Settings().answer.integrator_tolerance)
+    verdict = confirm([found], INTEGRATOR_TOLERANCE)
     assert not verdict.agrees
     assert verdict.failure == "the motion grows without bound"
     data = campaign()
     noise = campaign_noise(data, Settings().noise)
-    said = cautions(data, noise, (), verdict, named=False, settings=Settings())
+    said = cautions(data, noise, (), verdict, named=False)
     assert Fact("not followed", {"failure": verdict.failure}) in said
 
 
 def test_a_disagreement_is_a_caution_and_agreement_is_none():
     data = campaign()
-    noise, tolerance = campaign_noise(data, Settings().noise), Settings().answer.integrator_tolerance
+    noise, tolerance = campaign_noise(data, Settings().noise), INTEGRATOR_TOLERANCE
     good, bad = (
         confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, far)], (1e-4,))], tolerance)
         for far in (1e-6, 2e-5)
     )
-    assert cautions(data, noise, (), good, named=False, settings=Settings()) == ()
-    (said,) = cautions(data, noise, (), bad, named=False, settings=Settings())
+    assert cautions(data, noise, (), good, named=False) == ()
+    (said,) = cautions(data, noise, (), bad, named=False)
     assert (said.kind, said.figures["run"]) == ("not confirmed", "r1")
     assert (said.figures["rms_rad"], said.figures["tolerance_rad"]) == pytest.approx((2e-5, 1e-5))
 
@@ -155,7 +149,7 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
     alone = dataclasses.replace(data, runs=data.runs[:1])
     good = confirm(
         [Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))],
-        Settings().answer.integrator_tolerance,
+        INTEGRATOR_TOLERANCE,
     )
     found = {}
     for speed in (0.0, 10.0):
@@ -166,7 +160,6 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
             (),
             good,
             named=False,
-            settings=Settings(),
         )
         runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
         model = SpringModel().among(runs)

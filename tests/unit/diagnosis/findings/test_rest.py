@@ -13,14 +13,13 @@ from diagnosis.answer.linear_theory import (
     wind_on_runs,
 )
 from diagnosis.findings.averaged_coefficients import Answers, Possible, coefficients
-from diagnosis.findings.candidates import meant_coefficient, meant_parameter
+from diagnosis.findings.candidates import UNDETERMINED_FROM, meant_coefficient, meant_parameter
 from diagnosis.findings.remainder import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
-from diagnosis.settings import Settings
 from identification.estimate import Quantity
 from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
@@ -147,19 +146,15 @@ def test_no_gap_leaves_nothing(data, base):
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
     given = Quantity(0.2, std, "1/rad2")
-    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined_from)
+    found = meant_parameter(given, replace(info, scale=0.5), 0.3, UNDETERMINED_FROM)
     assert (found.std == std, found.determined) == (determined, determined)
 
 
 def test_a_range_no_wider_than_chance_determines_nothing():
     info = effect_class("coulomb_friction").parameters()[0]
     bounded = replace(info, fit_lower=1.0, fit_upper=3.0, scale=100.0)
-    assert meant_parameter(
-        Quantity(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined_from
-    ).determined
-    assert not meant_parameter(
-        Quantity(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined_from
-    ).determined
+    assert meant_parameter(Quantity(2.0, 0.5, "1"), bounded, 0.3, UNDETERMINED_FROM).determined
+    assert not meant_parameter(Quantity(2.0, 0.6, "1"), bounded, 0.3, UNDETERMINED_FROM).determined
 
 
 @pytest.mark.parametrize(

@@ -377,9 +377,9 @@ def estimates(**values):
 
 def test_a_change_of_two_per_cent_is_not_immaterial():
     before, after = estimates(cn_beta=0.5, cn_r=-0.1), estimates(cn_beta=0.5004, cn_r=-0.1003)
-    found = immaterial(before, after, Settings().words)
+    found = immaterial(before, after)
     assert found == pytest.approx({"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003})
-    assert immaterial(before, after | estimates(cn_r=-0.102), Settings().words) == {}
+    assert immaterial(before, after | estimates(cn_r=-0.102)) == {}
 
 
 def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():

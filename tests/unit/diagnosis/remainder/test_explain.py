@@ -168,7 +168,7 @@ def test_runs_that_differ_by_chance_are_no_error_of_the_reading_alike_in_all():
     reading, between = unexplained.common("reading"), unexplained.single("between")
     assert between.ceiling.closed > 0.95
     assert reading.ceiling.closed < 0.5
-    assert chosen_kind({"reading": reading}, {"between": between}, Settings().remainder) == "between"
+    assert chosen_kind({"reading": reading}, {"between": between}) == "between"
 
 
 def test_a_vibration_is_a_steady_line():
@@ -388,14 +388,14 @@ def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
 )
 def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
     given = [{name: evidence(name, share) for name, share in kinds.items()} for kinds in (common, single)]
-    assert chosen_kind(*given, Settings().remainder) == kind
+    assert chosen_kind(*given) == kind
 
 
 def test_a_kind_whose_share_is_not_determined_is_not_chosen():
     common, single = {"angle": evidence("angle", 1.0, std=0.9)}, {"event": evidence("event", 0.6, std=0.1)}
-    assert chosen_kind(common, single, Settings().remainder) == "event"
-    assert chosen_kind(common, {}, Settings().remainder) is None
-    assert chosen_kind(common, {"event": evidence("event", 0.01)}, Settings().remainder) is None
+    assert chosen_kind(common, single) == "event"
+    assert chosen_kind(common, {}) is None
+    assert chosen_kind(common, {"event": evidence("event", 0.01)}) is None
     rest = {"kind": "angle", "ceilings": [asdict(common["angle"].ceiling)]}
     table = closable_table(findings_of({"closable": rest}))
     assert table.rows[0][1] == "not determined"
