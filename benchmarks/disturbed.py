@@ -20,7 +20,6 @@ import numpy as np
 from diagnosis import diagnose
 from diagnosis.diagnosable import choose
 from diagnosis.search.investigate import nominal_study
-from diagnosis.settings import Settings
 from tunnel_reference.disturbance import DISTURBANCE, with_disturbances
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, truth_of
@@ -56,7 +55,7 @@ def answered(one: Simulated, name: str) -> dict[str, Any]:
     begun, campaign = time.process_time(), as_campaign(one, name)
     try:
         if hit is None:
-            chosen = choose(campaign, known_effects(), Settings().selection)
+            chosen = choose(campaign, known_effects())
             accused = nominal_study(chosen.campaign, chosen.kinds).disturbed
             seconds = time.process_time() - begun
             return {"name": name, "truth": truth, "disturbed": as_json(accused), "seconds": seconds}

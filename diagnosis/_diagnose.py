@@ -75,7 +75,7 @@ def diagnose(
     say = progress or (lambda _: None)
     with answering_with(kinds):
         judged = not isinstance(model, NominalModel)
-        chosen = choose(campaign, kinds, settings.selection, own, judged=judged)
+        chosen = choose(campaign, kinds, own, judged=judged)
         study = _studied(chosen, progress, settings, rivals)
         asked = Question(joint, short, tuple(leave_out), say)
         say("explained share")

@@ -56,7 +56,7 @@ class ByHand:
     """
 
     def __init__(self, campaign: Campaign, settings: Settings = Settings()) -> None:
-        comparable, _ = comparable_runs(diagnosable(campaign).campaign, settings.selection)
+        comparable, _ = comparable_runs(diagnosable(campaign).campaign)
         self._study = nominal_study(comparable, known_effects(), settings)
         self._base = excess_base(self._study)
         self._fits: dict[frozenset[str], Fit] = {frozenset(): self._study.nominal}

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import Final
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import free_frequency, response_to_input
 from diagnosis.model.untried_effects import untried_by_inputs
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
-from diagnosis.settings import SelectionSettings
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
@@ -29,6 +29,12 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run, speed_groups
 from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
+
+OTHER_MODE: Final = 1.5
+"""Minimum ratio of the frequencies with and without wind at which a run counts as another mode. Judgement."""
+SAME_SPRING: Final = 1.1
+"""Maximum ratio of the frequencies at one wind speed between runs of one spring. Judgement. The stiffnesses
+then differ by a fifth. Effects of the amplitude change a frequency gradually, and seldom by this much."""
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
 
@@ -98,7 +104,6 @@ class Chosen:
 def choose(
     campaign: Campaign,
     kinds: Sequence[type[Effect]],
-    settings: SelectionSettings,
     given: NominalModel | None = None,
     *,
     judged: bool = True,
@@ -115,7 +120,7 @@ def choose(
     found = diagnosable(campaign, judged=judged)
     if not found.limit_cycles:
         refuse_motionless(found.campaign, nominal_model(found.campaign, given))
-    compared, left_out = comparable_runs(found.campaign, settings)
+    compared, left_out = comparable_runs(found.campaign)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
         # Their sizes and ranges are those of angles; a mode moves the body.
@@ -128,7 +133,7 @@ def choose(
     return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
 
 
-def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
+def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     """Leave out the runs that cannot be fitted together with the others, with reasons.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
@@ -144,7 +149,7 @@ def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Ca
         other, why = (bare, "stiffness not stated") if kept is stated else (stated, "stiffness stated")
         left_out.append(Fact(why, {"runs": [run.id for run in other]}))
     if kept is bare:
-        same = _of_one_spring(bare, derivative, settings.same_spring)
+        same = _of_one_spring(bare, derivative, SAME_SPRING)
         if len(same) < len(bare):
             left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
         kept = same
@@ -157,10 +162,10 @@ def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Ca
         for run in kept
         if run.wind_on
         and run.spring_stiffness in still
-        and free_frequency(run, derivative) > settings.other_mode * median(still[run.spring_stiffness])
+        and free_frequency(run, derivative) > OTHER_MODE * median(still[run.spring_stiffness])
     ]
     if elsewhere:
-        figures = {"ratio": settings.other_mode, "runs": [run.id for run in elsewhere]}
+        figures = {"ratio": OTHER_MODE, "runs": [run.id for run in elsewhere]}
         left_out.append(Fact("another mode", figures))
         kept = [run for run in kept if run not in elsewhere]
     order = {run.id for run in kept}

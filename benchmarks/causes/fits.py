@@ -15,7 +15,6 @@ from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.model.data import Data
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.prepared import fit_nominal
-from diagnosis.settings import Settings
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -130,7 +129,7 @@ def _most_common(given: Sequence[Data]) -> Data | None:
 
 
 def _campaign(folder: Path) -> Campaign:
-    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign, Settings().selection)
+    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign)
     return campaign
 
 

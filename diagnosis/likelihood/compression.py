@@ -8,6 +8,7 @@ unless the residuals of the nominal model show otherwise.
 from __future__ import annotations
 
 import dataclasses
+from typing import Final
 
 import numpy as np
 from scipy.special import chdtri
@@ -17,6 +18,10 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.model.run_data import RunData
 from diagnosis.settings import SelectionSettings
 from tunnel_sim.vocabulary.record import Array
+
+BLOCK_LOSS: Final = 0.01
+"""Maximum share of the gap that wider blocks may average out. Judgement. Causes differ by much larger
+shares."""
 
 _MOST = 16  # blocks that become one
 _FAST = 0.4  # cycles in a wider block, above which its mean hides most of a line
@@ -92,5 +97,5 @@ def slow(residuals: list[Array], counts: list[int], chosen: SelectionSettings) -
         power = 2.0 * np.abs(spectrum) ** 2 / float(window @ window)  # χ² with two degrees of freedom
         lines, tried = max(lines, float(power.max())), tried + power.size
     rate = 0.5 * chosen.fast_rate
-    most = float(chdtri(freedom, rate)) + chosen.block_loss * max(excess, 0.0)
+    most = float(chdtri(freedom, rate)) + BLOCK_LOSS * max(excess, 0.0)
     return bool(lost < most and lines < chdtri(2, rate / tried))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.record import Array
+
+GROSS_MISFIT: Final = 0.01
+"""Minimum residual, as a share of the power of the readings, at which a fit fails to describe the motion.
+Judgement."""
 
 _HELD = 1e18  # precision of fixed deviations
 _MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
@@ -290,7 +295,7 @@ def misses_motion(fit: Fit) -> bool:
     """
     found = misfit(fit)
     at_motion = float(found.chi2.sum()) - float(found.chi2[CHANNELS.index("zero")])
-    return at_motion > fit.settings.selection.gross_misfit * found.motion
+    return at_motion > GROSS_MISFIT * found.motion
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:

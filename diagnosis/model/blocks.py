@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +16,13 @@ from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+
+LONG_REST: Final = 0.1
+"""Minimum duration of a rest at the end of a run, as a share of the run, for it to be cut off. Judgement. The
+angle at which friction stops a body says little about its motion."""
+REST_STDS: Final = 5.0
+"""Maximum deviation from the final reading at which the body counts as at rest, in std of a block mean.
+Convention."""
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
 BLOCK_INTERVAL = 4e-3
@@ -134,10 +142,8 @@ def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
         The data with such runs cut after their last reading that differs from their end by more than the noise, and
         the ids of these runs.
     """
-    chosen = data.settings.selection
-    ends = [_moves_until(run, chosen.rest_stds * run.noise.scale) for run in data.runs]
-    least = 1.0 - chosen.long_rest
-    rests = [end < least * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    ends = [_moves_until(run, REST_STDS * run.noise.scale) for run in data.runs]
+    rests = [end < (1.0 - LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
     each = list(zip(data.runs, ends, rests, strict=True))
     runs = tuple(run.part(last=end) if rest else run for run, end, rest in each)
     return data.with_runs(runs), tuple(run.id for run, _, rest in each if rest)

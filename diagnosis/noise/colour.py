@@ -12,6 +12,7 @@ below some corner; that of a random walk is not, because its zero departs ever f
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.optimize import minimize
@@ -23,6 +24,22 @@ from diagnosis.model.data import Data
 from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
 from identification.signal.colour import CYCLES, HANN, LOWEST, Periodogram, levinson, steady
 from tunnel_sim.vocabulary.record import Array
+
+COLOUR_FLAT: Final = 0.03
+"""Maximum deviation of a band from a flat spectrum that does not count as colour. Judgement. Quantisation
+causes a deviation of this size."""
+COLOUR_PARTS: Final = 4
+"""Minimum number of parts of the records for the test for colour. Judgement. Fewer parts may agree by
+chance."""
+COLOUR_AMPLITUDES: Final = 2.0
+"""Minimum ratio of the largest to the smallest motion among these parts, to show that the noise does not
+follow the motion. Judgement. The power of noise that follows the motion then differs by a factor of four."""
+COLOUR_BANDS: Final = 0.75
+"""Minimum share of stationary bands where only the wind-off runs show the colour. Judgement. Few parts are
+compared in that case, so non-stationary bands are easily missed."""
+COLOUR_SLOPE_STDS: Final = 2.0
+"""Margin by which the slope assumed below the lowest band exceeds the estimated slope, in standard
+deviations. Convention."""
 
 _PARTS = 8  # parts of records to compare, where they are long enough
 _OCTAVE_PARTS = 2  # bands in an octave
@@ -99,7 +116,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
         for piece in (slice(i * length, (i + 1) * length) for i in range(pieces)):
             parts.append(Periodogram.of(values[piece], run.interval, own, run.noise.variance))
             sizes.append(float(np.std(run.reading[piece] - values[piece])))
-    if len(sizes) < chosen.colour_parts or max(sizes) < chosen.colour_amplitudes * min(sizes):
+    if len(sizes) < COLOUR_PARTS or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
         return None
     lowest = max(
         LOWEST * max(part.frequency[1] for part in parts),
@@ -113,12 +130,12 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     kept = steady(power, count, chosen.colour_band_rate)
-    if kept.sum() < 2 or (throughout and not (kept[0] and kept.mean() >= chosen.colour_bands)):
+    if kept.sum() < 2 or (throughout and not (kept[0] and kept.mean() >= COLOUR_BANDS)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[kept] / total[kept])
     std = np.sqrt(1.0 / total[kept])
-    weight = 1.0 / (std**2 + chosen.colour_flat**2)
+    weight = 1.0 / (std**2 + COLOUR_FLAT**2)
     departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
     if departure < float(chdtri(level.size - 1, chosen.colour_rate)):  # one constant within chance
         return None
@@ -130,7 +147,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     slope = float((weight * centred) @ level[lowest_bands]) / information
     slope_std = float(np.sqrt(1.0 / information))
     # where a gap hides the lowest bands, a steeper slope would take the gap for noise
-    steep = slope - chosen.colour_slope_stds * slope_std if kept[0] else slope
+    steep = slope - COLOUR_SLOPE_STDS * slope_std if kept[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 

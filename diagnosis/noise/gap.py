@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.special import bdtrc, chdtrc, stdtr
@@ -23,6 +24,20 @@ from diagnosis.noise.rounding import repeated, repetitions, samples
 from diagnosis.noise.sensor_noise import NoiseTrend, trend_statistics
 from diagnosis.settings import GapSettings
 from tunnel_sim.effects import the_effect
+
+NOISE_TOLERANCE: Final = 0.03
+"""Allowed excess of the noise below 60 Hz over the noise above 60 Hz, as a share. Judgement. Quantisation
+colours the noise."""
+NOISE_TAILS: Final = 1.15
+"""Allowed ratio of the tails of the noise to those of a normal distribution. Judgement. Sensor noise is not
+exactly normal."""
+NOISE_ABOVE_STATED: Final = 1.5
+"""Maximum ratio of the noise variance to the stated variance that does not count as a gap. Judgement. Stated
+noise is often rounded to one digit."""
+
+COLOUR_BEYOND: Final = 3.5
+"""Multiple of the frequency of the motion above which the spectrum must be coloured where a gap remains.
+Judgement. The bands below contain the motion."""
 
 _MOST, _FEWEST = 32, 16  # repetitions of the campaign
 #: A step this many times the noise hides its level, since crossed edges look like noise; several levels are tried.
@@ -43,7 +58,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
         return dict.fromkeys(_NAMES, 1.0)
     white = noise.white(trend.step)
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
-    tails = np.log(fit.settings.gap.noise_tails)
+    tails = np.log(NOISE_TAILS)
     observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - tails])
     count = repetitions(fit, _FEWEST, _MOST)
     found = np.zeros(3)
@@ -66,7 +81,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (fit.settings.gap.noise_above_stated * noise.stated_variance)
+    level = noise.estimated / (NOISE_ABOVE_STATED * noise.stated_variance)
     ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
     return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
 
@@ -107,7 +122,7 @@ def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
     """
     chosen = fit.settings.gap
     level, scatter = noise.rounding.expected(fit)
-    floor = (1.0 + chosen.noise_tolerance) * noise.margin * level
+    floor = (1.0 + NOISE_TOLERANCE) * noise.margin * level
     noisy: dict[str, float] = {}
     if noise.shown and not coarse_step:
         noisy |= trend_p_values(trend, fit, noise)
@@ -209,8 +224,7 @@ class _Candidate:
         if test.detected:
             still = any(not run.wind_on for run in self.nominal.problem.data.runs)
             excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
-            beyond = chosen.noise.colour_beyond
-            return still and not excessive and noise_colour(self.source, beyond=beyond) is not None
+            return still and not excessive and noise_colour(self.source, beyond=COLOUR_BEYOND) is not None
         repeats = alike_in_all_runs(self.nominal) or _follows_input(self.fit)
         return not repeats and not zero_wanders(self.nominal, self.noise.spectrum)
 

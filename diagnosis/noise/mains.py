@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -26,6 +27,18 @@ from diagnosis.noise.sensor_noise import SmoothCurve
 from diagnosis.settings import ReadOffSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
+
+HUM_RUNS: Final = 0.75
+"""Minimum share of the runs that must show the hum. Judgement."""
+HUM_CONTRAST: Final = 4.0
+"""Minimum ratio of the drop of χ² at the line of the hum to the largest drop nearby, all runs combined.
+Judgement. The spectrum also rises at natural frequencies of the rod and at corner frequencies."""
+HUM_STEADY: Final = 0.25
+"""Minimum ratio of the hum's power in one half of the runs to its power in the other half. Judgement. Hum
+from an amplifier or a lamp may change by a factor of two. A mode excited at the release decays more."""
+HUM_ALIKE: Final = 0.02
+"""Maximum relative difference in evidence at which two mains frequencies explain the lines equally well.
+Judgement."""
 
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
@@ -66,7 +79,7 @@ def find_hum(nominal: Fit) -> float | None:
     if not found:
         return None
     most = max(line.evidence for line in found)
-    alike = (line for line in found if line.evidence >= (1.0 - chosen.hum_alike) * most)
+    alike = (line for line in found if line.evidence >= (1.0 - HUM_ALIKE) * most)
     return min(alike, key=lambda line: line.plainness).parameter
 
 
@@ -88,9 +101,9 @@ def _is_hum(line: MainsLine, chosen: ReadOffSettings, *, known: bool) -> bool:
     shown = line.powers > chdtri(2.0 * line.pieces, chosen.hum_run_rate)
     return (
         line.drop > chance
-        and line.contrast >= chosen.hum_contrast
-        and float(np.mean(shown)) >= chosen.hum_runs
-        and chosen.hum_steady <= line.later <= 1.0 / chosen.hum_steady
+        and line.contrast >= HUM_CONTRAST
+        and float(np.mean(shown)) >= HUM_RUNS
+        and HUM_STEADY <= line.later <= 1.0 / HUM_STEADY
     )
 
 

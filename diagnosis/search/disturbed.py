@@ -20,7 +20,7 @@ from diagnosis.noise.gap import GapTest
 from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.odd_run import odd_alone
+from diagnosis.search.odd_run import DISTURBED_FEWEST, DISTURBED_KEPT, DISTURBED_SHARE, odd_alone
 from diagnosis.search.prepared import Prepared, prepared_and_tested
 from diagnosis.search.scatter import scattered
 from diagnosis.settings import SelectionSettings, Settings
@@ -108,13 +108,11 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         last = min(float(one.time[first]), float(one.time[most]) - 1.0 / frequency)
         begun = origins[name] + similarity.own(runs[name].start, "s")
         at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
-        kept = until if last * frequency >= chosen.disturbed_kept else None
+        kept = until if last * frequency >= DISTURBED_KEPT else None
         after = float(one.time[most]) + 1.0 / frequency
         span = runs[name].reading.size * runs[name].interval
         # of a start that is not free, as of a hand that holds the body, the rest is used
-        begins = (
-            kept is None and (span - after) * frequency >= chosen.disturbed_kept and after < _EARLY * span
-        )
+        begins = kept is None and (span - after) * frequency >= DISTURBED_KEPT and after < _EARLY * span
         starts = begun + similarity.own(after, "s") if begins else None
         found.append(Disturbance(name, at, kept, p_value, kept_from_s=starts))
     return tuple(sorted(found, key=lambda one: one.run))
@@ -127,7 +125,7 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
     (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
     run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not determine it.
     """
-    if len(runs) < chosen.disturbed_fewest:
+    if len(runs) < DISTURBED_FEWEST:
         return []
     from scipy.special import stdtr  # only here: slow to load
 
@@ -135,7 +133,7 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
     # a value below the expected maximum of as many χ² by chance is not a jump
     sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
     order = np.argsort(-sizes)
-    most = min(max(1, int(chosen.disturbed_share * len(runs))), len(runs) - 2)
+    most = min(max(1, int(DISTURBED_SHARE * len(runs))), len(runs) - 2)
     p_values = []
     for place in range(most):
         one, others = order[place], sizes[order[place + 1 :]]

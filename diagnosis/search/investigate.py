@@ -13,7 +13,7 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
 from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.disturbed import prepared_undisturbed, together, undisturbed
-from diagnosis.search.odd_run import odd_runs
+from diagnosis.search.odd_run import DISTURBED_SHARE, odd_runs
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets, with_near_rivals
@@ -94,8 +94,7 @@ def without_odd_runs(
     Returns:
         With the runs that are left out among the disturbed ones; unchanged where no set explains the others.
     """
-    chosen = found.settings.selection
-    for _ in range(max(1, int(chosen.disturbed_share * len(campaign.runs)))):
+    for _ in range(max(1, int(DISTURBED_SHARE * len(campaign.runs)))):
         odd = odd_runs(campaign, found)
         if not odd:
             break

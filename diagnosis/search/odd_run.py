@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.special import chdtrc, fdtrc
@@ -36,6 +36,19 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
     from diagnosis.search.study import Study
+
+DISTURBED_FEWEST: Final = 3
+"""Minimum number of free decays in which a disturbed run is sought. Judgement. With two runs, a disturbance
+of one cannot be distinguished from a property of all."""
+DISTURBED_SHARE: Final = 0.25
+"""Maximum share of the runs that may be disturbed; at least one run. Judgement. The others show the common
+behaviour."""
+DISTURBED_KEPT: Final = 6.0
+"""Minimum number of cycles before a disturbance for that part of the run to be used. Otherwise the run is
+left out. Judgement. A record needs three cycles, and its damping needs twice as many."""
+ODD_HOLDS: Final = 0.5
+"""Minimum share of the gap in each of several odd runs, of the gap of the runs that are left. Convention.
+Most of it."""
 
 _SETS, _RUNS = 6, 2  # sets, and runs of each, that are refitted
 
@@ -121,7 +134,7 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
     cycle = 1.0 / (resonance(nominal, index) * run.interval)  # in blocks
     for quarters in range(1, int(run.reading.size / cycle) + 1):
         first = round(quarters * cycle / 4.0)
-        if run.reading.size - first < chosen.disturbed_kept * cycle:
+        if run.reading.size - first < DISTURBED_KEPT * cycle:
             return None
         data = others.problem.data.with_runs((run.part(first),))
         start = Point(others.point.common, np.zeros((1, others.point.per_run.shape[1])))
@@ -158,7 +171,7 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
         kinds: the effects that may be named, those between runs among them.
     """
     data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
-    if data.driven or len(data.runs) < chosen.disturbed_fewest:
+    if data.driven or len(data.runs) < DISTURBED_FEWEST:
         return []
     tried = [one for one in _without_a_run(sets) if max(one.p_values.values()) < chosen.disturbed_rate]
     gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in tried if not one.beside.effects}
@@ -188,12 +201,12 @@ def _without_several(
     Args:
         tried: the nominal model without each run.
     """
-    chosen, whole = nominal.settings.selection, nominal
+    whole = nominal
     known: dict[str, float] = {}
-    for _ in range(max(1, int(chosen.disturbed_share * len(nominal.problem.data.runs)))):
+    for _ in range(max(1, int(DISTURBED_SHARE * len(nominal.problem.data.runs)))):
         differing = scattered(whole, kinds)
         best = _worst_of(whole, tried) if differing is None else _worst_beside(differing, whole)
-        if best is None or len(best.beside.fit.residuals) < chosen.disturbed_fewest - 1:
+        if best is None or len(best.beside.fit.residuals) < DISTURBED_FEWEST - 1:
             return
         whole, known = best.beside.fit, {**known, **best.p_values}
         beside = scattered(whole, kinds)
@@ -208,7 +221,7 @@ def _worst_of(whole: Fit, tried: Sequence[OddRuns]) -> OddRuns | None:
     left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
     if best is None or max(best.p_values.values()) >= chosen.disturbed_rate:
         return None
-    return best if left < (1.0 - chosen.odd_holds) * (whole.total - whole.count) else None
+    return best if left < (1.0 - ODD_HOLDS) * (whole.total - whole.count) else None
 
 
 def _worst_beside(differing: Fit, whole: Fit) -> OddRuns | None:
@@ -222,7 +235,7 @@ def _worst_beside(differing: Fit, whole: Fit) -> OddRuns | None:
     index = int(np.argmax(own))
     size = differing.residuals[index].size
     p_value = min(1.0, own.size * float(chdtrc(size, own[index] + size)))
-    alone = own[index] > chosen.odd_holds * float(np.maximum(own, 0.0).sum())
+    alone = own[index] > ODD_HOLDS * float(np.maximum(own, 0.0).sum())
     if index not in replaceable(data) or not alone or p_value >= chosen.disturbed_rate:
         return None
     fitted = refitted_without(whole, index)

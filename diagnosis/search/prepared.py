@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -42,6 +43,9 @@ from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+COARSE_FROM: Final = 1.5
+"""Minimum ratio of the step of the readings to the stated resolution for a coarse sensor. Judgement."""
 
 #: The effects detected in the records before any is fitted.
 HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
@@ -172,8 +176,7 @@ def prepared_and_tested(
         noise = campaign_noise(campaign, settings.noise)
         trend, step = noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        least = settings.read_off.coarse_step
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > least * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSE_FROM * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity, model=model, settings=settings))
         hum = None

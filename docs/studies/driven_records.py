@@ -25,7 +25,6 @@ from diagnosis.likelihood.partial import fit_seen
 from diagnosis.model.parameters import Point
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import nominal_study
-from diagnosis.settings import Settings
 from identification import identify
 from identification.show.style import save
 from tunnel_lab.report.diagnosis_file import read_diagnosis
@@ -75,7 +74,7 @@ def fitted(campaign: Campaign, answer: Diagnosis) -> tuple[Fit, Fit]:
     }
     kinds = vocabulary(list(dict.fromkeys(name.split(".")[0] for name in parameters)))
     with answering_with(kinds):
-        chosen = choose(campaign, kinds, Settings().selection)
+        chosen = choose(campaign, kinds)
         study = nominal_study(chosen.campaign, chosen.kinds)
     nominal = study.nominal
     infos = {f"{kind.name}.{info.name}": info for kind in kinds for info in kind.parameters()}

@@ -9,7 +9,6 @@ from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import comparable_runs, without_short
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import frequency
-from diagnosis.settings import Settings
 from identification.status import Outcome
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
@@ -33,13 +32,13 @@ PAIR = [Setting(spring, speed) for spring in STIFFNESSES for speed in (0.0, 0.0,
 
 
 def kept(data):
-    found, said = comparable_runs(data, Settings().selection)
+    found, said = comparable_runs(data)
     return [run.id for run in found.runs], said
 
 
 def test_runs_that_all_state_their_spring_stay():
     data = decays(PAIR)
-    found, said = comparable_runs(data, Settings().selection)
+    found, said = comparable_runs(data)
     assert found.runs == data.runs
     assert said == ()
 
@@ -132,7 +131,7 @@ def test_unlike_springs_that_are_not_stated_are_no_gap():
 def test_a_wind_on_run_in_another_mode_is_left_out():
     data = decays(PAIR[:3])
     fast = replace(data.runs[2], record=Record(0.5 * data.runs[2].record.time_s, data.runs[2].record.yaw_rad))
-    found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)), Settings().selection)
+    found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)))
     assert [run.id for run in found.runs] == ["r01", "r02"]
     assert (said.kind, said.figures["runs"]) == ("another mode", ["r03"])
 
@@ -172,6 +171,6 @@ def test_wind_speeds_within_their_reading_are_one_speed():
     """24.9972 and 25 m/s are one setting of the fan, so a run of another spring is left out among them."""
     speeds = (25.0, 24.9972, 25.0, 24.98)
     data = decays([Setting(16.12, speed) for speed in speeds] + [Setting(44.84, 25.01)], bare=range(5))
-    found, (said,) = comparable_runs(data, Settings().selection)
+    found, (said,) = comparable_runs(data)
     assert [run.id for run in found.runs] == ["r01", "r02", "r03", "r04"]
     assert said == Fact("other springs", {"runs": ["r05"]})

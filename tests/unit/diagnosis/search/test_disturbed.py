@@ -210,7 +210,7 @@ def test_a_blow_is_not_taken_for_a_clock_that_drifts() -> None:
     conditions = [(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 15.0, 25.0)]
     struck = with_blow(campaign(seed=0, conditions=conditions), 8e-3, 2.1, "r1")
     assert not any(remark.outcome is Outcome.REFUSED for remark in examine(struck).remarks)
-    chosen = choose(struck, known_effects(), CHOSEN)
+    chosen = choose(struck, known_effects())
     assert [one.run for one in nominal_study(chosen.campaign, chosen.kinds).disturbed] == ["r1"]
 
 
@@ -223,7 +223,7 @@ def test_without_a_cause_there_is_no_gap_beside_the_blow() -> None:
 
 def test_by_hand_the_same_runs_are_used() -> None:
     struck = with_blow(campaign(), 5e-3, 4.0, "r2")
-    chosen = choose(struck, known_effects(), CHOSEN)
+    chosen = choose(struck, known_effects())
     assert [one.run for one in nominal_study(chosen.campaign, chosen.kinds).disturbed] == ["r2"]
     assert ByHand(struck).closure(()).before < 0.1
 
