@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
@@ -25,6 +26,10 @@ from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
+
+LIMIT_TOLD: Final = 0.5
+"""Maximum ratio of the upper limit of a scatter that is not detected to its limit before any run, for the
+runs to say something about it. Judgement. Above it the limit is the prior's."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +225,7 @@ class RunDeviations:
         unseen = prior.usual * 10.0 ** (prior.decades * float(ndtri(_AT_MOST)))
         per = np.array([self._per(index) for index in range(len(self.fitted.problem.data.runs))])
         sizes = widths * np.sqrt(np.mean(per**2, axis=0))
-        told = widths <= self.fitted.settings.scatter.limit_told * unseen
+        told = widths <= LIMIT_TOLD * unseen
         frequency, damping = (float(size) if known else None for size, known in zip(sizes, told, strict=True))
         return ScatterLimits(frequency, damping)
 

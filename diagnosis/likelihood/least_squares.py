@@ -6,7 +6,7 @@ import math
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
+
+SHOWN_STDS: Final = 4.0
+"""Minimum size of an effect for single runs to show it, without a comparison of runs, in standard deviations.
+Convention. One effect in 16,000 reaches this size by chance."""
 
 _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than without the added effect
@@ -115,7 +119,7 @@ class Fit:
         """Whether single runs show an effect: its size differs from zero by their evidence alone."""
         if self.between is None:
             return {}
-        shown = self.between.shown(self.point.common, self.settings.scatter.shown_stds)
+        shown = self.between.shown(self.point.common, SHOWN_STDS)
         by_itself = dict(zip(self.problem.names, shown.tolist(), strict=True))
         sizes = {kind.name: f"{kind.name}.{kind.parameters()[0].name}" for kind in self.problem.effects}
         return {name: by_itself.get(size, True) for name, size in sizes.items()}

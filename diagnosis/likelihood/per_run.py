@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from diagnosis.likelihood.residuals import SpectralLine, linear_coefficients, re
 from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
+
+MODE_RUNS: Final = 0.5
+"""Minimum share of the runs in which a second mode must be distinct from the motion. Convention."""
 
 _RINGING_PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
@@ -76,7 +80,7 @@ def ringing(fit: Fit) -> Sought | None:
         own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
         apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
     beside = np.array(apart)
-    free = np.mean(beside, axis=0) >= fit.settings.search.mode_runs
+    free = np.mean(beside, axis=0) >= MODE_RUNS
     if not free.any():
         return None
     shortest = min(run.duration for run in runs)
@@ -141,7 +145,7 @@ def excited(fit: Fit) -> Sought | None:
         np.arange(np.log(0.1 * min(own)), np.log(0.8 * np.pi / max(r.interval for r in runs)), _APART)
     )
     beside = np.mean([np.abs(grid / one - 1.0) > NEAR_MOTION for one in own], axis=0)
-    grid = grid[beside >= fit.settings.search.mode_runs]
+    grid = grid[beside >= MODE_RUNS]
     found = Sought((0.0, 1.0, 0.0), np.zeros(len(runs)), 0.0)
     for frequency in grid.tolist():
         for damping_ratio in _DAMPINGS:

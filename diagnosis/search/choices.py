@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible
 from tunnel_sim.effects import Effect
+
+CHOICE_KEPT: Final = 0.05
+"""Minimum probability of an alternative spring to be stated. Judgement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +61,7 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
     scale = Scale.of(sets, gap, weighing)
     logs = np.array([scale.weight(one) for one in sets])
     weights = np.exp(logs - logs.max())
-    kept = weights / weights.sum() >= weighing.choice_kept
+    kept = weights / weights.sum() >= CHOICE_KEPT
     if kept.sum() < 2:
         return ()
     shares = weights * kept / (weights @ kept)

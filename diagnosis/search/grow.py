@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Final
 
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, Scale
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import likelier
+
+GROWTH_LOSS: Final = 2.8
+"""Maximum loss in the logarithm of the weight by an added effect for the set to be extended further.
+Judgement. A superfluous effect costs more. One of two equal causes explains only half."""
+MOST_CAUSES: Final = 5
+"""Maximum number of named causes, in effects. Convention. One to four causes of the vocabulary, and a small
+one."""
 
 
 def grow(
@@ -59,7 +67,7 @@ def going_on(
     for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
-        if first or scale.weight(child) > max(map(scale.weight, smaller)) - settings.search.growth_loss:
+        if first or scale.weight(child) > max(map(scale.weight, smaller)) - GROWTH_LOSS:
             going.append(child)
     return going
 
@@ -69,7 +77,7 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
     if not hypothesis.effects:
         return True
     rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
-    return rises and len(hypothesis.effects) < hypothesis.fit.settings.search.most_causes
+    return rises and len(hypothesis.effects) < MOST_CAUSES
 
 
 def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: RunsInView) -> list[Hypothesis]:

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,25 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
+
+NEEDLESS_SPRING: Final = 0.05
+"""Maximum stiffness of an unstated spring, as a share of its stiffness with gravity, at which the rig has no
+spring. Judgement (decision 0018). The set then counts two parameters less: a spring would have to soften by
+chance exactly as much as gravity does."""
+
+FORM_NEEDED: Final = 0.2
+"""Minimum rise of χ² without a freed form, as a share of the excess, for the form to be kept. Tuned (decision
+0008)."""
+FREED_HYPOTHESES: Final = 3
+"""Number of sets of one effect whose forms are freed. Judgement (decision 0008). Time against coverage."""
+GRAVITY_CANCELS: Final = 0.8
+"""Maximum share of an unstated spring that gravity may cancel. Judgement (decision 0029). Beyond this share
+the two imitate a nonlinear spring. Silverbox is not an independent test."""
+PLAUSIBLE_RUNS: Final = 0.5
+"""Minimum share of the runs in which an effect must agree with its definition. Convention."""
+TURNED_AS_WELL: Final = 1.01
+"""Maximum ratio of χ² at which a fit with the angle turned by half a turn explains the readings equally well.
+Judgement."""
 
 #: The parameters of a general form, as ``effect.parameter``.
 Form: TypeAlias = tuple[str, ...]
@@ -68,7 +87,7 @@ class Hypothesis:
         numbers = self.forms + sum(kind.numbers_like_forms(problem.instants) for kind in problem.effects)
         spring = self.fit.fitted_spring
         if spring is not None:
-            needless = self.fit.settings.weighing.needless_spring * linear_coefficients(self.fit, 0)[2]
+            needless = NEEDLESS_SPRING * linear_coefficients(self.fit, 0)[2]
             numbers -= 2 * (spring < needless)
         return numbers
 
@@ -195,9 +214,8 @@ def is_plausible(fitted: Fit) -> bool:
     whose free exponent ends at a bound, nor friction whose rate does: the readings ask for another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
-    chosen = fitted.settings.search
     spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
-    if spring is not None and -gravity > chosen.gravity_cancels * spring:
+    if spring is not None and -gravity > GRAVITY_CANCELS * spring:
         return False
     inside = [
         f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.inside
@@ -209,7 +227,7 @@ def is_plausible(fitted: Fit) -> bool:
     ]
     return all(
         np.mean([effect.plausible(omega) and effect.shown_in(duration) for omega, duration in motions])
-        >= chosen.plausible_runs
+        >= PLAUSIBLE_RUNS
         for effect in effects
     )
 
@@ -234,7 +252,7 @@ def turned_back(fitted: Fit) -> Fit:
     common[[problem.names.index(name) for name in signs]] *= -1.0
     release[:, 0] -= turn
     turned = try_fit(problem, Point(common, release))
-    greatest = fitted.settings.search.turned_as_well * fitted.total
+    greatest = TURNED_AS_WELL * fitted.total
     return fitted if turned is None or turned.total >= greatest else turned
 
 
@@ -266,7 +284,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 
 
 def with_forms(
-    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int | None = None
+    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a large residual and they gain weight.
 
@@ -276,15 +294,15 @@ def with_forms(
     Args:
         gap: misfit of the nominal model.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: number of the best that are tried with free forms; None: the setting.
+        count: number of the best that are tried with free forms.
 
     Returns:
         All hypotheses, best first.
     """
     ranked = sorted(found, key=lambda h: h.fit.total)
     for place, hypothesis in enumerate(ranked):
-        textbook, chosen = hypothesis.fit, hypothesis.fit.settings.search
-        if place == (chosen.freed_hypotheses if count is None else count):
+        textbook = hypothesis.fit
+        if place == count:
             break
         scale = Scale.of(ranked, gap, textbook.settings.weighing)
         needless = textbook is hypothesis.plain or textbook.excess <= least
@@ -302,7 +320,7 @@ def with_forms(
             tried[forms] = freed = _free_forms(start, forms)
             if freed is None or (parts and not _explains_more(freed, start)):
                 continue
-            needed = _needed(freed, forms, chosen.form_needed * textbook.excess * textbook.count)
+            needed = _needed(freed, forms, FORM_NEEDED * textbook.excess * textbook.count)
             if needed and needed != forms:
                 freed = _free_forms(textbook, needed) or freed
             ranked[place] = of_more_weight(
@@ -417,7 +435,7 @@ def _worth_a_form(fitted: Fit, least: float) -> float:
     Args:
         least: χ² with the forms so far.
     """
-    gain = fitted.settings.search.form_needed * (least - fitted.count)
+    gain = FORM_NEEDED * (least - fitted.count)
     return least - max(gain, fitted.settings.weighing.needless_chi2)
 
 

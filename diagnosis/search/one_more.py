@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,22 @@ from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight
 from diagnosis.search.scatter import likelier, with_likeliest_widths
 from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
+
+ALWAYS_FITTED: Final = 7
+"""Number of effects that are fitted in any case, ranked by linear theory. Judgement. Linear theory ranks
+effects well, but cannot decide."""
+PREDICTED_SHARE: Final = 0.01
+"""Minimum predicted drop of χ², as a share of χ², for further effects to be fitted. Judgement."""
+LEAST_DROP: Final = 20.0
+"""Minimum predicted drop of χ² for an effect to be fitted beside others. Judgement. Two parameters lower χ²
+by more than 20 by chance once in 22,000 effects tried."""
+LIKELY_BESIDE_SCATTER: Final = 6
+"""Number of effects that are fitted in any case where scatter between runs explains their deviations.
+Judgement. Linear theory underestimates effects hidden by deviations of the runs. Time against coverage."""
+GROWN_BY: Final = 4
+"""Number of effects that are added to a set. Judgement. Time against coverage."""
+SAME_CHANGE: Final = 0.02
+"""Maximum difference between the changes of two equivalent sets, as a share of the power. Judgement."""
 
 _ITERATIONS = 12  # of an intermediate fit; the answer's is polished
 
@@ -32,7 +49,7 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     """Whether two fits differ by a small share of the power of their change to the nominal fit."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
-    return apart < nominal.settings.search.same_change * (nominal.total - max(one.total, other.total))
+    return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
 def sets_with_one_more(
@@ -77,7 +94,7 @@ def _worth_fitting(
     between the runs explain them, the effects of greatest predicted likelihood are fitted.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
-    weighing, chosen = parent.fit.settings.weighing, parent.fit.settings.search
+    weighing = parent.fit.settings.weighing
     scale = misfit_scale(misfit(parent.fit), weighing)
     scored.sort(
         key=lambda item: min(
@@ -90,16 +107,14 @@ def _worth_fitting(
         for kind, starts in scored:  # the chance gain of the effect's parameters per run does not count
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
         if not parent.effects:
-            likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
+            likely = sorted(scored, key=lambda item: -beyond[item[0].name])[:LIKELY_BESIDE_SCATTER]
             return [item for item in likely if beyond[item[0].name] > 0.0]
-        worth = [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
+        worth = [item for item in scored[:GROWN_BY] if beyond[item[0].name] > LEAST_DROP]
         # linear theory underestimates these: the runs' deviations absorb most of the prediction, not of the effect
         absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
         return worth + [item for item in absorbed if item not in worth and beyond[item[0].name] > 0.0]
-    limit = chosen.predicted_share * parent.fit.total
-    return [
-        item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit
-    ]
+    limit = PREDICTED_SHARE * parent.fit.total
+    return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
 
 
 def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:

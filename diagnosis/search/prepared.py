@@ -44,6 +44,9 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
+HUM_LEFT: Final = 0.02
+"""Maximum residual share of a removed hum that needs no cause. Judgement."""
+
 COARSE_FROM: Final = 1.5
 """Minimum ratio of the step of the readings to the stated resolution for a coarse sensor. Judgement."""
 
@@ -117,7 +120,7 @@ class Prepared:
         Args:
             base: fit of the nominal model to the runs on which sets are compared.
         """
-        left = self.hum_power(base, self.settings.weighing.hum_left)
+        left = self.hum_power(base, HUM_LEFT)
         if not self.coarse:
             return left
         levels, stated = reading_levels(self.campaign), self.campaign.sensor.noise_std

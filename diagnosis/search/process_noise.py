@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.optimize import minimize
@@ -34,6 +35,9 @@ from diagnosis.search.random_spectra import (
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
+
+PART_STDS: Final = 2.0
+"""Margin of that drop over the minimum, in its scatter between runs, in standard deviations. Convention."""
 
 _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
 _SETTLE = 1.0  # s left out at the start: the transient of the filter
@@ -143,7 +147,7 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMom
     if gains.size < 2:
         return False
     std = float(np.std(gains, ddof=1)) * np.sqrt(gains.size)
-    return bool(gains.sum() - chosen.part_stds * std > chosen.part_price)
+    return bool(gains.sum() - PART_STDS * std > chosen.part_price)
 
 
 def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:

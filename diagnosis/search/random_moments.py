@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.special import fdtrc
@@ -22,7 +23,7 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, mi
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import grow
+from diagnosis.search.grow import MOST_CAUSES, grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
@@ -38,8 +39,25 @@ from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
-from diagnosis.settings import RandomMomentSettings
 from tunnel_sim.effects import Effect
+
+ALIKE_WITHIN: Final = 20.0
+"""Difference of −2 ln L below which two kinds of random moment explain the residuals equally well, in χ².
+Judgement (decision 0046). The minimum drop for a random moment: real spectra are not first-order, and smaller
+differences reflect the shape of the spectrum."""
+EVIDENT_FROM: Final = 20.0
+"""Minimum drop of χ² for a further effect beside a random moment to be evident. Judgement. Two parameters
+lower χ² by more than 20 by chance once in 22,000 effects tried."""
+FURTHER_EFFECTS: Final = 2
+"""Maximum number of effects added to make the innovations white. Judgement. Time against coverage."""
+LAW_SHARE: Final = 0.5
+"""Minimum share of the residual, on held-out runs, that a law with the wind must explain to replace a random
+moment. Convention. More than half."""
+NO_NOISE_SHARE: Final = 0.9
+"""Share of the residual explained by one law, on held-out runs, above which no random moment is sought.
+Judgement. At most a tenth of the residual then differs from run to run."""
+LAW_STDS: Final = 2.0
+"""Margin over that share, in its scatter, in standard deviations. Convention."""
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
@@ -93,13 +111,13 @@ def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> 
         return []
     named = [source for source in SOURCES if any(source.may_be(kind) for kind in view.prepared.kinds)]
     acting = [source for source in named if _may_act(source, best, scale)]
-    found, within = list[_Beside](), view.base.settings.moment.alike_within
+    found = list[_Beside]()
     for source in sorted(acting, key=lambda one: _explained(one, best)[0]) if len(acting) > 1 else acting:
-        if all(one.cost_from(source) < one.cost + within for one in found):
+        if all(one.cost_from(source) < one.cost + ALIKE_WITHIN for one in found):
             one = _Beside.found(source, best, view)
             found += [] if one is None else [one]
     least = min((one.cost for one in found), default=0.0)
-    return [answer for one in found if one.cost < least + within for answer in one.answers()]
+    return [answer for one in found if one.cost < least + ALIKE_WITHIN for answer in one.answers()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +140,7 @@ class _Beside:
         """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
         top = _settled(best, view, source)
-        for number in range(chosen.further_effects + 1):
+        for number in range(FURTHER_EFFECTS + 1):
             if number > 0:  # a small effect that no gap shows may keep the innovations from being white
                 further = _evident(top, view.able)
                 if not further:
@@ -133,7 +151,7 @@ class _Beside:
             shown = [one for one in steady if _shown_apart(one, source, seen.fit)]
             process = likeliest(shown, chosen)
             if process is not None and _is_random(process, source, seen.fit):
-                return cls((process, *_others_alike(process, shown, chosen)), top, seen, view)
+                return cls((process, *_others_alike(process, shown)), top, seen, view)
         return None
 
     def cost_from(self, source: MomentSource) -> float:
@@ -172,16 +190,14 @@ class _Beside:
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
 
 
-def _others_alike(
-    process: ProcessNoise, shown: Sequence[ProcessNoise], chosen: RandomMomentSettings
-) -> list[ProcessNoise]:
+def _others_alike(process: ProcessNoise, shown: Sequence[ProcessNoise]) -> list[ProcessNoise]:
     """Moments about a fixed frequency beside one that follows the wind, and the reverse, if as likely."""
     kind, found = _kind(process), dict[frozenset[str], ProcessNoise]()
     about = [one for one in shown if any(part.states > 1 for part in one.spectrum)]
     if process not in about:
         return []
     for one in sorted(about, key=lambda one: -one.cost):
-        if _kind(one) != kind and one.cost < process.cost + chosen.alike_within:
+        if _kind(one) != kind and one.cost < process.cost + ALIKE_WITHIN:
             found[_kind(one)] = one
     return sorted(found.values(), key=lambda one: one.cost)
 
@@ -228,7 +244,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     shows how much of a drop of χ² is chance. An effect with an instant in every run must lower χ² for each instant
     as well.
     """
-    if len(top.effects) >= top.fit.settings.search.most_causes:
+    if len(top.effects) >= MOST_CAUSES:
         return []
     able = {kind.name: kind for kind in kinds if not kind.line}
     larger = sets_with_one_more([top], list(able.values()))
@@ -238,7 +254,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
         numbers = 1 + len(kind.per_run_parameters(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
         gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
-    return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
+    return [larger[i] for i in order if gains[i] > EVIDENT_FROM]
 
 
 def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
@@ -334,7 +350,7 @@ def obeys_a_law(fitted: Fit, source: MomentSource) -> bool:
     Returns:
         Whether one of these laws (`diagnosis.likelihood.paths`) explains enough of held-out runs, beyond chance.
     """
-    return _closed_by_a_law(fitted, source.laws, fitted.settings.moment.law_share)
+    return _closed_by_a_law(fitted, source.laws, LAW_SHARE)
 
 
 def is_no_noise(fitted: Fit) -> bool:
@@ -342,14 +358,14 @@ def is_no_noise(fitted: Fit) -> bool:
 
     The rest is then too small for a random moment to be the missing cause, and none is sought.
     """
-    return _closed_by_a_law(fitted, list(COMMON), fitted.settings.moment.no_noise_share)
+    return _closed_by_a_law(fitted, list(COMMON), NO_NOISE_SHARE)
 
 
 def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
     """Whether a law of some kind explains more than a share of a residual on held-out runs."""
     unexplained = Unexplained(fitted)
-    found, stds = (unexplained.common(kind).ceiling for kind in kinds), fitted.settings.moment.law_stds
-    return any(one.closed - stds * one.std > share for one in found)
+    found = (unexplained.common(kind).ceiling for kind in kinds)
+    return any(one.closed - LAW_STDS * one.std > share for one in found)
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

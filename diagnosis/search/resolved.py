@@ -7,6 +7,7 @@ effect shows at large amplitudes alone, or at small ones alone; an effect that o
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,10 @@ from diagnosis.likelihood.least_squares import Fit, fit_at
 from diagnosis.likelihood.normal_equations import Products, normal_equations
 from diagnosis.likelihood.partial import fit_seen
 from tunnel_sim.vocabulary.record import Array
+
+RESOLVED_STDS: Final = 2.0
+"""Minimum distance of an effect from zero, fitted to one half of the records, for that half to confirm it, in
+standard deviations. Convention."""
 
 _ROUNDS = 4  # of the fit of a half
 _SETTLED = 0.5  # standard deviations by which a round may still move a parameter
@@ -43,7 +48,7 @@ def unresolved(whole: Fit) -> tuple[str, ...]:
         for name, full in list(left.items()):
             place = problem.names.index(full)
             same_sign = values[place] * whole.value(full) > 0.0
-            if same_sign and abs(values[place]) > whole.settings.search.resolved_stds * stds[place]:
+            if same_sign and abs(values[place]) > RESOLVED_STDS * stds[place]:
                 del left[name]
     return tuple(left)
 

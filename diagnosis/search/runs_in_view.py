@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar, Final, Self
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, gap_left
 from diagnosis.search.clock import Progress
-from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
+from diagnosis.search.hypothesis import FREED_HYPOTHESES, Hypothesis, polish, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
 from diagnosis.search.prepared import Prepared
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
+
+FORM_OPEN: Final = 0.02
+"""Minimum share of the excess unexplained by a textbook form for its forms to be freed. Judgement (decision
+0008)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +81,9 @@ class RunsInView:
         Args:
             level: the sets with one effect less from which they are grown, the best first.
         """
-        chosen, parent = self.base.settings.search, level[0]
-        count = chosen.freed_hypotheses if not parent.effects else 1
-        return with_forms(children, self.gap, chosen.form_open * parent.fit.excess, count)
+        parent = level[0]
+        count = FREED_HYPOTHESES if not parent.effects else 1
+        return with_forms(children, self.gap, FORM_OPEN * parent.fit.excess, count)
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The sets to be grown further; of several that change the readings alike, one.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from scipy.special import chdtri
@@ -23,6 +24,10 @@ from diagnosis.model.parameters import Point
 from diagnosis.settings import ScatterSettings
 from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import Effect
+
+WIDTHS_SETTLED: Final = 1.0
+"""Drop of −2 ln L above which a fit is repeated with new widths of the scatter, in χ². Convention. A smaller
+change is insignificant."""
 
 _ROUNDS = 3  # of widths and fits
 _REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
@@ -225,7 +230,7 @@ def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
             return fitted
         prior = width_prior(fitted.problem)
         here = fitted.columns.at(fitted.widths, prior)
-        if here.restricted - between.restricted < fitted.settings.scatter.widths_settled:
+        if here.restricted - between.restricted < WIDTHS_SETTLED:
             return fitted
         again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)
         if again is None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -21,6 +22,11 @@ from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import drifting, with_scatter
 from diagnosis.search.surviving import refusal, refusal_with_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
+
+RIVAL_FORMS: Final = 0.05
+"""Minimum probability of a rival set for its forms to be freed. Judgement."""
+OUTSIDE_FROM: Final = 0.05
+"""Minimum probability of a set for comparison with explanations outside the vocabulary. Judgement."""
 
 Names = tuple[str, ...]
 
@@ -149,8 +155,7 @@ def with_near_rivals(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> S
     """
     sets = _with_near_sets(sets, clock)
     with clock.step("pruning"):
-        least = sets.view.base.settings.search.outside_from
-        fitted = (sets.fitted(w.effects) for w in sets.weighed if w.probability > least)
+        fitted = (sets.fitted(w.effects) for w in sets.weighed if w.probability > OUTSIDE_FROM)
         likely = [hypothesis for hypothesis in fitted if hypothesis is not None]
         tried = (
             FoundRival(one, tuple(one.hypotheses(likely, sets.hypotheses, sets.view.base))) for one in rivals
@@ -169,8 +174,7 @@ def _with_near_sets(sets: Sets, clock: StepClock) -> Sets:
         known = (*sets.hypotheses, *prune(best, sets.hypotheses))
         sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
     with clock.step("forms"):  # of rival sets, freed where that pays: growth frees those of few sets
-        least = view.base.settings.search.rival_forms
-        near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > least]
+        near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > RIVAL_FORMS]
         if len(near) < 2:
             return sets
         rivals = [h for h in sets.hypotheses if h.names in near and not h.forms]

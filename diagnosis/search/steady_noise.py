@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from scipy.special import chdtri
 
@@ -10,14 +12,26 @@ from diagnosis.likelihood.residuals import residual_spectra
 from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.settings import RandomMomentSettings
 
+WHITE_INNOVATIONS: Final = 10.0
+"""Maximum deviation of the power of the innovations from white noise, by band and by quarter of a record, in
+standard deviations. Judgement (decision 0009). Chance alone gives less than 3.5. Real spectra are not
+first-order. With the true sets of unblinded campaigns it is at most 9.0."""
+BURST_POWER: Final = 1.5
+"""Maximum power of short innovations of a steady moment, relative to chance. Judgement. Real turbulence is
+not exactly stationary."""
+STEADY_LINE_SHARE: Final = 0.9
+"""Share of the residual explained by a line with a phase per run, above which the moment is a line. Judgement
+(decision 0046). A line explains nine tenths of a random moment whose half-width is a twentieth of one over
+the duration."""
+
 _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
     """Whether innovations are white and steady, without bursts, and not those of one run."""
     return (
-        departure_from_white(result) <= chosen.white_innovations
-        and bursts(result, chosen.burst_rate) <= chosen.burst_power
+        departure_from_white(result) <= WHITE_INNOVATIONS
+        and bursts(result, chosen.burst_rate) <= BURST_POWER
         and of_all_runs(result) >= chosen.one_run_rate
     )
 
@@ -95,4 +109,4 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
     left = (
         float(r @ r) - r.size for run, r in zip(runs, fit.residuals, strict=True) if run.id in process.runs
     )
-    return max(drops) > fit.settings.moment.steady_line_share * sum(left)
+    return max(drops) > STEADY_LINE_SHARE * sum(left)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
@@ -25,6 +26,18 @@ from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place
 from tunnel_sim.vocabulary.campaign import Campaign
+
+NOISE_EXPLAINS: Final = 1.0
+"""Maximum gap that irregular noise explains completely. Judgement. The noise variance itself."""
+SHARES_CHANCE: Final = 1.0
+"""Standard deviation of the explained share of the gap above which the shares of all sets are chance.
+Convention. As large as the gap itself."""
+NOISE_EXCUSED: Final = 0.8
+"""Explained share of a gap this small above which irregular noise is not its cause. Judgement (decision
+0007). Effects with few parameters explain little of any noise."""
+
+CHOICES_FROM: Final = 0.05
+"""Minimum probability of an answer for alternative springs to be sought. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -289,17 +302,16 @@ def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> b
 
     Effects with few parameters explain little of any noise, however it misbehaves.
     """
-    block, weighing = nominal.problem.data.mean_block, nominal.settings.weighing
-    small = test.noisy and nominal.excess < weighing.noise_explains * block
-    closed = any(w.effects != UNKNOWN and w.share < 1.0 - weighing.noise_excused for w in weighed)
-    return nominal.chance > weighing.shares_chance or (small and not closed)
+    small = test.noisy and nominal.excess < NOISE_EXPLAINS * nominal.problem.data.mean_block
+    closed = any(w.effects != UNKNOWN and w.share < 1.0 - NOISE_EXCUSED for w in weighed)
+    return nominal.chance > SHARES_CHANCE or (small and not closed)
 
 
 def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
     """The choices of a probable answer that the runs cannot exclude, with its coefficients."""
     nominal = sets.view.prepared.nominal
     chosen = answer.stated if answer.random is None else answer.random.beside
-    if chosen is None or answer.probability < nominal.settings.search.choices_from:
+    if chosen is None or answer.probability < CHOICES_FROM:
         return ()
     if all(kind.chosen_spring() is None for kind in chosen.fit.problem.effects):
         return ()

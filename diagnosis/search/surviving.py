@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,28 @@ from diagnosis.search.process_noise import ProcessNoise, with_response
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from tunnel_sim.vocabulary.record import Array
+
+EXPLAINS_MOST: Final = 1.5
+"""Maximum drop of −2 ln L by a random moment, as a multiple of the χ² beyond noise that the nominal model
+leaves in its runs. Judgement. The release of a run absorbs part of a random motion, and the nominal model all
+that it can; a half is allowed for both."""
+EXPLAINS_ALONE: Final = 3.0
+"""The same for a random moment without effects beside it. Judgement. The nominal model and the releases may
+absorb two thirds of a random motion of few cycles. In two campaigns where a moment acts alone the drop is
+1.54 and 1.61; no campaign shows where the limit fails."""
+EXPLAINS_STDS: Final = 4.0
+"""Margin of χ² of noise over that maximum, in standard deviations. Convention. One campaign in 30,000."""
+
+SURVIVES_SIZE: Final = 0.5
+"""Minimum size of an effect without any one run that the others could replace, as a share of its size.
+Convention. The other runs then confirm more than half of it."""
+SURVIVES_STDS: Final = 3.0
+"""Minimum standard deviations by which the other runs must miss that size; and minimum size of an effect for
+them to show it. Convention. One of 700 runs misses it by chance."""
+SURVIVES_EXCESS: Final = 1.0
+"""Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of
+an effect. Judgement. A residual as large as the noise. A fit that leaves more is not a model of the other
+runs."""
 
 
 def refusal(whole: Fit) -> Fact | None:
@@ -64,9 +87,8 @@ def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = Fa
         if run.id in process.runs:
             left += float(residual @ residual) - residual.size
             freedom += residual.size
-    chosen = repeating.settings.moment
-    margin = chosen.explains_stds * float(np.sqrt(2.0 * freedom))
-    most = chosen.explains_alone if alone else chosen.explains_most
+    margin = EXPLAINS_STDS * float(np.sqrt(2.0 * freedom))
+    most = EXPLAINS_ALONE if alone else EXPLAINS_MOST
     return process.drop > most * max(left, 0.0) + margin
 
 
@@ -76,26 +98,26 @@ def contradicted(whole: Fit) -> dict[str, str]:
     Linear theory finds them, and a fit without the run confirms it. That fit explains the other runs: where more
     than the noise remains in them, sizes depend on the runs in any case.
     """
-    chosen, found = whole.settings.search, dict[str, str]()
+    found = dict[str, str]()
     for name, full, sizes, could in _without_each(whole):
-        judged = np.where(could * (1.0 - chosen.survives_size) > chosen.survives_stds, sizes, 1.0)
+        judged = np.where(could * (1.0 - SURVIVES_SIZE) > SURVIVES_STDS, sizes, 1.0)
         for index in np.argsort(judged)[:1]:
-            if judged[index] >= chosen.survives_size:
+            if judged[index] >= SURVIVES_SIZE:
                 continue
             again = refitted_without(whole, int(index))
-            if again is None or again.excess > chosen.survives_excess:
+            if again is None or again.excess > SURVIVES_EXCESS:
                 continue
-            if again.value(full) / whole.value(full) < chosen.survives_size:
+            if again.value(full) / whole.value(full) < SURVIVES_SIZE:
                 found[name] = whole.problem.data.runs[index].id
     return found
 
 
 def shown_by_one(whole: Fit) -> dict[str, str]:
     """The effects that only one run can show, with that run."""
-    least, found = whole.settings.search.survives_stds, dict[str, str]()
+    found = dict[str, str]()
     if len(whole.residuals) > 1:
         for name, _, _, could in _without_each(whole):
-            if could.min() < least and np.median(could) >= least:
+            if could.min() < SURVIVES_STDS and np.median(could) >= SURVIVES_STDS:
                 found[name] = whole.problem.data.runs[int(np.argmin(could))].id
     return found
 
@@ -109,7 +131,7 @@ def _without_each(whole: Fit) -> Iterator[tuple[str, str, Array, Array]]:
     """
     if len(whole.residuals) < 2:
         return
-    names, least = whole.problem.names, whole.settings.search.survives_stds
+    names = whole.problem.names
     severities = {kind.name: f"{kind.name}.{kind.parameters()[0].name}" for kind in whole.problem.effects}
     fitted = {name: full for name, full in severities.items() if full in names and whole.bound(full) is None}
     if not fitted:
@@ -117,7 +139,7 @@ def _without_each(whole: Fit) -> Iterator[tuple[str, str, Array, Array]]:
     without = WithoutRuns.of(whole)
     for name, full in fitted.items():
         place, value = names.index(full), whole.value(full)
-        if value != 0.0 and abs(value) >= least * whole.std(full):
+        if value != 0.0 and abs(value) >= SURVIVES_STDS * whole.std(full):
             yield (
                 name,
                 full,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,10 @@ from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.rivals.rival import Rival
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+
+TWO_SPRINGS_OF: Final = 3
+"""Minimum number of springs for two of them to be called miscalibrated. Physics. With fewer springs, one
+effect of the vocabulary fits any frequencies."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ class TwoSprings(Rival):
         Fits start at the known sets with those effects.
         """
         data = nominal.problem.data
-        if len(data.springs) < data.settings.search.two_springs_of:
+        if len(data.springs) < TWO_SPRINGS_OF:
             return []
         by_name = {hypothesis.names: hypothesis for hypothesis in known} | {(): Hypothesis((), nominal)}
         pairs: dict[tuple[str, ...], Hypothesis] = {}

@@ -7,7 +7,7 @@ large swings at its beginning and its small ones at its end.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Final, Self
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
+
+COMPARED_FROM: Final = 0.01
+"""Minimum probability of a set of the beginnings of driven runs for comparison in whole runs. Judgement
+(decision 0054). Time against coverage."""
 
 _LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembers as many
 
@@ -150,8 +154,8 @@ class AfterBeginnings(View):
 
     def sets(self, clock: StepClock) -> Sets:
         """The likely sets of the beginnings."""
-        least, known = self.base.settings.search.compared_from, self.known
-        likely = (known.fitted(one.effects) for one in known.weighed if one.probability > least)
+        known = self.known
+        likely = (known.fitted(one.effects) for one in known.weighed if one.probability > COMPARED_FROM)
         with clock.step("effects"):
             whole = [known.view.whole(one) for one in likely if one is not None]
         return Sets(self, tuple(one for one in whole if one is not None), refused=known.refused)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Final, Self
 
 import numpy as np
 
@@ -19,6 +19,16 @@ from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import UNKNOWN
+
+MOMENT_NOISE_FROM: Final = 0.05
+"""Minimum probability of a set for its residual random moment to be modelled as noise. Judgement."""
+MOMENT_LEFT: Final = 0.25
+"""Maximum power of the residual random moment of a set, as a share of the missing moment, for a body without
+a spring. Judgement. Half its size: a cause explains most of the gap. The EMPS axis (0.115) is not an
+independent test."""
+MOMENT_CHANCE: Final = 1.0
+"""Maximum relative standard deviation of the best set's residual for sets to be compared by the moment.
+Convention. The standard deviation then equals the residual."""
 
 # powers of a random moment's response per interval, in variances of white noise
 _POWERS = np.geomspace(1e-12, 1e12, 49)
@@ -49,18 +59,18 @@ class ByMoment(View):
         """
         del clock
         best = None if known is None or prepared.nominal.problem.data.model.restored else known.best
-        if known is None or best is None or best.fit.chance >= prepared.settings.search.moment_chance:
+        if known is None or best is None or best.fit.chance >= MOMENT_CHANCE:
             return None
-        prepared, chosen = known.view.prepared, prepared.settings.search
+        prepared = known.view.prepared
         # refit the nominal model with the residual noise of each probable set
         bases: list[Fit] = []
         for answer in known.weighed:
             left = known.fitted(answer.effects)
-            if left is None or (bases and answer.probability < chosen.moment_noise_from):
+            if left is None or (bases and answer.probability < MOMENT_NOISE_FROM):
                 continue
             with suppress(FitError, np.linalg.LinAlgError):
                 bases.append(fit(Problem(by_moment(left.fit)), prepared.nominal.point))
-        small = [base for base in bases if chosen.moment_left * (1.0 + base.excess) >= 1.0]
+        small = [base for base in bases if MOMENT_LEFT * (1.0 + base.excess) >= 1.0]
         if not bases or (not small and known.weighed[0].effects == UNKNOWN):
             return None
         return cls(prepared, (small or bases)[0], known)

@@ -12,7 +12,7 @@ from collections.abc import Container, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -25,9 +25,14 @@ from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared, fit_nominal
+from diagnosis.search.runs_in_view import FORM_OPEN
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from tunnel_sim.effects import Effect
+
+FITTED_LONGER: Final = 4
+"""Number of sets of each size that are found on short stretches and fitted to long ones. Judgement. Time
+against coverage."""
 
 _SHORT, _LONG = 2, 18  # cycles
 _LONGER = 3  # ratio of the lengths of successive fits: the phase at the end of a stretch is known well enough
@@ -187,10 +192,10 @@ class InStretches(View):
 
     def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
         """The sets with one effect more, from the better of two starts where there are two."""
-        data, chosen = self.prepared.nominal.problem.data, self.base.settings.search
+        data = self.prepared.nominal.problem.data
         tried = sets_with_one_more([h.short for h in level if h.short is not None], self.able, progress)
         grown: dict[tuple[str, ...], Hypothesis] = {}
-        for h in sorted(tried, key=lambda h: h.fit.total)[: chosen.fitted_longer]:
+        for h in sorted(tried, key=lambda h: h.fit.total)[:FITTED_LONGER]:
             with suppress(FitError, np.linalg.LinAlgError):
                 longer, _ = fit_longer(h.fit, self.short, data, long_stretch(self.short))
                 grown[h.names] = replace(h, fit=longer, short=h)
@@ -203,9 +208,8 @@ class InStretches(View):
 
     def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
         """Sets with their forms freed where the textbook form leaves more than sensors and springs may."""
-        settings, base = self.base.settings, self.base
-        may = settings.weighing.model_error**2 * self.gap.motion / base.count
-        return with_forms(children, self.gap, min(settings.search.form_open * level[0].fit.excess, may))
+        may = self.base.settings.weighing.model_error**2 * self.gap.motion / self.base.count
+        return with_forms(children, self.gap, min(FORM_OPEN * level[0].fit.excess, may))
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best child of each parent, then the others: the best fit at first may lead nowhere."""

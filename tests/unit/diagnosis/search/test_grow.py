@@ -13,7 +13,7 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
 from diagnosis.search import hypothesis as module
-from diagnosis.search.grow import grow
+from diagnosis.search.grow import MOST_CAUSES, grow
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.sets import exchange, prune
 from diagnosis.search.weigh import weigh
@@ -100,7 +100,7 @@ def test_a_set_of_three_is_found(of_three):
     for name, value in THREE.items():
         key = f"{name}.{effect_class(name).parameters()[0].name}"
         assert abs(three.fit.value(key) - value) < 4.0 * three.fit.std(key)
-    assert max(len(h.effects) for h in ranked) == 3 < Settings().search.most_causes
+    assert max(len(h.effects) for h in ranked) == 3 < MOST_CAUSES
     assert any(line.count(" + ") == 2 for line in steps)
     assert (
         weigh([h.fitted_set(base, misfit(base)) for h in ranked], misfit(base), Settings().weighing)[

@@ -9,6 +9,7 @@ from diagnosis import vocabulary
 from diagnosis.findings.cautions import CAUTIONS
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.reach import unexplained_floor
+from diagnosis.search.views.whole_runs import OUT_OF_REACH
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -59,7 +60,7 @@ def test_the_search_ends_there_and_says_so() -> None:
     study = investigate(campaign(strange=0.1), few)
     assert study.causes == ("unknown",)
     assert study.unexplained_floor is not None
-    assert study.unexplained_floor > study.settings.search.out_of_reach
+    assert study.unexplained_floor > OUT_OF_REACH
     assert max(len(answer.effects) for answer in study.answers) <= 2
     words = CAUTIONS["beyond reach"]
     assert callable(words)

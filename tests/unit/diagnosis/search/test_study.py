@@ -14,6 +14,7 @@ from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.prepared import HUM_LEFT
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains
@@ -163,7 +164,7 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
     """Truth: white residuals that hold a multiple of the share of a hum's power that no pure line removes."""
     hum = Hum(50.0, 1e-3, 1e-5, None, 20.0)
     rng = np.random.default_rng(4)
-    excess = share * Settings().weighing.hum_left * hum.excess
+    excess = share * HUM_LEFT * hum.excess
     residuals = [np.sqrt(1.0 + excess) * rng.normal(size=r.size) for r in study.nominal.residuals]
     base = replace(study.nominal, residuals=residuals)
     found = Sets(WholeRuns(replace(study.prepared, hum=hum), base), ()).weighed

@@ -16,7 +16,7 @@ from diagnosis.model import chance
 from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import nominal_study
-from diagnosis.search.one_more import sets_with_one_more
+from diagnosis.search.one_more import LEAST_DROP, sets_with_one_more
 from diagnosis.search.scatter import scattered
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.files.rig_file import load_rig
@@ -135,7 +135,7 @@ def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_lit
     _, base = beside_scatter(blown(lead=0.3, sensor_error=-0.07), "sensor_nonlinearity")
     lag = effect_class("unsteady_aero_lag")
     (start,) = starting_points(base, lag)
-    assert start.predicted_drop < base.settings.search.least_drop
+    assert start.predicted_drop < LEAST_DROP
     assert sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag]) == []
     monkeypatch.setattr(Hypothesis, "explains_runs", True)
     (child,) = sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag])

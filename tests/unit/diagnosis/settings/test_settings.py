@@ -28,15 +28,9 @@ KNOWN_IN_SEVERAL = {
     "rivals_from": "a rival is stated by its name, and in the sentence with its probability",
     "detection_rate": "the rate of the test is also what a campaign without a gap is said to have",
     "grown_from": "on whole runs and on stretches",
-    "most_causes": "on whole runs and beside a random moment",
-    "form_open": "on whole runs and on stretches",
-    "form_needed": "a form is kept, while sets grow and in the answer",
-    "freed_hypotheses": "growth frees the forms of fewer beside other effects",
-    "mode_runs": "of a free and of an excited mode",
     "part_price": "a part is tried, taken and compared at one price",
     "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
-    "alike_within": "of random moments of two sources, and of two kinds of one source",
     "remains_rate": "whether a residual is beyond chance, with the causes or, for a judgement on them, without",
     "unknown_from": "the rest of the answers are weighed again without a refused one",
     "coefficient_interval": "an interval has one probability, within bounds or without",
@@ -46,7 +40,6 @@ KNOWN_IN_SEVERAL = {
     "which_scatters_rate": "shown beside other numbers, or beside a drift",
     "form_price": "the forms of an answer are not compared with an odd run",
     "disturbed_rate": "one rate, of a jump and of a run that differs as a whole",
-    "survives_stds": "what shows an effect, and what contradicts it",
     "odd_share": "the price of an odd run, and the doubt about a cause that one run alone shows",
     "set_price": "scatter pays the price of an effect, and so would one that acts later on",
     "steepness": "by the same measure as an effect",
@@ -141,7 +134,7 @@ def test_a_share_in_words(share, text):
 
 
 def test_a_copy_with_other_values_is_told_by_its_differences():
-    given = {"weighing.leak": 0.1, "search.grown_by": 7}
+    given = {"weighing.leak": 0.1, "search.grown_from": 7}
     changed = Settings().changed(given)
     assert changed.differences() == given
     assert settings_of({"provenance": {"settings": given}}) == changed
