@@ -54,7 +54,7 @@ def diagnose(
         progress: called with the name of each step.
         model: your own model, from `read_model`, whose joint is then the nominal model; or a nominal model of your
             own kind.
-        settings: every number that decides.
+        settings: the numbers that weigh answers, and the rates of the tests.
         rivals: causes from outside the vocabulary, weighed with it; their probability is added to that of
             ``unknown``.
 

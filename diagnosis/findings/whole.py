@@ -287,15 +287,20 @@ class Findings:
             remedy: in an error.
 
         Raises:
-            TunnelError: when it is not a diagnosis: a key is missing or unknown, or a value has the wrong type.
+            TunnelError: when it is not a diagnosis: a key or a setting is unknown, a key is missing, or a value
+                has the wrong type.
         """
         check_shape(data, where, remedy)
         with as_described("is not a diagnosis", where, remedy):
             adapter = _adapter(cast(Any, cls))
             found = cast(Self, adapter.validate_json(json.dumps(_by_field(data)), strict=True))
             unknown = next(_unknown_keys(data, found.to_json_dict()), "")
+            stated = dict(found.provenance.get("settings", {}))
         if unknown:
             what = f"is not a diagnosis ({one_line(unknown, 60)}: unknown key)"
+            raise TunnelError(what, where=where, remedy=remedy)
+        if gone := stated.keys() - Settings().values().keys():
+            what = f"was made with {one_line(min(gone), 60)!r}, which is not a setting of this version"
             raise TunnelError(what, where=where, remedy=remedy)
         return found
 

@@ -1,7 +1,10 @@
-"""Every number by which the diagnosis decides: one field for each decision, with its origin.
+"""The numbers of a diagnosis that somebody varies: one field for each decision, with its origin.
 
-Settings are arguments: `diagnosis.diagnose` takes them, and every fit has those of its data. Numerical constants
-(grids, iterations, paddings, tolerances of solvers) are in the code that uses them.
+A field weighs answers (a probability, a prior, a price), is the false-alarm rate of a test, or fits the search to a
+campaign. Settings are arguments: `diagnosis.diagnose` takes them, and every fit has those of its data. Every other
+number that decides is a constant beside its use, ``NAME: Final = value``, with its meaning, origin and reason below
+it. docs/reference/settings.md lists both. Numerical constants (grids, iterations, paddings, tolerances of solvers)
+are in the code that uses them, too.
 """
 
 from __future__ import annotations
@@ -10,11 +13,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from diagnosis.settings.answer import AnswerSettings, WhereSettings
-from diagnosis.settings.found import GapSettings, NoiseSettings, ReadOffSettings, SelectionSettings
-from diagnosis.settings.search import RandomMomentSettings, ScatterSettings, SearchSettings, WeighingSettings
-from diagnosis.settings.words import RemainderSettings, WordsSettings
-from diagnosis.settings.work import WorkSettings
+from diagnosis.settings.stages import (
+    AnswerSettings,
+    GapSettings,
+    NoiseSettings,
+    RandomMomentSettings,
+    ReadOffSettings,
+    RemainderSettings,
+    ScatterSettings,
+    SearchSettings,
+    SelectionSettings,
+    WeighingSettings,
+    WhereSettings,
+    WordsSettings,
+    WorkSettings,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 
 __all__ = [
@@ -32,7 +45,6 @@ __all__ = [
     "WhereSettings",
     "WordsSettings",
     "WorkSettings",
-    "settings_of",
 ]
 
 
@@ -66,7 +78,11 @@ class Settings:
         known, found = self.values(), self
         for full, value in values.items():
             if full not in known:
-                raise TunnelError(f"there is no setting {full!r}", remedy="see docs/reference/settings.md")
+                raise TunnelError(
+                    f"there is no setting {full!r}",
+                    remedy="leave it out; docs/reference/settings.md has all settings, and the constants, "
+                    "among them settings of earlier versions",
+                )
             stage, name = full.split(".")
             group: dict[str, Any] = {stage: replace(getattr(found, stage), **{name: value})}
             found = replace(found, **group)
@@ -84,8 +100,3 @@ class Settings:
         """The values that differ from the usual ones, by name with its stage, each in the unit of the field."""
         usual = Settings().values()
         return {name: value for name, value in self.values().items() if value != usual[name]}
-
-
-def settings_of(document: Mapping[str, Any]) -> Settings:
-    """The settings with which a diagnosis was made, from its JSON document."""
-    return Settings().changed(document.get("provenance", {}).get("settings", {}))

@@ -28,3 +28,15 @@ def setting(
     """
     about = {"unit": unit, "meaning": meaning, "origin": origin, "why": why, "decision": decision}
     return field(default=default, metadata=about)
+
+
+def rate(of: str, default: float = 0.001, *, why: str | None = None, origin: Origin = "convention") -> Any:
+    """A field with the false-alarm rate of a test.
+
+    Args:
+        of: the test, without the full stop of its sentence.
+        default: the rate, 1.
+        why: as of `setting`; None: nothing more than the rate says.
+    """
+    usual = ONE_IN_1000 if default == 0.001 else ""
+    return setting(default, f"False-alarm rate of {of}.", origin, usual if why is None else why)

@@ -9,10 +9,10 @@ import pytest
 
 from diagnosis import Settings, diagnose, vocabulary
 from diagnosis.search.investigate import investigate
-from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
 from docs.studies import settings_page
 from identification.show.numbers import part
+from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -24,7 +24,6 @@ FIELDS = {
 
 #: Decisions that more than one function has to know: the reason why they are one.
 KNOWN_IN_SEVERAL = {
-    "patch_excused": "below it an unwritten part excuses the patched model, from it on a mean leaves a doubt",
     "rivals_from": "a rival is stated by its name, and in the sentence with its probability",
     "detection_rate": "the rate of the test is also what a campaign without a gap is said to have",
     "grown_from": "on whole runs and on stretches",
@@ -137,16 +136,23 @@ def test_a_copy_with_other_values_is_told_by_its_differences():
     given = {"weighing.leak": 0.1, "search.grown_from": 7}
     changed = Settings().changed(given)
     assert changed.differences() == given
-    assert settings_of({"provenance": {"settings": given}}) == changed
-    assert settings_of({}) == Settings()
+    assert findings_of({"provenance": {"settings": given}}).settings == changed
+    assert findings_of({}).settings == Settings()
     assert Settings().differences() == {}
 
 
-@pytest.mark.parametrize("name", ["leak", "weighing.lea", "weighting.leak", ""])
+@pytest.mark.parametrize("name", ["leak", "weighing.lea", "weighting.leak", "search.grown_by", ""])
 def test_an_unknown_setting_is_refused_in_one_line(name):
     with pytest.raises(TunnelError, match="there is no setting") as caught:
         Settings().changed({name: 1.0})
     assert "settings.md" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["search.grown_by", "leak"])
+def test_a_document_of_an_earlier_setting_is_refused_in_one_line(name):
+    with pytest.raises(TunnelError, match=f"was made with '{name}', which is not a setting") as caught:
+        findings_of({"provenance": {"settings": {name: 7}}})
+    assert "tunnel diagnose --json" in caught.value.remedy
 
 
 def test_the_settings_given_decide_and_are_in_the_document():
