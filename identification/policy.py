@@ -144,6 +144,12 @@ OTHER_WIND = (1.02, 1.3)
 NOISE_RATIO = 0.15
 """Tolerance of the ratio of two runs' noise from one sensor."""
 
+SCATTER_OF_NOISE = 0.02
+"""Relative scatter of the noise of one sensor between runs, besides chance, where few runs show it. Judgement."""
+
+SCATTER_OF_RELEASE = 0.03
+"""Relative scatter of the first swing about the stated release, where few runs show it: by hand. Judgement."""
+
 ODD_NOISE = 3.5
 """Ratio of a run's noise to that of the other runs, by which it is odd: simulated runs of one sensor differ by a
 fifth, and one run of a measured campaign in the data differs by three times from all others. Judgement."""

@@ -244,15 +244,25 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
         reading: of many samples per cycle, evenly spaced, shape (n,), rad.
         sensor: its stated noise is used where the reading agrees with it; quantisation is included.
     """
-    peak = 0.5 * float(np.ptp(reading))
-    floor = max(LEAST_NOISE * peak, 1e-300)
-    return _as_stated(*_fast_part([Residual(reading, 1.0, 0, peak)], floor), floor, sensor)
+    return _as_stated(*_white_part(reading), _floor(reading), sensor)
 
 
 def reading_noise(record: Record, sensor: SensorProperties) -> float:
     """`white_noise` of a record of many samples per cycle, with any spacing of its times."""
+    return _as_stated(*measured_noise(record), _floor(record.yaw_rad), sensor)
+
+
+def measured_noise(record: Record) -> tuple[float, float]:
+    """The white part of a record's noise by its readings alone, whatever the sensor states.
+
+    Args:
+        record: of many samples per cycle, with any spacing of its times.
+
+    Returns:
+        Standard deviation of one sample, rad, and the degrees of freedom of its variance.
+    """
     if record.uniform or record.time_s.size <= 4 * _ORDER:
-        return white_noise(record.yaw_rad, sensor)
+        return _white_part(record.yaw_rad)
     # A sixth divided difference is zero for the quintic that a swing resembles over seven samples.
     time, values = record.time_s, record.yaw_rad
     count = time.size - _ORDER
@@ -265,8 +275,19 @@ def reading_noise(record: Record, sensor: SensorProperties) -> float:
         difference += weight * values[i : i + count]
         power += weight**2
     fast = sqrt(float(np.mean(difference**2 / power)))
-    floor = max(0.5 * LEAST_NOISE * float(np.ptp(values)), 1e-300)
-    return _as_stated(fast, count / _SAMPLES_PER_DEGREE, floor, sensor)
+    return max(fast, _floor(values)), count / _SAMPLES_PER_DEGREE
+
+
+def _white_part(reading: Array) -> tuple[float, float]:
+    """`measured_noise` of evenly spaced readings."""
+    floor = _floor(reading)
+    fast, degrees = _fast_part([Residual(reading, 1.0, 0, 0.5 * float(np.ptp(reading)))], floor)
+    return max(fast, floor), degrees
+
+
+def _floor(reading: Array) -> float:
+    """The least noise of a reading, rad."""
+    return max(0.5 * LEAST_NOISE * float(np.ptp(reading)), 1e-300)
 
 
 def slow_power(values: Angles, block: int) -> tuple[float, int]:

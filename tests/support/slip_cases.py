@@ -183,6 +183,8 @@ def _nothing(data: Campaign) -> Campaign:
 PLAIN = honest()
 """Four honest runs, the same for all slips."""
 SIX, NINE = _six(), _nine()
+RELEASED = repeated(2, release=True)
+"""Eight honest runs that state their release."""
 ALL = ("r1", "r2", "r3", "r4")
 ON, OFF = ("r2", "r4"), ("r1", "r3")
 WIND = {"wind_speed": 15.0, "air_density": 1.2}
@@ -408,6 +410,12 @@ FURTHER: dict[str, Case] = {
         "the logger filtered the run",
         ("r5",),
         refused=False,
+    ),
+    "one run of another amplifier range": Case(
+        RELEASED, reading(lambda y: 1.3 * y, "r5"), "the sensor had another gain", ("r5",), refused=False
+    ),
+    "one run of a tenth of the gain": Case(
+        RELEASED, reading(lambda y: 0.1 * y, "r2"), "times those of the other runs", ("r2",), refused=False
     ),
     "one run of five times the noise": Case(
         SIX, _noisier(4.9 * NOISE, "r1"), "its noise is 5.", ("r1",), refused=False

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification import policy
 from identification.examination.slips.base import SlipEvidence, StatementSlip
-from identification.signal.noise import reading_noise
+from identification.signal.noise import measured_noise
 from identification.status import Outcome, Remark
 
 _DEGREES = 180.0 / np.pi
@@ -23,15 +23,14 @@ class AngleInDegrees(StatementSlip):
     """
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare amplitudes and, where they differ much, the noise, without the stated noise and resolution."""
+        """Compare amplitudes and, where they differ much, the noise."""
         if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:
             return ()
         amplitudes = np.array([swing.amplitude for swing in seen.swings])
         large = amplitudes > _SUSPICIOUS * float(amplitudes.min())
         if not large.any():
             return ()
-        bare = replace(seen.campaign.sensor, resolution=None, noise_std=None)
-        noise = np.array([reading_noise(swing.run.record, bare) for swing in seen.swings])
+        noise = np.array([measured_noise(swing.run.record)[0] for swing in seen.swings])
         ratio = float(np.median(noise[large]) / np.median(noise[~large]))
         alike = [
             np.abs(noise[some] / np.median(noise[some]) - 1.0) < policy.NOISE_RATIO

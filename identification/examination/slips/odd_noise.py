@@ -10,6 +10,7 @@ import numpy as np
 from identification import policy
 from identification.examination.self_excited import Swing
 from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.odd_gain import other_gain
 from identification.show.numbers import significant
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
@@ -32,9 +33,10 @@ class OddNoise(StatementSlip):
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
 
-        The wind may add noise: a run is compared with others of as much wind, or as little.
+        The wind may add noise: a run is compared with others of as much wind, or as little. `OddGain` names a run
+        of another gain.
         """
-        if len(seen.swings) < _FEWEST:
+        if len(seen.swings) < _FEWEST or other_gain(seen) is not None:
             return ()
         bands, power = _powers(seen.swings)
         if not bands.size:

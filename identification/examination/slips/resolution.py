@@ -8,7 +8,7 @@ import numpy as np
 
 from identification import policy
 from identification.examination.slips.base import RecordSlip
-from identification.signal.noise import reading_noise
+from identification.signal.noise import measured_noise
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
@@ -32,8 +32,7 @@ class ResolutionTooCoarse(RecordSlip):
         if not all(_off_lattice(record.yaw_rad, step) for record in records):
             return campaign, ()
         swing = float(np.median([0.5 * np.ptp(record.yaw_rad) for record in records]))
-        bare = replace(campaign.sensor, resolution=None, noise_std=None)
-        noise = float(np.median([reading_noise(record, bare) for record in records]))
+        noise = float(np.median([measured_noise(record)[0] for record in records]))
         if swing > policy.LEAST_STEPS * step and noise > policy.FINER_THAN_STATED * step:
             return campaign, ()
         what = (

@@ -11,6 +11,7 @@ from identification.examination.slips.coupling import CoupledSensor
 from identification.examination.slips.equal_statements import EqualStatementsDiffer
 from identification.examination.slips.factors import WrongFactor
 from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
+from identification.examination.slips.odd_gain import OddGain
 from identification.examination.slips.odd_noise import OddNoise
 from identification.examination.slips.resolution import ResolutionTooCoarse
 from identification.examination.slips.run_comparisons import (
@@ -45,6 +46,7 @@ RECORD_SLIPS: tuple[RecordSlip, ...] = (
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
     MotionGrows(),
     AngleInDegrees(),
+    OddGain(),
     OddNoise(),
     SpringsRenumbered(),
     WrongFactor(),
