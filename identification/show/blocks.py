@@ -80,7 +80,8 @@ class TextTable:
         right: headings of the right-aligned columns.
         names: headings of the columns of names such as ``coulomb_friction``, which a page shows as words.
         detail: headings of the columns that only a page has room for.
-        groups: the group of each row; in a terminal a line separates groups. Empty: one group.
+        sections: number of first columns that name a section. In a terminal a line separates sections, and where
+            it is too narrow these names stand above the rows of their section.
     """
 
     title: str
@@ -89,7 +90,7 @@ class TextTable:
     right: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
-    groups: tuple[object, ...] = ()
+    sections: int = 0
 
     def without_detail(self) -> TextTable:
         """The table without the columns of a page."""

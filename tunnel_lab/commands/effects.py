@@ -193,10 +193,8 @@ def listing(kinds: Sequence[type[Effect]]) -> TextTable:
         parameters = [f"{info.name} {info.symbol} [{unit_mark(info.unit)}]" for info in kind.parameters()]
         rows.append((kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters])))
     names = ("effect", "channel", "condition")
-    groups = tuple(kinds)
-    return TextTable(
-        "Effects beyond the nominal model", (*names, last), tuple(rows), names=names, groups=groups
-    )
+    title = "Effects beyond the nominal model"
+    return TextTable(title, (*names, last), tuple(rows), names=names, sections=1)
 
 
 def example(kind: type[Effect]) -> str:

@@ -21,9 +21,9 @@ from identification.scoring import score
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import significant
 from identification.show.style import figure, styled
+from tunnel_lab.experiments.columns import NAMES, file_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_reference.draw import CampaignDraw, EffectDraw
@@ -252,7 +252,7 @@ def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
                 "quantity": quantity,
                 "realisations": judged.count,
                 "failures": judged.failures.count,
-                **figure_columns(judged, figures, {}, "_std_error"),
+                **file_columns(judged, figures, {}, "_std_error"),
                 "rmse_over_bound": getattr(judged.rmse_over_bound, "value", None),
                 "covered": getattr(judged.coverage, "count", None),
                 "model_departs_share": (some["status"] == "model_departs").mean(),

@@ -18,6 +18,7 @@ import polars as pl
 
 from identification.estimate import UNITS
 from identification.scoring import Trials
+from tunnel_lab.experiments.columns import trials_of
 from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
     RAISED,
@@ -30,7 +31,6 @@ from tunnel_lab.experiments.estimate_rows import (
     quantity_rows,
 )
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
-from tunnel_lab.experiments.figures import trials_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.arguments import NO_EFFECT

@@ -2,40 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 import polars as pl
 
 from identification.policy import DIFFERENCE_RATE
 from identification.scoring import (
     Change,
-    Score,
-    Trials,
     changes,
     holm,
-    mean_figure,
-    overall,
     reach_of_rmse,
     score,
 )
 from identification.show.blocks import Block, Paragraph, TextTable
-from identification.show.numbers import concise, significant
-from identification.show.quantity import Quantity
-from identification.statistics import Proportion
+from identification.show.numbers import significant
+from tunnel_lab.experiments.columns import (
+    CELL,
+    NAMES,
+    POOLED,
+    Column,
+    ScoredRow,
+    file_columns,
+    meanings,
+    not_given_notes,
+    score_table,
+)
 from tunnel_lab.experiments.experiment import parquet
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text
 from tunnel_lab.experiments.score import Results, groups_of
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
-ABOUT = (
-    "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter. Worst: of the cells. In "
-    "brackets: the standard error in the last digits; after shares: their 95 % interval. Time: of identify for a "
-    "record, its examination included."
-)
+_TIME = "Time: of identify for a record, its examination included."
 _SHOWN_WORSE = 12
 _FEW = 20
 """Trials below which the χ² interval of an RMSE ends more than a tenth above 1 + 1.96 standard errors."""
@@ -157,7 +156,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
                 "unit": trials.unit,
                 "trials": judged.count,
                 "failures": judged.failures.count,
-                **figure_columns(judged, columns, shares, "_std_error"),
+                **file_columns(judged, columns, shares, "_std_error"),
                 "milliseconds_per_record": results.milliseconds(estimator, [index]),
             }
         )
@@ -166,38 +165,26 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
 def summary_tables(results: Results) -> list[TextTable]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
-    heads = ("RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]")
-
-    def figures(name: str, cells: Sequence[int], quantity: str) -> tuple[str, ...]:
-        return pooled_figures([results.trials[name, cell, quantity] for cell in cells])
-
     return [
-        _table(
-            results, f"{group[0].upper()}{group[1:]} ({counted(len(cells), 'cell')})", heads, cells, figures
-        )
+        _table(results, f"{group[0].upper()}{group[1:]} ({counted(len(cells), 'cell')})", POOLED, cells)
         for group, cells in groups_of(results.grid).items()
     ]
 
 
-def _table(
-    results: Results,
-    title: str,
-    heads: tuple[str, ...],
-    cells: Sequence[int],
-    figures: Callable[[str, Sequence[int], str], tuple[str, ...]],
-) -> TextTable:
-    """Each estimator's name and time in the first column, which has no heading, and a row for each quantity."""
-    rows: list[tuple[str, ...]] = []
-    groups: list[str] = []
+def cell_tables(results: Results) -> list[TextTable]:
+    """One table for each cell: a section for each estimator, a row for each quantity."""
+    return [_table(results, cell.label, CELL, [index]) for index, cell in enumerate(results.grid.cells)]
+
+
+def _table(results: Results, title: str, columns: Sequence[Column], cells: Sequence[int]) -> TextTable:
+    rows = []
     for name in results.estimators:
-        given = [q for q in results.grid.cells[cells[0]].quantities if results.gives(name, q)]
-        if not given:
-            continue
-        time = f"  {significant(results.milliseconds(name, cells), 2)} ms/record"
-        rows += [(text, *[""] * len(heads)) for text in (name, time)]
-        rows += [(f"  {NAMES[quantity]}", *figures(name, cells, quantity)) for quantity in given]
-        groups += [name] * (2 + len(given))
-    return TextTable(title, ("", *heads), tuple(rows), ("worst",), names=("",), groups=tuple(groups))
+        time = significant(results.milliseconds(name, cells), 2)
+        for quantity in results.grid.cells[cells[0]].quantities:
+            if results.gives(name, quantity):
+                trials = tuple(results.trials[name, cell, quantity] for cell in cells)
+                rows.append(({"estimator": name, "time [ms/record]": time}, ScoredRow(name, quantity, trials)))
+    return score_table(title, columns, rows)
 
 
 def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
@@ -218,7 +205,8 @@ def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
 
 def notes_below(results: Results) -> list[Paragraph]:
     """Below the tables: the meaning of the figures, missing quantities, and the accuracy of few trials."""
-    return [Paragraph(ABOUT), *not_given_notes(results.not_given), *_few_trials(results)]
+    about = Paragraph(f"{meanings(POOLED, CELL).text} {_TIME}")
+    return [about, *not_given_notes(results.not_given), *_few_trials(results)]
 
 
 def _few_trials(results: Results) -> list[Paragraph]:
@@ -233,50 +221,6 @@ def _few_trials(results: Results) -> list[Paragraph]:
             "shown (95 % interval for normal errors), which its standard error does not tell. --trials gives more."
         )
     ]
-
-
-def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
-    """Figures of pooled cells: RMSE over the bound, the worst cell's, bias over the bound, % covered and failed."""
-    scores = [score(trials) for trials in every]
-    worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
-    scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
-    bias = mean_figure(np.array(scaled), "1") if len(scaled) > 1 else None
-    identified = sum(trials.error.size for trials in every)
-    covered = Proportion(sum(trials.covered for trials in every), identified) if identified else None
-    failed = Proportion(sum(t.failures for t in every), sum(t.count for t in every))
-    return (
-        _figure(overall(scores)),
-        significant(max(worst), 3) if worst else "–",
-        _figure(bias),
-        share_text(covered),
-        share_text(failed) if failed.count else "0",
-    )
-
-
-def cell_tables(results: Results) -> list[TextTable]:
-    """One table for each cell: a section for each estimator, a row for each quantity."""
-    heads = ("RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]", "failed\n[%]")
-
-    def figures(name: str, cells: Sequence[int], quantity: str) -> tuple[str, ...]:
-        return cell_figures(score(results.trials[name, cells[0], quantity]))
-
-    cells = results.grid.cells
-    return [_table(results, cell.label, heads, [index], figures) for index, cell in enumerate(cells)]
-
-
-def cell_figures(judged: Score) -> tuple[str, ...]:
-    """Figures of one cell, as text: RMSE over the bound, bias in % and in deviations, shares covered and failed."""
-    return (
-        _figure(judged.rmse_over_bound),
-        _figure(judged.relative_bias),
-        _figure(judged.bias_in_stds),
-        share_text(judged.coverage),
-        share_text(judged.failures) if judged.failures.count else "0",
-    )
-
-
-def _figure(quantity: Quantity | None) -> str:
-    return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
 def _worse_table(verdict: ScoreVerdict) -> TextTable:

@@ -10,18 +10,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification.scoring import Score, score
-from identification.show.blocks import Paragraph, TextTable
-from identification.show.numbers import concise, significant, unit
+from identification.show.blocks import TextTable
+from identification.show.numbers import significant, unit
 from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.experiments.columns import (
+    LINE,
+    NAMES,
+    ScoredRow,
+    file_columns,
+    meanings,
+    not_given_notes,
+    score_table,
+    trials_of,
+)
 from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
-from tunnel_lab.experiments.figures import NAMES, figure_columns, not_given_notes, share_text, trials_of
 from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.terminal.arguments import NO_EFFECT
@@ -30,8 +37,6 @@ from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from identification.show.quantity import Quantity
 
 
 OVERALL = "all"
@@ -51,46 +56,37 @@ AXES = {
 """Columns that a summary uses as axes, each with its name and unit."""
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
-BRACKETS = (
-    "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %. Bound: "
-    "Cramér–Rao's, of the nominal model, with the scatter where runs scatter."
-)
 _TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
 _ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
 _WIDE = 10.0  # ratio of the largest to the least value above which an axis is logarithmic
 
 
-@dataclass(frozen=True)
-class ScoreLine:
-    """The score of an estimator for a quantity at a place on an axis.
+@dataclass(frozen=True, eq=False)
+class ScoreLine(ScoredRow):
+    """The trials of an estimator for a quantity at a place on an axis, in % of the truth where it is not zero.
 
     Args:
         axis: a key of `AXES`, ``severity`` or ``all``.
         effect: the effect for the axis ``severity``; otherwise the pooled effects.
         at: the value on the axis, in its unit; None for ``all``.
         at_unit: unit of the axis.
-        quantity: its name; ``omega_n`` and ``zeta`` are those of single runs.
-        score: bias, RMSE, coverage and failures, in the score's unit.
     """
 
     axis: str
     effect: str
-    at: float | None
-    at_unit: str
-    estimator: str
-    quantity: str
-    score: Score
+    at: float | None = None
+    at_unit: str = ""
 
     def to_row(self) -> dict[str, Any]:
         """The line as plain values: every figure with its standard error or 95 % interval."""
         figures = {name: name for name in ("bias", "rmse", "rmse_over_bound")}
-        failures = figure_columns(self.score, {}, {"failures": "failures"}, "")
+        failures = file_columns(self.score, {}, {"failures": "failures"}, "")
         return {
             "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
             "estimator": self.estimator, "quantity": self.quantity,
             "unit": getattr(self.score.bias, "unit", None), "count": self.score.count, **failures,
-            **figure_columns(self.score, figures, {"coverage": "coverage"}, "_std"),
+            **file_columns(self.score, figures, {"coverage": "coverage"}, "_std"),
         }  # fmt: skip
 
 
@@ -129,7 +125,7 @@ def sweep_view(results: pl.LazyFrame, name: str) -> ExperimentView:
     tables = (overall_table(lines), *map(axis_table, along.values()))
     return ExperimentView(
         f"Sweep {name}",
-        [*tables, Paragraph(BRACKETS), *not_given_notes(unanswered(results))],
+        [*tables, meanings(LINE), *not_given_notes(unanswered(results))],
         {name: partial(error_figure, part) for name, part in along.items()},
         {"summary.csv": csv.encode()},
     )
@@ -144,15 +140,20 @@ def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Scor
     """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
     plain = data.filter(pl.col("effect") == NO_EFFECT)
     base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
-    yield ScoreLine(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
+
+    def line(part: pl.DataFrame, *place: Any) -> ScoreLine:
+        percent = bool((part["truth"] != 0.0).all())
+        return ScoreLine(estimator, quantity, (trials_of(part, percent=percent),), *place)
+
+    yield line(_repeating(base), OVERALL, effects)
     for axis, (_, at_unit) in AXES.items():
         for at, part in _along(_repeating(base, but=axis), axis):
-            yield ScoreLine(axis, effects, at, at_unit, estimator, quantity, _score(part))
+            yield line(part, axis, effects, at, at_unit)
     for effect in sorted(set(data["effect"]) - {NO_EFFECT}):
         both = _repeating(data.filter(pl.col("effect").is_in([effect, NO_EFFECT])))
         at_unit = effect_class(effect.partition(" + ")[0]).parameters()[0].unit
         for at, part in _along(both, SEVERITY):
-            yield ScoreLine(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
+            yield line(part, SEVERITY, effect, at, at_unit)
 
 
 def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
@@ -169,11 +170,6 @@ def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:
     if len(values) < 2 or data[axis].null_count():
         return []
     return [(value, data.filter(data[axis] == value)) for value in values]
-
-
-def _score(data: pl.DataFrame) -> Score:
-    """The score in % of the truth, or in the quantity's unit where a truth is zero."""
-    return score(trials_of(data, percent=bool((data["truth"] != 0.0).all())))
 
 
 def groups(lines: Iterable[ScoreLine]) -> dict[str, list[ScoreLine]]:
@@ -259,42 +255,15 @@ def overall_table(lines: Iterable[ScoreLine]) -> TextTable:
     # if only some cases have scatter, the table has only the others
     scattering = {line.at for line in every if line.axis in SCATTER_COLUMNS and line.at is not None}
     repeating = " and without scatter" if 0.0 in scattering else ""
-    heads = ("bias", "RMSE", "RMSE/\nbound", "95 % covers\n[%]", "failed\n[%]")
-    rows = tuple(
-        (
-            line.estimator,
-            NAMES[line.quantity],
-            str(line.score.count),
-            *map(_figure, (line.score.bias, line.score.rmse, line.score.rmse_over_bound)),
-            *map(share_text, (line.score.coverage, line.score.failures)),
-        )
-        for line in kept
-    )
-    return TextTable(
-        f"All cases {pooled}{repeating}",
-        ("estimator", "quantity", "trials", *heads),
-        rows,
-        right=("trials",),
-        groups=tuple(line.estimator for line in kept),
-    )
+    title = f"All cases {pooled}{repeating}"
+    return score_table(title, LINE, (({"estimator": line.estimator}, line) for line in kept))
 
 
 def axis_table(lines: Sequence[ScoreLine]) -> TextTable:
-    """RMSE along one axis, a column for each quantity that has a panel in the figures."""
-    label, at_unit = _label(lines[0]), lines[0].at_unit
-    quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
-    heads = (f"{label} {unit(at_unit)}", "estimator", *(f"RMSE {NAMES[name]}" for name in quantities))
-    cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
-    places = sorted({line.at for line in lines if line.at is not None})
-    pairs = list(product(places, dict.fromkeys(line.estimator for line in lines)))
-    rows = tuple(
-        (significant(at), name, *(_figure(cells.get((at, name, quantity))) for quantity in quantities))
-        for at, name in pairs
-    )
-    return TextTable(f"Error against {label}", heads, rows, groups=tuple(at for at, _ in pairs))
-
-
-def _figure(quantity: Quantity | None) -> str:
-    if quantity is None:
-        return "–"
-    return f"{concise(quantity.value, quantity.std)} {'' if quantity.unit == '1' else quantity.unit}".rstrip()
+    """The errors along one axis, of the quantities that have a panel in the figures."""
+    label, order = _label(lines[0]), [line.estimator for line in lines]
+    drawn = [line for line in lines if line.quantity in DRAWN and line.at is not None]
+    drawn.sort(key=lambda line: (line.at, order.index(line.estimator), list(DRAWN).index(line.quantity)))
+    head = f"{label} {unit(lines[0].at_unit)}"
+    places = ({head: significant(line.at or 0.0), "estimator": line.estimator} for line in drawn)
+    return score_table(f"Error against {label}", LINE, zip(places, drawn, strict=True))

@@ -17,6 +17,7 @@ from tunnel_lab.terminal.table_layout import (
     in_columns,
     is_too_wide,
     rendered,
+    sectioned,
     stacked,
     without_shared,
 )
@@ -93,7 +94,10 @@ def _show_table(table: TextTable) -> None:
         out.print(in_columns(table))
     else:
         narrow, shared = without_shared(table)
-        fitting = narrow if not is_too_wide(narrow, out.width) else folded(narrow, out.width)
+        fitting = next(
+            (one for one in (narrow, sectioned(narrow)) if one and not is_too_wide(one, out.width)),
+            folded(narrow, out.width),
+        )
         if fitting is None:
             out.print(stacked(table, out.width), soft_wrap=True)
         else:

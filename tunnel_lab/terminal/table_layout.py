@@ -7,7 +7,7 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, zip_longest
 from textwrap import wrap
 
 from rich import box
@@ -73,8 +73,8 @@ def in_columns(table: TextTable) -> RichTable:
             min_width=width,
             no_wrap=heading in table.names,  # for copying
         )
-    ends = [one != other for one, other in pairwise(table.groups)]
-    for row, is_end in zip(table.rows, [*ends, False] if ends else [False] * len(table.rows), strict=True):
+    for row, after in zip_longest(table.rows, table.rows[1:]):
+        is_end = after is not None and row[: table.sections] != after[: table.sections]
         result.add_row(*map(Text, row), end_section=is_end)
     return result
 
@@ -103,7 +103,26 @@ def without_shared(table: TextTable) -> tuple[TextTable, str]:
     ]
     rows = tuple(tuple(row[at] for at in kept) for row in table.rows)
     words = f"In all rows: {', '.join(shared)}" if shared else ""
-    return replace(table, columns=tuple(table.columns[at] for at in kept), rows=rows), words
+    columns, sections = tuple(table.columns[at] for at in kept), sum(at < table.sections for at in kept)
+    return replace(table, columns=columns, rows=rows, sections=sections), words
+
+
+def sectioned(table: TextTable) -> TextTable | None:
+    """A table with the names of each section in lines above its rows; None where no section has several rows."""
+    places = list(range(table.sections))
+    parts = [list(rows) for _, rows in groupby(table.rows, lambda row: row[: table.sections])]
+    if not places or all(len(part) == 1 for part in parts):
+        return None
+    rows: list[tuple[str, ...]] = []
+    for part in parts:
+        for at in places:
+            head = "" if table.columns[at] in table.names else f"{_on_one_line(table.columns[at])} "
+            rows.append((f"{head}{part[0][at]}", *[""] * (len(table.columns) - table.sections - 1)))
+        rows += [(f"  {first}", *others) for first, *others in (row[table.sections :] for row in part)]
+        rows.append(("",) * (len(table.columns) - table.sections))
+    return replace(
+        table, columns=("", *table.columns[table.sections + 1 :]), rows=tuple(rows[:-1]), sections=0
+    )
 
 
 def folded(table: TextTable, width: int) -> TextTable | None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification.scoring import Trials, score
+from identification.scoring import Trials
+from tunnel_lab.experiments.columns import CELL, POOLED, Column, ScoredRow, score_table
 from tunnel_lab.experiments.score import packaged_baseline
-from tunnel_lab.experiments.score_view import cell_figures, notes_below, pooled_figures, summary_tables
+from tunnel_lab.experiments.score_view import notes_below, summary_tables
+from tunnel_lab.terminal.outputs import show
 
 
 def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Trials:
@@ -18,33 +21,59 @@ def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Tri
     return Trials(0.1 * np.array(errors), 0.1 * ones, 2.0 * ones, 0.1 * ones if bound else None, failures)
 
 
+def shown(columns: Sequence[Column], *cells: Trials) -> dict[str, str]:
+    """The row of one estimator, by heading."""
+    table = score_table("one", columns, [({"estimator": "e"}, ScoredRow("e", "zeta", cells))])
+    (row,) = table.rows
+    heads = (" ".join(head.split()) for head in table.columns)
+    return {head.replace("/ ", "/"): text for head, text in zip(heads, row, strict=True)}
+
+
+def value(text: str) -> float:
+    return float(text.partition("(")[0])
+
+
 def test_cells_are_pooled_in_units_of_their_bounds() -> None:
-    rmse, worst, bias, covered, failed = pooled_figures([trials([1.0, -1.0, 3.0]), trials([2.0, 2.0], 1)])
-    assert float(rmse.partition("(")[0]) == pytest.approx(((11.0 / 3.0 + 4.0) / 2.0) ** 0.5, abs=0.05)
-    assert float(worst) == 2.0
-    assert float(bias.partition("(")[0]) == pytest.approx(1.4, abs=0.05)  # 1.4 ± 0.68
-    assert covered == "40 (12–77)"
-    assert failed == "16.7 (3–56)"
+    row = shown(POOLED, trials([1.0, -1.0, 3.0]), trials([2.0, 2.0], 1))
+    assert value(row["RMSE/bound"]) == pytest.approx(((11.0 / 3.0 + 4.0) / 2.0) ** 0.5, abs=0.05)
+    assert float(row["worst"]) == 2.0
+    assert value(row["bias/bound"]) == pytest.approx(1.4, abs=0.05)  # 1.4 ± 0.68
+    assert row["95 % covers [%]"] == "40 (12–77)"
+    assert row["failed [%]"] == "16.7 (3–56)"
+    assert (row["estimator"], row["quantity"]) == ("e", "ζ")
 
 
 def test_what_a_cell_does_not_give_is_a_dash() -> None:
-    assert pooled_figures([trials([1.0, 2.0], bound=False)])[:3] == ("–", "–", "–")
-    assert pooled_figures([trials([], 3)]) == ("–", "–", "–", "–", "100 (44–100)")
-    assert cell_figures(score(trials([], 2)))[:4] == ("–", "–", "–", "–")
-    assert cell_figures(score(trials([1.0, 1.0, 1.0])))[3:] == ("100 (44–100)", "0")
+    def dashes(row: dict[str, str]) -> set[str]:
+        return {head for head, text in row.items() if text == "–"}
+
+    assert dashes(shown(POOLED, trials([1.0, 2.0], bound=False))) == {"RMSE/bound", "worst", "bias/bound"}
+    none = shown(POOLED, trials([], 3))
+    assert dashes(none) == {"RMSE/bound", "worst", "bias/bound", "95 % covers [%]"}
+    assert none["failed [%]"] == "100 (44–100)"
+    assert dashes(shown(CELL, trials([], 2))) == {"RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]"}
+    exact = shown(CELL, trials([1.0, 1.0, 1.0]))
+    assert (exact["95 % covers [%]"], exact["failed [%]"]) == ("100 (44–100)", "0")
 
 
 def test_two_trials_have_a_bias_and_one_has_none() -> None:
-    assert float(pooled_figures([trials([1.0, 2.0])])[2].partition("(")[0]) == pytest.approx(1.5, abs=0.05)
-    assert pooled_figures([trials([1.0])])[2] == "–"
+    assert value(shown(POOLED, trials([1.0, 2.0]))["bias/bound"]) == pytest.approx(1.5, abs=0.05)
+    assert shown(POOLED, trials([1.0]))["bias/bound"] == "–"
 
 
-def test_the_time_is_not_under_a_heading_of_another_figure() -> None:
-    """In a narrow terminal a row is printed as headings and values: a time is not one of an RMSE."""
+def test_the_time_is_not_under_a_heading_of_another_figure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a narrow terminal estimator and time stand above the rows of their section."""
     decays, *_ = summary_tables(packaged_baseline())
-    times = [others for first, *others in decays.rows if first.endswith("ms/record")]
-    assert len(times) == len(packaged_baseline().estimators)
-    assert not any(cell for others in times for cell in others)
+    assert decays.columns[:3] == ("estimator", "time [ms/record]", "quantity")
+    monkeypatch.setenv("COLUMNS", "80")
+    show([decays])
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    for estimator, time in {row[:2] for row in decays.rows}:
+        at = lines.index(estimator)
+        assert lines[at + 1] == f"time [ms/record] {time}"
+        assert lines[at + 2].split()[0] == "ζ"
 
 
 def test_few_trials_are_said() -> None:
@@ -58,7 +87,7 @@ def test_few_trials_are_said() -> None:
 
 
 def test_a_cell_has_its_bias_in_per_cent_and_in_deviations() -> None:
-    over_bound, per_cent, deviations, *_ = cell_figures(score(trials([1.0, 2.0, 3.0])))
-    assert float(over_bound.partition("(")[0]) == pytest.approx((14.0 / 3.0) ** 0.5, abs=0.05)
-    assert float(per_cent.partition("(")[0]) == pytest.approx(10.0, abs=0.5)
-    assert float(deviations.partition("(")[0]) == pytest.approx(2.0, abs=0.05)
+    row = shown(CELL, trials([1.0, 2.0, 3.0]))
+    assert value(row["RMSE/bound"]) == pytest.approx((14.0 / 3.0) ** 0.5, abs=0.05)
+    assert value(row["bias [%]"]) == pytest.approx(10.0, abs=0.5)
+    assert value(row["bias/std"]) == pytest.approx(2.0, abs=0.05)

@@ -1,0 +1,237 @@
+"""The figures of estimates against their truth: every column declared once, for tables, pages and files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from identification.printing import SYMBOLS
+from identification.scoring import Score, Trials, mean_figure, overall, score
+from identification.show.blocks import Paragraph, TextTable
+from identification.show.numbers import concise, significant
+from identification.show.quantity import Quantity
+from identification.statistics import Proportion
+from tunnel_sim.vocabulary.record import read_only
+
+NAMES: Mapping[str, str] = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn", "sensor_zero": "zero"}
+"""How quantities are written."""
+_BRACKETS = "In brackets: the standard error in the last digits; after shares: their 95 % interval."
+
+
+def trials_of(rows: pl.DataFrame, *, percent: bool = False) -> Trials:
+    """The trials of one estimator and one quantity.
+
+    Args:
+        rows: with ``truth``, ``value``, ``std``, ``bound`` and ``unit``.
+        percent: whether in % of the truths, none of which is then zero.
+    """
+    given = rows.filter(pl.col("value").is_not_null())
+    truth, value, std = (given[name].to_numpy() for name in ("truth", "value", "std"))
+    bounded = len(given) > 0 and not given["bound"].null_count()
+    scale = 100.0 / np.abs(truth) if percent else np.ones(truth.size)
+    return Trials(
+        error=read_only((value - truth) * scale),
+        std=read_only(std * scale),
+        truth=read_only(truth * scale),
+        bound=read_only(given["bound"].to_numpy() * scale) if bounded else None,
+        failures=len(rows) - len(given),
+        unit="%" if percent else rows["unit"][0],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredRow:
+    """The trials of one estimator and one quantity, of one cell or of several that are pooled.
+
+    Args:
+        cells: the trials of each cell, at least one.
+    """
+
+    estimator: str
+    quantity: str
+    cells: tuple[Trials, ...]
+
+    @cached_property
+    def scores(self) -> tuple[Score, ...]:
+        """The score of each cell."""
+        return tuple(map(score, self.cells))
+
+    @property
+    def score(self) -> Score:
+        """The score of the only cell."""
+        (only,) = self.scores
+        return only
+
+    @property
+    def rmse_over_bound(self) -> Quantity | None:
+        """Root mean square over the cells; None without a bound."""
+        return overall(self.scores)
+
+    @property
+    def worst_over_bound(self) -> float | None:
+        """The largest RMSE over the bound of a cell; None without a bound."""
+        return max(
+            (s.rmse_over_bound.value for s in self.scores if s.rmse_over_bound is not None), default=None
+        )
+
+    @property
+    def bias_over_bound(self) -> Quantity | None:
+        """Mean of error over the bound; None for fewer than two trials with a bound."""
+        scaled = [trials.scaled for trials in self.cells if trials.bound is not None]
+        values = np.concatenate(scaled) if scaled else np.zeros(0)
+        return mean_figure(values, "1") if values.size > 1 else None
+
+    @property
+    def coverage(self) -> Proportion | None:
+        """Of the 95 % intervals, among the trials with an estimate; None where there is none."""
+        identified = sum(trials.error.size for trials in self.cells)
+        return Proportion(sum(trials.covered for trials in self.cells), identified) if identified else None
+
+    @property
+    def failures(self) -> Proportion:
+        """The trials without an estimate, among all."""
+        return Proportion(sum(t.failures for t in self.cells), sum(t.count for t in self.cells))
+
+
+@dataclass(frozen=True)
+class Column:
+    """A figure of scored trials as a column.
+
+    Args:
+        head: heading, with the unit.
+        texts: the cells, of the figures of all rows of a table.
+        find: the figure of a row.
+        what: its meaning in a sentence below the tables; empty: the heading says it.
+        detail: whether only a page has room for it.
+    """
+
+    head: str
+    texts: Callable[[Sequence[Any]], Sequence[str]]
+    find: Callable[[ScoredRow], Any]
+    what: str = ""
+    detail: bool = False
+
+
+def _values(found: Sequence[Quantity | None]) -> list[str]:
+    return ["–" if one is None else concise(one.value, one.std) for one in found]
+
+
+def _with_units(found: Sequence[Quantity | None]) -> list[str]:
+    texts = zip(_values(found), found, strict=True)
+    return [text if one is None or one.unit == "1" else f"{text} {one.unit}" for text, one in texts]
+
+
+def _plain(found: Sequence[float | None]) -> list[str]:
+    return ["–" if one is None else significant(one, 3) for one in found]
+
+
+def _shares(found: Sequence[Proportion | None]) -> list[str]:
+    return ["–" if one is None else share_text(one) for one in found]
+
+
+def share_text(share: Proportion) -> str:
+    """A share with its 95 % interval, in %."""
+    low, high = share.interval
+    return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
+
+
+def _failed(found: Sequence[Proportion]) -> list[str]:
+    return [share_text(one) if one.count else "0" for one in found]
+
+
+RMSE = Column("RMSE", _with_units, lambda row: row.score.rmse)
+RMSE_OVER_BOUND = Column(
+    "RMSE/\nbound",
+    _values,
+    lambda row: row.rmse_over_bound,
+    "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter.",
+)
+WORST = Column("worst", _plain, lambda row: row.worst_over_bound, "Worst: RMSE/bound of the worst cell.")
+BIAS = Column("bias", _with_units, lambda row: row.score.bias)
+BIAS_OVER_BOUND = Column("bias/\nbound", _values, lambda row: row.bias_over_bound)
+BIAS_PERCENT = Column("bias [%]", _values, lambda row: row.score.relative_bias)
+BIAS_IN_STDS = Column("bias/std", _values, lambda row: row.score.bias_in_stds)
+COVERAGE = Column("95 % covers\n[%]", _shares, lambda row: row.coverage)
+FAILED = Column("failed\n[%]", _failed, lambda row: row.failures)
+TRIALS = Column("trials", lambda found: list(map(str, found)), lambda row: row.failures.total)
+
+POOLED = (RMSE_OVER_BOUND, WORST, BIAS_OVER_BOUND, COVERAGE, FAILED)
+"""The columns of a score's cells together."""
+CELL = (RMSE_OVER_BOUND, BIAS_PERCENT, BIAS_IN_STDS, COVERAGE, FAILED)
+"""The columns of one cell of a score."""
+LINE = (TRIALS, BIAS, RMSE, RMSE_OVER_BOUND, COVERAGE, FAILED)
+"""The columns of a sweep."""
+
+
+def score_table(
+    title: str, columns: Sequence[Column], rows: Iterable[tuple[Mapping[str, str], ScoredRow]]
+) -> TextTable:
+    """A table of scored trials, in sections of their places.
+
+    Args:
+        rows: each with the place where it was scored, by heading: the same headings in all rows.
+    """
+    every = list(rows)
+    places = tuple(every[0][0]) if every else ()
+    scored = [row for _, row in every]
+    cells = zip(*(column.texts([column.find(row) for row in scored]) for column in columns), strict=True)
+    return TextTable(
+        title,
+        (*places, "quantity", *(column.head for column in columns)),
+        tuple(
+            (*place.values(), NAMES[row.quantity], *texts)
+            for (place, row), texts in zip(every, cells, strict=True)
+        ),
+        right=tuple(one.head for one in columns if one in (WORST, TRIALS)),
+        names=("estimator",),
+        detail=tuple(column.head for column in columns if column.detail),
+        sections=len(places),
+    )
+
+
+def meanings(*tables: Sequence[Column]) -> Paragraph:
+    """What the columns of some tables mean, each said once."""
+    said = dict.fromkeys(column.what for columns in tables for column in columns if column.what)
+    return Paragraph(" ".join((*said, _BRACKETS)))
+
+
+def file_columns(
+    judged: Score, figures: Mapping[str, str], shares: Mapping[str, str], error: str
+) -> dict[str, float | None]:
+    """Figures of a score as columns of a file.
+
+    Args:
+        figures: columns by the attribute of the score; the standard error is beside it.
+        shares: columns of the shares likewise, with the ends of the 95 % interval beside.
+        error: ending of the columns of standard errors.
+    """
+    columns: dict[str, float | None] = {}
+    for name, column in figures.items():
+        found: Quantity | None = getattr(judged, name)
+        columns[column], columns[column + error] = (None, None) if found is None else (found.value, found.std)
+    for name, column in shares.items():
+        share: Proportion | None = getattr(judged, name)
+        low, high = (None, None) if share is None else share.interval
+        columns |= {
+            column: None if share is None else share.value,
+            f"{column}_low": low,
+            f"{column}_high": high,
+        }
+    return columns
+
+
+def not_given_notes(absent: Mapping[str, tuple[str, ...]]) -> list[Paragraph]:
+    """Quantities that estimators do not give, a paragraph for each estimator.
+
+    Args:
+        absent: names of quantities by estimator.
+    """
+    return [
+        Paragraph(f"Not given by {name}: {', '.join(NAMES[one] for one in some)}.")
+        for name, some in absent.items()
+    ]
