@@ -107,7 +107,7 @@ def score(
     shown: ScoreView,
     overwrite: Annotated[bool, Option("--overwrite", help="Replace a finished score in the folder.")] = False,
 ) -> None:
-    """Score estimators: bias, RMSE over the Cramér–Rao bound, coverage, failures, time.
+    """Score estimators: RMSE, also over the Cramér–Rao bound; coverage, failures, time.
 
     Every estimator sees the same simulated records: single decays over ζ,
     frequency (Hz), noise and length (s), and campaigns over wind speed (m/s),

@@ -10,8 +10,18 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from identification.policy import DIFFERENCE_RATE
 from identification.printing import SYMBOLS
-from identification.scoring import Score, Trials, mean_figure, overall, score
+from identification.scoring import (
+    NOMINAL_COVERAGE,
+    Score,
+    Trials,
+    holm,
+    mean_figure,
+    overall,
+    root_mean_square,
+    score,
+)
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import concise, significant
 from identification.show.quantity import Quantity
@@ -20,7 +30,7 @@ from tunnel_sim.vocabulary.record import read_only
 
 NAMES: Mapping[str, str] = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn", "sensor_zero": "zero"}
 """How quantities are written."""
-_BRACKETS = "In brackets: the standard error in the last digits; after shares: their 95 % interval."
+_BRACKETS = "In brackets after other figures: the standard error in the last digits."
 
 
 def trials_of(rows: pl.DataFrame, *, percent: bool = False) -> Trials:
@@ -66,6 +76,15 @@ class ScoredRow:
         """The score of the only cell."""
         (only,) = self.scores
         return only
+
+    @property
+    def relative_rmse(self) -> Quantity | None:
+        """Root mean square over all trials of error over the size of the truth, %; None where a truth is zero."""
+        if any(not trials.truth.all() for trials in self.cells):
+            return None
+        errors = [100.0 * trials.error / np.abs(trials.truth) for trials in self.cells]
+        values = np.concatenate(errors)
+        return root_mean_square(values, "%") if values.size > 1 else None
 
     @property
     def rmse_over_bound(self) -> Quantity | None:
@@ -130,18 +149,24 @@ def _plain(found: Sequence[float | None]) -> list[str]:
     return ["–" if one is None else significant(one, 3) for one in found]
 
 
-def _shares(found: Sequence[Proportion | None]) -> list[str]:
-    return ["–" if one is None else share_text(one) for one in found]
+def _coverages(found: Sequence[Proportion | None]) -> list[str]:
+    """Shares with their intervals; ``low`` or ``high`` where one differs from 95 %, by Holm's test of all rows."""
+    from scipy.stats import binomtest
+
+    tests = [binomtest(one.count, one.total, NOMINAL_COVERAGE).pvalue if one else 1.0 for one in found]
+    texts = []
+    for one, wrong in zip(found, holm(tests, DIFFERENCE_RATE), strict=True):
+        if one is None:
+            texts.append("–")
+        else:
+            low, high = (100 * end for end in one.interval)
+            mark = "" if not wrong else " low" if one.value < NOMINAL_COVERAGE else " high"
+            texts.append(f"{100 * one.value:.0f} ({low:.0f}–{high:.0f}){mark}")
+    return texts
 
 
-def share_text(share: Proportion) -> str:
-    """A share with its 95 % interval, in %."""
-    low, high = share.interval
-    return f"{100 * share.value:.3g} ({100 * low:.0f}–{100 * high:.0f})"
-
-
-def _failed(found: Sequence[Proportion]) -> list[str]:
-    return [share_text(one) if one.count else "0" for one in found]
+def _counts(found: Sequence[Proportion]) -> list[str]:
+    return [f"{one.count}/{one.total}" for one in found]
 
 
 RMSE = Column("RMSE", _with_units, lambda row: row.score.rmse)
@@ -151,20 +176,31 @@ RMSE_OVER_BOUND = Column(
     lambda row: row.rmse_over_bound,
     "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter.",
 )
+RMSE_PERCENT = Column(
+    "RMSE\n[%]", _values, lambda row: row.relative_rmse, "RMSE: of the error over the truth."
+)
 WORST = Column("worst", _plain, lambda row: row.worst_over_bound, "Worst: RMSE/bound of the worst cell.")
-BIAS = Column("bias", _with_units, lambda row: row.score.bias)
-BIAS_OVER_BOUND = Column("bias/\nbound", _values, lambda row: row.bias_over_bound)
-BIAS_PERCENT = Column("bias [%]", _values, lambda row: row.score.relative_bias)
-BIAS_IN_STDS = Column("bias/std", _values, lambda row: row.score.bias_in_stds)
-COVERAGE = Column("95 % covers\n[%]", _shares, lambda row: row.coverage)
-FAILED = Column("failed\n[%]", _failed, lambda row: row.failures)
-TRIALS = Column("trials", lambda found: list(map(str, found)), lambda row: row.failures.total)
+BIAS = Column("bias", _with_units, lambda row: row.score.bias, detail=True)
+BIAS_OVER_BOUND = Column("bias/\nbound", _values, lambda row: row.bias_over_bound, detail=True)
+BIAS_PERCENT = Column("bias [%]", _values, lambda row: row.score.relative_bias, detail=True)
+BIAS_IN_STDS = Column(
+    "bias/\nstd", _values, lambda row: row.score.bias_in_stds, "Bias/std: in reported standard deviations."
+)
+COVERAGE = Column(
+    "95 % covers\n[%]",
+    _coverages,
+    lambda row: row.coverage,
+    "Covers: share of the 95 % intervals that contain the truth, with its own 95 % interval; low or high where it "
+    "differs from 95 % beyond chance (exact binomial tests, Holm; a table of right intervals has a mark in "
+    f"{100 * DIFFERENCE_RATE:.0f} % of cases).",
+)
+FAILED = Column("failed", _counts, lambda row: row.failures)
 
-POOLED = (RMSE_OVER_BOUND, WORST, BIAS_OVER_BOUND, COVERAGE, FAILED)
+POOLED = (RMSE_PERCENT, RMSE_OVER_BOUND, WORST, BIAS_OVER_BOUND, COVERAGE, FAILED)
 """The columns of a score's cells together."""
-CELL = (RMSE_OVER_BOUND, BIAS_PERCENT, BIAS_IN_STDS, COVERAGE, FAILED)
+CELL = (RMSE_PERCENT, RMSE_OVER_BOUND, BIAS_PERCENT, BIAS_IN_STDS, COVERAGE, FAILED)
 """The columns of one cell of a score."""
-LINE = (TRIALS, BIAS, RMSE, RMSE_OVER_BOUND, COVERAGE, FAILED)
+LINE = (RMSE, RMSE_OVER_BOUND, BIAS, COVERAGE, FAILED)
 """The columns of a sweep."""
 
 
@@ -187,7 +223,7 @@ def score_table(
             (*place.values(), NAMES[row.quantity], *texts)
             for (place, row), texts in zip(every, cells, strict=True)
         ),
-        right=tuple(one.head for one in columns if one in (WORST, TRIALS)),
+        right=tuple(one.head for one in columns if one in (WORST, FAILED)),
         names=("estimator",),
         detail=tuple(column.head for column in columns if column.detail),
         sections=len(places),

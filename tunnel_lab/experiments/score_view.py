@@ -22,6 +22,7 @@ from tunnel_lab.experiments.columns import (
     CELL,
     NAMES,
     POOLED,
+    WORST,
     Column,
     ScoredRow,
     file_columns,
@@ -166,7 +167,12 @@ def scores_frame(results: Results) -> pl.DataFrame:
 def summary_tables(results: Results) -> list[TextTable]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     return [
-        _table(results, f"{group[0].upper()}{group[1:]} ({counted(len(cells), 'cell')})", POOLED, cells)
+        _table(
+            results,
+            f"{group[0].upper()}{group[1:]} ({counted(len(cells), 'cell')})",
+            [column for column in POOLED if column is not WORST or len(cells) > 1],
+            cells,
+        )
         for group, cells in groups_of(results.grid).items()
     ]
 
@@ -183,7 +189,9 @@ def _table(results: Results, title: str, columns: Sequence[Column], cells: Seque
         for quantity in results.grid.cells[cells[0]].quantities:
             if results.gives(name, quantity):
                 trials = tuple(results.trials[name, cell, quantity] for cell in cells)
-                rows.append(({"estimator": name, "time [ms/record]": time}, ScoredRow(name, quantity, trials)))
+                rows.append(
+                    ({"estimator": name, "time [ms/record]": time}, ScoredRow(name, quantity, trials))
+                )
     return score_table(title, columns, rows)
 
 

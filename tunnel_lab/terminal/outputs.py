@@ -91,7 +91,7 @@ def _show_table(table: TextTable) -> None:
     if kind is not TableFormat.TEXT:
         out.print(rendered(table, kind), soft_wrap=True, end="")
     elif not is_too_wide(table, out.width):
-        out.print(in_columns(table))
+        out.print(in_columns(table, out.width))
     else:
         narrow, shared = without_shared(table)
         fitting = next(
@@ -101,7 +101,7 @@ def _show_table(table: TextTable) -> None:
         if fitting is None:
             out.print(stacked(table, out.width), soft_wrap=True)
         else:
-            out.print(in_columns(fitting))
+            out.print(in_columns(fitting, out.width))
             out.print(shared, end="\n" if shared else "")
     if kind is not TableFormat.JSON:
         out.print()

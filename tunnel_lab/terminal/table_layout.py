@@ -24,6 +24,7 @@ PROSE = 30
 """Columns: a longer cell is a sentence, which may be wrapped."""
 _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 _FOLDED = 16  # columns: a first cell is not folded to less
+_UNIT = re.compile(r"\[([^]]+)\]$")  # at the end of a heading
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
@@ -55,8 +56,13 @@ def _on_one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def in_columns(table: TextTable) -> RichTable:
-    """A table in columns, wide enough that only headings and sentences are wrapped."""
+def in_columns(table: TextTable, width: int) -> RichTable:
+    """A table in columns, wide enough that only headings and sentences are wrapped; see `is_too_wide`."""
+    natural = [
+        max(cell_len(line) for cell in column for line in cell.split("\n"))
+        for column in zip(table.columns, *table.rows, strict=True)
+    ]
+    fits = sum(natural) <= _room(table, width)
     result = RichTable(
         title=Text(table.title),
         title_justify="left",
@@ -64,13 +70,16 @@ def in_columns(table: TextTable) -> RichTable:
         box=box.SIMPLE_HEAD,
         show_edge=False,
     )
-    for heading, width in zip(table.columns, _least_widths(table), strict=True):
+    for heading, least in zip(table.columns, _least_widths(table), strict=True):
+        head = (
+            heading if fits else "\n".join(wrap(heading, least))
+        )  # Rich would narrow columns of numbers as well
         # As text, not markup: units are in brackets. Folded, not cut, so that no digit is lost.
         result.add_column(
-            Text(heading),
+            Text(head),
             justify="right" if heading in table.right else "left",
             overflow="fold",
-            min_width=width,
+            min_width=least,
             no_wrap=heading in table.names,  # for copying
         )
     for row, after in zip_longest(table.rows, table.rows[1:]):
@@ -86,8 +95,12 @@ def is_too_wide(table: TextTable, width: int) -> bool:
 
 def _spare(table: TextTable, width: int) -> int:
     """Columns left at this width; negative: so many are missing."""
-    needed = sum(least + _PADDING for least in _least_widths(table))
-    return width - needed - _BETWEEN * (len(table.columns) - 1)
+    return _room(table, width) - sum(_least_widths(table))
+
+
+def _room(table: TextTable, width: int) -> int:
+    """Columns for the cells of a row at this width."""
+    return width - _PADDING * len(table.columns) - _BETWEEN * (len(table.columns) - 1)
 
 
 def without_shared(table: TextTable) -> tuple[TextTable, str]:
@@ -116,13 +129,21 @@ def sectioned(table: TextTable) -> TextTable | None:
     rows: list[tuple[str, ...]] = []
     for part in parts:
         for at in places:
-            head = "" if table.columns[at] in table.names else f"{_on_one_line(table.columns[at])} "
-            rows.append((f"{head}{part[0][at]}", *[""] * (len(table.columns) - table.sections - 1)))
+            name = _named(table, at, part[0][at])
+            rows.append((name, *[""] * (len(table.columns) - table.sections - 1)))
         rows += [(f"  {first}", *others) for first, *others in (row[table.sections :] for row in part)]
         rows.append(("",) * (len(table.columns) - table.sections))
     return replace(
         table, columns=("", *table.columns[table.sections + 1 :]), rows=tuple(rows[:-1]), sections=0
     )
+
+
+def _named(table: TextTable, at: int, cell: str) -> str:
+    """A cell that stands above the others: a name, or a value with the unit of its heading."""
+    unit = _UNIT.search(table.columns[at])
+    if table.columns[at] in table.names:
+        return cell
+    return f"{cell} {unit[1]}" if unit else f"{_on_one_line(table.columns[at])} {cell}"
 
 
 def folded(table: TextTable, width: int) -> TextTable | None:

@@ -208,12 +208,15 @@ def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
     score = ("score", "--jobs", "0", "grid.toml", "-e", "own_method:Bare,own_method:Mine")
     status, out, err = tunnel(*score)
     assert (status, err) == (0, "")
-    bare, mine = out.partition(" bare ")[2].split(" mine ")
-    assert ("ωn" in bare, "ζ" in bare, "ζ" in mine) == (True, False, True)
+    given = {
+        (words[0], word) for words in map(str.split, out.splitlines()) for word in words if word in "ζωn"
+    }
+    assert given >= {("bare", "ωn"), ("mine", "ωn"), ("mine", "ζ")}
+    assert ("bare", "ζ") not in given
     assert "Not given by bare: ζ.\n" in out
     status, out, _ = tunnel(*score[:-1], "own_method:Leaves")
     assert "Not given" not in out
-    assert out.count("100 (51–100)") == 2
+    assert out.count(" 4/4") == 2
 
 
 def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.scoring import Trials
-from tunnel_lab.experiments.columns import CELL, POOLED, Column, ScoredRow, score_table
+from tunnel_lab.experiments.columns import CELL, COVERAGE, POOLED, Column, ScoredRow, score_table
 from tunnel_lab.experiments.score import packaged_baseline
 from tunnel_lab.experiments.score_view import notes_below, summary_tables
 from tunnel_lab.terminal.outputs import show
@@ -38,8 +38,11 @@ def test_cells_are_pooled_in_units_of_their_bounds() -> None:
     assert value(row["RMSE/bound"]) == pytest.approx(((11.0 / 3.0 + 4.0) / 2.0) ** 0.5, abs=0.05)
     assert float(row["worst"]) == 2.0
     assert value(row["bias/bound"]) == pytest.approx(1.4, abs=0.05)  # 1.4 ± 0.68
-    assert row["95 % covers [%]"] == "40 (12–77)"
-    assert row["failed [%]"] == "16.7 (3–56)"
+    assert value(row["RMSE [%]"]) == pytest.approx(
+        5.0 * (19.0 / 5.0) ** 0.5, abs=0.5
+    )  # the truth is 20 bounds
+    assert row["95 % covers [%]"] == "40 (12–77) low"
+    assert row["failed"] == "1/6"
     assert (row["estimator"], row["quantity"]) == ("e", "ζ")
 
 
@@ -49,11 +52,13 @@ def test_what_a_cell_does_not_give_is_a_dash() -> None:
 
     assert dashes(shown(POOLED, trials([1.0, 2.0], bound=False))) == {"RMSE/bound", "worst", "bias/bound"}
     none = shown(POOLED, trials([], 3))
-    assert dashes(none) == {"RMSE/bound", "worst", "bias/bound", "95 % covers [%]"}
-    assert none["failed [%]"] == "100 (44–100)"
-    assert dashes(shown(CELL, trials([], 2))) == {"RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]"}
+    assert dashes(none) == {"RMSE [%]", "RMSE/bound", "worst", "bias/bound", "95 % covers [%]"}
+    assert none["failed"] == "3/3"
+    assert dashes(shown(CELL, trials([], 2))) == {
+        "RMSE [%]", "RMSE/bound", "bias [%]", "bias/std", "95 % covers [%]",
+    }  # fmt: skip
     exact = shown(CELL, trials([1.0, 1.0, 1.0]))
-    assert (exact["95 % covers [%]"], exact["failed [%]"]) == ("100 (44–100)", "0")
+    assert (exact["95 % covers [%]"], exact["failed"]) == ("100 (44–100)", "0/3")
 
 
 def test_two_trials_have_a_bias_and_one_has_none() -> None:
@@ -72,7 +77,7 @@ def test_the_time_is_not_under_a_heading_of_another_figure(
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     for estimator, time in {row[:2] for row in decays.rows}:
         at = lines.index(estimator)
-        assert lines[at + 1] == f"time [ms/record] {time}"
+        assert lines[at + 1] == f"{time} ms/record"
         assert lines[at + 2].split()[0] == "ζ"
 
 
@@ -91,3 +96,24 @@ def test_a_cell_has_its_bias_in_per_cent_and_in_deviations() -> None:
     assert value(row["RMSE/bound"]) == pytest.approx((14.0 / 3.0) ** 0.5, abs=0.05)
     assert value(row["bias [%]"]) == pytest.approx(10.0, abs=0.5)
     assert value(row["bias/std"]) == pytest.approx(2.0, abs=0.05)
+    assert value(row["RMSE [%]"]) == pytest.approx(5.0 * (14.0 / 3.0) ** 0.5, abs=0.5)
+
+
+def test_a_coverage_is_marked_where_it_is_too_low_and_where_it_is_too_high() -> None:
+    """Truth: binomial probabilities of 95 %; 0.95^200 = 4e-5, and 180 or fewer of 200 have 0.3 %."""
+
+    def marks(*hits: int) -> list[str]:
+        rows = [ScoredRow("e", "zeta", (trials([1.0] * hit + [3.0] * (200 - hit)),)) for hit in hits]
+        table = score_table("one", [COVERAGE], [({"estimator": "e"}, row) for row in rows])
+        return [row[-1].partition(")")[2].strip() for row in table.rows]
+
+    assert marks(200, 190, 170) == ["high", "", "low"]
+    assert marks(180) == ["low"]
+    assert marks(180, *[190] * 9) == [""] * 10  # ten rows: a chance of one in 250 is no longer beyond chance
+
+
+def test_the_notes_say_what_the_columns_mean() -> None:
+    said = notes_below(packaged_baseline())[0].text
+    assert said.count("Bound: Cramér–Rao's") == 1
+    for column in (*POOLED, *CELL):
+        assert column.what in said
