@@ -21,10 +21,10 @@ from identification.scoring import score
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import significant
 from identification.show.style import figure, styled
-from tunnel_lab.experiments.columns import NAMES, file_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
+from tunnel_lab.experiments.score_columns import NAMES, file_columns, not_given_notes, trials_of
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of

@@ -18,7 +18,6 @@ import polars as pl
 
 from identification.estimate import UNITS
 from identification.scoring import Trials
-from tunnel_lab.experiments.columns import trials_of
 from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
     RAISED,
@@ -32,6 +31,7 @@ from tunnel_lab.experiments.estimate_rows import (
 )
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.runner import Progress, Workers
+from tunnel_lab.experiments.score_columns import trials_of
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.kept_process import read_apart

@@ -11,8 +11,8 @@ import numpy as np
 
 from identification.scoring import INTERVAL, NOMINAL_COVERAGE, Score, score
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled, text_width
-from tunnel_lab.experiments.columns import NAMES
 from tunnel_lab.experiments.score import Results
+from tunnel_lab.experiments.score_columns import NAMES
 from tunnel_lab.experiments.score_grid import Cell
 from tunnel_lab.terminal.arguments import NO_EFFECT
 

@@ -18,20 +18,20 @@ from identification.scoring import (
 )
 from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import significant
-from tunnel_lab.experiments.columns import (
+from tunnel_lab.experiments.experiment import parquet
+from tunnel_lab.experiments.score import Results, groups_of
+from tunnel_lab.experiments.score_columns import (
     CELL,
     NAMES,
     POOLED,
     WORST,
-    Column,
+    ScoreColumn,
     ScoredRow,
     file_columns,
     meanings,
     not_given_notes,
     score_table,
 )
-from tunnel_lab.experiments.experiment import parquet
-from tunnel_lab.experiments.score import Results, groups_of
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
@@ -182,7 +182,7 @@ def cell_tables(results: Results) -> list[TextTable]:
     return [_table(results, cell.label, CELL, [index]) for index, cell in enumerate(results.grid.cells)]
 
 
-def _table(results: Results, title: str, columns: Sequence[Column], cells: Sequence[int]) -> TextTable:
+def _table(results: Results, title: str, columns: Sequence[ScoreColumn], cells: Sequence[int]) -> TextTable:
     rows = []
     for name in results.estimators:
         time = significant(results.milliseconds(name, cells), 2)

@@ -18,7 +18,8 @@ from identification.show.blocks import TextTable
 from identification.show.numbers import significant, unit
 from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
-from tunnel_lab.experiments.columns import (
+from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
+from tunnel_lab.experiments.score_columns import (
     LINE,
     NAMES,
     ScoredRow,
@@ -28,7 +29,6 @@ from tunnel_lab.experiments.columns import (
     score_table,
     trials_of,
 )
-from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
 from tunnel_lab.experiments.sweep_work import SCATTER_COLUMNS
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_lab.terminal.arguments import NO_EFFECT

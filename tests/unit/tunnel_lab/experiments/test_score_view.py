@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from identification.scoring import Trials
-from tunnel_lab.experiments.columns import CELL, COVERAGE, POOLED, Column, ScoredRow, score_table
 from tunnel_lab.experiments.score import packaged_baseline
+from tunnel_lab.experiments.score_columns import CELL, COVERAGE, POOLED, ScoreColumn, ScoredRow, score_table
 from tunnel_lab.experiments.score_view import notes_below, summary_tables
 from tunnel_lab.terminal.outputs import show
 
@@ -21,7 +21,7 @@ def trials(errors: list[float], failures: int = 0, *, bound: bool = True) -> Tri
     return Trials(0.1 * np.array(errors), 0.1 * ones, 2.0 * ones, 0.1 * ones if bound else None, failures)
 
 
-def shown(columns: Sequence[Column], *cells: Trials) -> dict[str, str]:
+def shown(columns: Sequence[ScoreColumn], *cells: Trials) -> dict[str, str]:
     """The row of one estimator, by heading."""
     table = score_table("one", columns, [({"estimator": "e"}, ScoredRow("e", "zeta", cells))])
     (row,) = table.rows

@@ -118,7 +118,7 @@ class ScoredRow:
 
 
 @dataclass(frozen=True)
-class Column:
+class ScoreColumn:
     """A figure of scored trials as a column.
 
     Args:
@@ -169,24 +169,24 @@ def _counts(found: Sequence[Proportion]) -> list[str]:
     return [f"{one.count}/{one.total}" for one in found]
 
 
-RMSE = Column("RMSE", _with_units, lambda row: row.score.rmse)
-RMSE_OVER_BOUND = Column(
+RMSE = ScoreColumn("RMSE", _with_units, lambda row: row.score.rmse)
+RMSE_OVER_BOUND = ScoreColumn(
     "RMSE/\nbound",
     _values,
     lambda row: row.rmse_over_bound,
     "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter.",
 )
-RMSE_PERCENT = Column(
+RMSE_PERCENT = ScoreColumn(
     "RMSE\n[%]", _values, lambda row: row.relative_rmse, "RMSE: of the error over the truth."
 )
-WORST = Column("worst", _plain, lambda row: row.worst_over_bound, "Worst: RMSE/bound of the worst cell.")
-BIAS = Column("bias", _with_units, lambda row: row.score.bias, detail=True)
-BIAS_OVER_BOUND = Column("bias/\nbound", _values, lambda row: row.bias_over_bound, detail=True)
-BIAS_PERCENT = Column("bias [%]", _values, lambda row: row.score.relative_bias, detail=True)
-BIAS_IN_STDS = Column(
+WORST = ScoreColumn("worst", _plain, lambda row: row.worst_over_bound, "Worst: RMSE/bound of the worst cell.")
+BIAS = ScoreColumn("bias", _with_units, lambda row: row.score.bias, detail=True)
+BIAS_OVER_BOUND = ScoreColumn("bias/\nbound", _values, lambda row: row.bias_over_bound, detail=True)
+BIAS_PERCENT = ScoreColumn("bias [%]", _values, lambda row: row.score.relative_bias, detail=True)
+BIAS_IN_STDS = ScoreColumn(
     "bias/\nstd", _values, lambda row: row.score.bias_in_stds, "Bias/std: in reported standard deviations."
 )
-COVERAGE = Column(
+COVERAGE = ScoreColumn(
     "95 % covers\n[%]",
     _coverages,
     lambda row: row.coverage,
@@ -194,7 +194,7 @@ COVERAGE = Column(
     "differs from 95 % beyond chance (exact binomial tests, Holm; a table of right intervals has a mark in "
     f"{100 * DIFFERENCE_RATE:.0f} % of cases).",
 )
-FAILED = Column("failed", _counts, lambda row: row.failures)
+FAILED = ScoreColumn("failed", _counts, lambda row: row.failures)
 
 POOLED = (RMSE_PERCENT, RMSE_OVER_BOUND, WORST, BIAS_OVER_BOUND, COVERAGE, FAILED)
 """The columns of a score's cells together."""
@@ -205,7 +205,7 @@ LINE = (RMSE, RMSE_OVER_BOUND, BIAS, COVERAGE, FAILED)
 
 
 def score_table(
-    title: str, columns: Sequence[Column], rows: Iterable[tuple[Mapping[str, str], ScoredRow]]
+    title: str, columns: Sequence[ScoreColumn], rows: Iterable[tuple[Mapping[str, str], ScoredRow]]
 ) -> TextTable:
     """A table of scored trials, in sections of their places.
 
@@ -230,7 +230,7 @@ def score_table(
     )
 
 
-def meanings(*tables: Sequence[Column]) -> Paragraph:
+def meanings(*tables: Sequence[ScoreColumn]) -> Paragraph:
     """What the columns of some tables mean, each said once."""
     said = dict.fromkeys(column.what for columns in tables for column in columns if column.what)
     return Paragraph(" ".join((*said, _BRACKETS)))
