@@ -17,14 +17,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from identification.scoring import score
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import significant
 from identification.show.style import figure, styled
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
-from tunnel_lab.experiments.score_columns import NAMES, file_columns, not_given_notes, trials_of
+from tunnel_lab.experiments.score_columns import (
+    BIAS_IN_STDS,
+    BIAS_PERCENT,
+    NAMES,
+    ScoredRow,
+    file_columns,
+    not_given_notes,
+    trials_of,
+)
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -237,12 +244,12 @@ def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
     """
     absent = not_given(results)
     keys = ("effect", "severity", "estimator", "quantity")
-    figures = {"relative_bias": "bias_percent", "bias_in_stds": "bias_in_stds"}
+    columns = {"bias_percent": BIAS_PERCENT, "bias_in_stds": BIAS_IN_STDS}
     rows = []
     for (effect, severity, estimator, quantity), some in results.group_by(*keys, maintain_order=True):
         if quantity in absent.get(str(estimator), ()):
             continue
-        judged = score(trials_of(some))
+        row = ScoredRow(str(estimator), str(quantity), (trials_of(some),))
         rows.append(
             {
                 "effect": effect,
@@ -250,11 +257,11 @@ def breakdown_frame(results: pl.DataFrame) -> pl.DataFrame:
                 "reached_noise_powers": some["reached"].mean(),
                 "estimator": estimator,
                 "quantity": quantity,
-                "realisations": judged.count,
-                "failures": judged.failures.count,
-                **file_columns(judged, figures, {}, "_std_error"),
-                "rmse_over_bound": getattr(judged.rmse_over_bound, "value", None),
-                "covered": getattr(judged.coverage, "count", None),
+                "realisations": row.failures.total,
+                "failures": row.failures.count,
+                **file_columns(row, columns, "_std_error"),
+                "rmse_over_bound": getattr(row.rmse_over_bound, "value", None),
+                "covered": getattr(row.coverage, "count", None),
                 "model_departs_share": (some["status"] == "model_departs").mean(),
             }
         )

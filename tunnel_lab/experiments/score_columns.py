@@ -89,7 +89,7 @@ class ScoredRow:
     @property
     def rmse_over_bound(self) -> Quantity | None:
         """Root mean square over the cells; None without a bound."""
-        return overall(self.scores)
+        return overall(self.scores) if len(self.cells) > 1 else self.score.rmse_over_bound
 
     @property
     def worst_over_bound(self) -> float | None:
@@ -236,29 +236,24 @@ def meanings(*tables: Sequence[ScoreColumn]) -> Paragraph:
     return Paragraph(" ".join((*said, _BRACKETS)))
 
 
-def file_columns(
-    judged: Score, figures: Mapping[str, str], shares: Mapping[str, str], error: str
-) -> dict[str, float | None]:
-    """Figures of a score as columns of a file.
+def file_columns(row: ScoredRow, columns: Mapping[str, ScoreColumn], error: str) -> dict[str, float | None]:
+    """Figures of a row as columns of a file.
 
     Args:
-        figures: columns by the attribute of the score; the standard error is beside it.
-        shares: columns of the shares likewise, with the ends of the 95 % interval beside.
-        error: ending of the columns of standard errors.
+        columns: by their names in the file. The ends of the 95 % interval stand beside a share, the standard error
+            beside another figure.
+        error: ending of the names of standard errors.
     """
-    columns: dict[str, float | None] = {}
-    for name, column in figures.items():
-        found: Quantity | None = getattr(judged, name)
-        columns[column], columns[column + error] = (None, None) if found is None else (found.value, found.std)
-    for name, column in shares.items():
-        share: Proportion | None = getattr(judged, name)
-        low, high = (None, None) if share is None else share.interval
-        columns |= {
-            column: None if share is None else share.value,
-            f"{column}_low": low,
-            f"{column}_high": high,
-        }
-    return columns
+    found: dict[str, float | None] = {}
+    for name, column in columns.items():
+        figure = column.find(row)
+        found[name] = None if figure is None else figure.value
+        if column.texts in (_coverages, _counts):
+            ends = (None, None) if figure is None else figure.interval
+            found |= dict(zip((f"{name}_low", f"{name}_high"), ends, strict=True))
+        else:
+            found[f"{name}{error}"] = None if figure is None else figure.std
+    return found
 
 
 def not_given_notes(absent: Mapping[str, tuple[str, ...]]) -> list[Paragraph]:

@@ -14,16 +14,22 @@ from identification.scoring import (
     changes,
     holm,
     reach_of_rmse,
-    score,
 )
 from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import significant
 from tunnel_lab.experiments.experiment import parquet
 from tunnel_lab.experiments.score import Results, groups_of
 from tunnel_lab.experiments.score_columns import (
+    BIAS,
+    BIAS_IN_STDS,
+    BIAS_PERCENT,
     CELL,
+    COVERAGE,
+    FAILED,
     NAMES,
     POOLED,
+    RMSE,
+    RMSE_OVER_BOUND,
     WORST,
     ScoreColumn,
     ScoredRow,
@@ -133,14 +139,15 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
     It has the conditions, the figures, and their standard errors and intervals.
     """
-    figures = ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound")
-    columns = {name: "relative_bias_percent" if name == "relative_bias" else name for name in figures}
-    shares = {"coverage": "coverage", "failures": "failure_share"}
+    columns = {
+        "bias": BIAS, "relative_bias_percent": BIAS_PERCENT, "bias_in_stds": BIAS_IN_STDS, "rmse": RMSE,
+        "rmse_over_bound": RMSE_OVER_BOUND, "coverage": COVERAGE, "failure_share": FAILED,
+    }  # fmt: skip
     rows = []
     for (estimator, index, quantity), trials in results.trials.items():
         if not results.gives(estimator, quantity):
             continue
-        cell, judged = results.grid.cells[index], score(trials)
+        cell, row = results.grid.cells[index], ScoredRow(estimator, quantity, (trials,))
         rows.append(
             {
                 "estimator": estimator,
@@ -155,9 +162,9 @@ def scores_frame(results: Results) -> pl.DataFrame:
                 "runs": cell.runs,
                 "quantity": quantity,
                 "unit": trials.unit,
-                "trials": judged.count,
-                "failures": judged.failures.count,
-                **file_columns(judged, columns, shares, "_std_error"),
+                "trials": row.failures.total,
+                "failures": row.failures.count,
+                **file_columns(row, columns, "_std_error"),
                 "milliseconds_per_record": results.milliseconds(estimator, [index]),
             }
         )

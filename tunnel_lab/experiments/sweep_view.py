@@ -20,8 +20,13 @@ from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.experiments.estimate_rows import NOT_ASKED, not_given
 from tunnel_lab.experiments.score_columns import (
+    BIAS,
+    COVERAGE,
+    FAILED,
     LINE,
     NAMES,
+    RMSE,
+    RMSE_OVER_BOUND,
     ScoredRow,
     file_columns,
     meanings,
@@ -80,13 +85,15 @@ class ScoreLine(ScoredRow):
 
     def to_row(self) -> dict[str, Any]:
         """The line as plain values: every figure with its standard error or 95 % interval."""
-        figures = {name: name for name in ("bias", "rmse", "rmse_over_bound")}
-        failures = file_columns(self.score, {}, {"failures": "failures"}, "")
+        columns = {
+            "failures": FAILED, "bias": BIAS, "rmse": RMSE, "rmse_over_bound": RMSE_OVER_BOUND,
+            "coverage": COVERAGE,
+        }  # fmt: skip
         return {
             "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
             "estimator": self.estimator, "quantity": self.quantity,
-            "unit": getattr(self.score.bias, "unit", None), "count": self.score.count, **failures,
-            **file_columns(self.score, figures, {"coverage": "coverage"}, "_std"),
+            "unit": getattr(self.score.bias, "unit", None), "count": self.score.count,
+            **file_columns(self, columns, "_std"),
         }  # fmt: skip
 
 
