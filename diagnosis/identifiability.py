@@ -59,8 +59,8 @@ class Identifiability:
         """The figures in words."""
         nearest = [f"{name} {cosine:.3f}" for name, cosine in list(self.cosines.items())[:5]]
         return [
-            f"On 12 simulated {'driven ' if self.driven else ''}runs (3 springs, wind off and on, 2 releases) the "
-            "nominal model cannot absorb "
+            f"On 24 simulated {'driven ' if self.driven else ''}runs (3 springs, wind off and at 3 speeds, 2 "
+            "releases) the nominal model cannot absorb "
             f"{100.0 * self.share:.1f} % of its change of the readings.",
             f"Cosine of this part with the nearest effects: {', '.join(nearest)}.",
         ]
@@ -100,7 +100,7 @@ def _nominal(*, driven: bool) -> Fit:
     conditions = tuple(
         Condition(f"s{spring:g}-v{speed:g}-a{degrees:g}", spring, speed, 1.204, math.radians(degrees), 8.0)
         for spring in (16.12, 21.02, 44.84)
-        for speed in (0.0, 20.0)
+        for speed in (0.0, 10.0, 16.0, 24.0)
         for degrees in (8.0, 20.0)
     )
     truth, sensor = Truth(0.47, -0.12, 0.1014, 0.018), SensorModel(sample_rate=200.0)

@@ -13,7 +13,7 @@ import pytest
 
 from diagnosis.identifiability import identifiability
 from tests.support.own_effects import DETENT, OwnCubic
-from tunnel_sim.effects import Effect, the_effect
+from tunnel_sim.effects import Effect, effect_class, the_effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.engine.effect_laws import check
@@ -114,10 +114,15 @@ def test_a_twin_of_a_known_effect_is_recognised() -> None:
     assert all(np.isfinite(cosine) for cosine in found.cosines.values())
 
 
+@pytest.mark.parametrize("name", ["reynolds_dependence", "wind_speed_offset"])
+def test_an_effect_that_only_the_comparison_of_speeds_shows_is_identifiable(name: str) -> None:
+    assert identifiability(effect_class(name)).fault == ""
+
+
 def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
     kind = the_effect(delays=True)
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
     # of small ones, linear theory tells no delay from a lag
     assert found.fault == "it has the same influence on the motion as actuator_lag"
-    assert "12 simulated driven runs" in found.lines()[0]
+    assert "24 simulated driven runs" in found.lines()[0]
