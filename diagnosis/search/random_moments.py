@@ -126,12 +126,13 @@ class _Beside:
 
     Args:
         alike: the likeliest, and those of other kinds that explain the runs nearly as well.
-        top: the set with the response to the random moment in the noise.
-        seen: the same with the sensor's noise alone.
+        sets: the set with the response to the random moment in the noise, and its rivals with another effect in
+            place of one.
+        seen: the first of them with the sensor's noise alone.
     """
 
     alike: tuple[ProcessNoise, ...]
-    top: Hypothesis
+    sets: tuple[Hypothesis, ...]
     seen: Hypothesis
     view: RunsInView
 
@@ -139,19 +140,20 @@ class _Beside:
     def found(cls, source: MomentSource, best: Hypothesis, view: RunsInView) -> _Beside | None:
         """The steady noise of a source beside the effects found with it; None where there is none."""
         chosen = view.base.settings.moment
-        top = _settled(best, view, source)
+        top, exchanges = _settled(best, view, source)
         for number in range(FURTHER_EFFECTS + 1):
             if number > 0:  # a small effect that no gap shows may keep the innovations from being white
                 further = _evident(top, view.able)
                 if not further:
                     break
-                top = further[0]
+                top, exchanges = further[0], exchanges | _exchanges(further)
             seen = _seen_in(top, view.base.problem.data)
             steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
             shown = [one for one in steady if _shown_apart(one, source, seen.fit)]
             process = likeliest(shown, chosen)
             if process is not None and _is_random(process, source, seen.fit):
-                return cls((process, *_others_alike(process, shown)), top, seen, view)
+                sets = (top, *_exchanged(top, exchanges, view.able))
+                return cls((process, *_others_alike(process, shown)), sets, seen, view)
         return None
 
     def cost_from(self, source: MomentSource) -> float:
@@ -167,26 +169,32 @@ class _Beside:
     @property
     def cost(self) -> float:
         """−2 ln L without constants of all runs, and the prices of parts and effects, dimensionless."""
-        return _cost(self.alike[0], self.top)
+        return _cost(self.alike[0], self.sets[0])
 
     def answers(self) -> list[RandomAnswer]:
         """The answers to be weighed, the likeliest first; without those a part of which may not be named."""
-        return [answer for one in self.alike if (answer := self._answer(one)) is not None]
+        tried = (self._answer(process, top) for process in self.alike for top in self.sets)
+        return [answer for answer in tried if answer is not None]
 
-    def _answer(self, process: ProcessNoise) -> RandomAnswer | None:
-        view, seen = self.view, self.seen
+    def _answer(self, process: ProcessNoise, top: Hypothesis) -> RandomAnswer | None:
+        view, first = self.view, self.sets[0]
+        seen = self.seen if top is first else _seen_in(top, view.base.problem.data)
         allowed = [kind for kind in view.prepared.kinds if kind.random]
         of_parts = [[kind for kind in allowed if part.is_of(kind)] for part in process.spectrum]
         if not all(of_parts):
             return None
         kinds = tuple(dict.fromkeys(kinds[0] for kinds in of_parts))
-        excess = abs(process.excess) + max(excess_elsewhere(seen.fit, process.runs), 0.0)
+        excess = abs(process.excess) + max(excess_elsewhere(self.seen.fit, process.runs), 0.0)
         names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
         share, by_channel = excess / view.repeating.gap, excess / view.base.gap * view.gap.excess
+        # rivals are compared in the noise of the random moment
+        behind = np.maximum(misfit(top.fit).excess - misfit(first.fit).excess, 0.0)
         # with a random motion taken for sensor noise, the runs would appear to differ
-        cost = self.top.fit.scatter_cost(view.gap.deviation_precision)
-        numbers, between = seen.further_numbers, self.top.fit.shown_between_runs
-        left = FittedSet(names, share, by_channel, numbers, scatter_cost=cost, shown_between_runs=between)
+        cost = top.fit.scatter_cost(view.gap.deviation_precision)
+        numbers, between = seen.further_numbers, top.fit.shown_between_runs
+        left = FittedSet(
+            names, share, by_channel + behind, numbers, scatter_cost=cost, shown_between_runs=between
+        )
         return RandomAnswer(kinds, process, seen if seen.effects else None, left)
 
 
@@ -386,8 +394,38 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypothesis:
-    """The best set of effects on rows whose noise includes the response to the random moment.
+def _exchanges(sets: Sequence[Hypothesis]) -> set[tuple[str, str]]:
+    """An effect of the first set and the one in its place in another that explains the runs nearly as well."""
+    first, *others = sets
+    near = (one for one in others if one.fit.total < first.fit.total + ALIKE_WITHIN)
+    apart = ((set(first.effects) - set(one.effects), set(one.effects) - set(first.effects)) for one in near)
+    return {(out.pop(), into.pop()) for out, into in apart if len(out) == len(into) == 1}
+
+
+def _exchanged(
+    top: Hypothesis, exchanges: Collection[tuple[str, str]], kinds: Sequence[type[Effect]]
+) -> list[Hypothesis]:
+    """The sets with another effect in place of one, in the noise of the given set.
+
+    Args:
+        exchanges: names of an effect and of the one to take its place; those that do not apply are passed over.
+    """
+    found = []
+    for out, into in sorted(exchanges):
+        kind = next((one for one in kinds if one.name == into), None)
+        if kind is None or out not in top.effects or into in top.effects:
+            continue
+        rest = tuple(name for name in top.effects if name != out)
+        start = restricted(top.fit, rest)
+        alone = try_fit(start.problem, start.point)
+        found += [] if alone is None else sets_with_one_more([Hypothesis(rest, alone)], [kind])
+    return found
+
+
+def _settled(
+    best: Hypothesis, view: RunsInView, source: MomentSource
+) -> tuple[Hypothesis, set[tuple[str, str]]]:
+    """The best set of effects on rows whose noise includes the response to the random moment, and exchanges in it.
 
     The given set where no random moment acts or its filter does not settle. The random moment is estimated from
     the residual of the best set with the sensor's noise alone: the fit with the response as noise lets the motion
@@ -398,6 +436,7 @@ def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypoth
     data, chosen = nominal.problem.data, nominal.settings.moment
     hidden = {kind.name for kind in kinds if source.condition in ("always", kind.condition)}
     reached: dict[tuple[str, ...], Hypothesis] = {}
+    exchanges = set[tuple[str, str]]()
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
@@ -410,19 +449,20 @@ def _settled(best: Hypothesis, view: RunsInView, source: MomentSource) -> Hypoth
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
+            exchanges |= _exchanges([found, *sets])
             top = _sought_again(found)
             further = _evident(top, kinds)
             while any(h.effects[-1] in hidden for h in further):
-                top = further[0]
+                top, exchanges = further[0], exchanges | _exchanges(further)
                 further = _evident(top, kinds)
             if top.names == best.names:
-                return top
+                return top, exchanges
             reached[top.names] = top
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
         if len(reached) > 1:  # alternates between sets
             top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
-    return top
+    return top, exchanges
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:

@@ -35,6 +35,7 @@ from tests.support.gap_campaigns import (
     whole_runs,
     with_blow,
 )
+from tests.support.own_effects import OwnCubic
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.record import Record
 
@@ -206,6 +207,17 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     assert answer.effects == ("buffeting", "cubic_stiffness")
 
 
+def test_a_rival_beside_turbulence_is_an_answer_as_well():
+    strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
+    base = nominal(buffeted(campaign(strong), 0.0012, 4.0))
+    (start, *_) = starting_points(base, type(strong))
+    spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
+    view = whole_runs(base, (*BUFFETING, type(strong), OwnCubic, effect_class("coulomb_friction")))
+    one, other = weigh_random_moments(view, [spring])
+    assert {one.effects, other.effects} == {("buffeting", "cubic_stiffness"), ("buffeting", "own_cubic")}
+    assert other.left.excess == pytest.approx(one.left.excess, rel=0.01, abs=1.0)
+
+
 @pytest.mark.slow
 def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     """Least squares takes the motion that turbulence drives for white noise, and misplaces them."""
@@ -283,7 +295,7 @@ def test_one_gust_is_no_buffeting():
 
 def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_steady(monkeypatch, windy):
     settled = []
-    monkeypatch.setattr(random_moments, "_settled", lambda best, *_: settled.append(best) or best)
+    monkeypatch.setattr(random_moments, "_settled", lambda best, *_: settled.append(best) or (best, set()))
     runs = windy.problem.data.runs
     misled = [r if run.wind_on else 300.0 * r for run, r in zip(runs, windy.residuals, strict=True)]
     fitted = replace(windy, residuals=misled, chi2=np.array([float(r @ r) for r in misled]))
