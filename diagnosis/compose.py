@@ -67,7 +67,7 @@ from identification import identify
 from identification.estimate import Estimate
 from identification.show.quantity import Quantity
 from identification.status import Remark, left_out_as_asked
-from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.effects import BetweenRuns, effect_class, known_effects
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -375,7 +375,9 @@ def _predictions(
 
 def _identified(study: Study, chosen: Chosen) -> Estimate | None:
     """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
-    scatter_alone = study.causes != UNKNOWN and all(effect_class(name).scatters for name in study.causes)
+    scatter_alone = study.causes != UNKNOWN and all(
+        issubclass(effect_class(name), BetweenRuns) for name in study.causes
+    )
     own_model = study.model.of_robot or type(study.model) is not type(nominal_model(chosen.campaign, None))
     if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
         return None

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tunnel_lab.experiments.blind.sets import campaign_folders, write_document
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -24,7 +24,9 @@ UNKNOWN = "unknown"
 _LAST_PLACE = 32  # in the vocabulary when the sets were drawn: they do not have later effects
 KINDS = tuple(kind for kind in ALL_EFFECTS if kind.place <= _LAST_PLACE)
 """The vocabulary of the sets."""
-NAMES: tuple[str, ...] = tuple(sorted(kind.name for kind in KINDS if not (kind.driven or kind.scatters)))
+NAMES: tuple[str, ...] = tuple(
+    sorted(kind.name for kind in KINDS if not (kind.driven or issubclass(kind, BetweenRuns)))
+)
 """The causes of free decays, which all campaigns of the sets are; `unknown` is one more. Scatter is beside them."""
 
 Answer = Callable[[Path], dict[str, Any]]

@@ -25,7 +25,7 @@ from identification.show.numbers import significant, unit_shown
 from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
-from tunnel_sim.effects import known_effects
+from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.vocabulary.record import Array
@@ -225,7 +225,9 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
 def _scatter(study: Study) -> set[str]:
     """The chance differences that the runs may have: all that an answer without effects explains a gap by."""
     windy = any(run.wind_on for run in study.campaign.runs)
-    return {kind.name for kind in known_effects() if kind.scatters and kind.acts(wind_on=windy)}
+    return {
+        kind.name for kind in known_effects() if issubclass(kind, BetweenRuns) and kind.acts(wind_on=windy)
+    }
 
 
 def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:

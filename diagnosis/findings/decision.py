@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from diagnosis.settings import AnswerSettings
 from identification.show.numbers import share
-from tunnel_sim.effects import known_effects
+from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
 
@@ -153,7 +153,7 @@ def decision(
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     proper = {
-        kind.name for kind in known_effects() if not kind.scatters
+        kind.name for kind in known_effects() if not issubclass(kind, BetweenRuns)
     }  # runs differ by chance beside any of them
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
     first, probable = answers[0][0], answers[0][1] >= chosen.decided_from

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from diagnosis.findings.judged import Judged
 from diagnosis.findings.misfit import windy
 from identification.show.numbers import plain
+from tunnel_sim.effects import BetweenRuns
 from tunnel_sim.effects.registry import ALL_EFFECTS, known_effects
 
 CHANNELS = {
@@ -68,7 +69,7 @@ def acts_on(answer: Judged, effect: str) -> str:
     return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"
 
 
-SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
+SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if issubclass(kind, BetweenRuns)}
 """The quantity that differs between runs, by the name of the scatter."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, RunParameterPrior
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -38,7 +38,7 @@ class Chance:
         shown: whether the runs show that they differ in this rather than in the others, beyond what is stated.
     """
 
-    kind: type[Effect]
+    kind: type[BetweenRuns]
     width: float
     derivatives: AeroDerivatives
     damping: float

@@ -23,7 +23,7 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.settings import ScatterSettings
 from identification.campaign.random_effects import WidthPrior
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import BetweenRuns, Effect
 
 WIDTHS_SETTLED: Final = 1.0
 """Drop of −2 ln L above which a fit is repeated with new widths of the scatter, in χ². Convention. A smaller
@@ -37,14 +37,15 @@ _IN_ORDER = 5  # runs that show an order
 _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
 
 
-def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
+def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
     """The differences that the runs could show: at least three runs have the quantity, and a spring."""
     if not data.model.restored:
         return ()
     return tuple(
         kind
         for kind in kinds
-        if kind.scatters and sum(kind.acts(wind_on=run.wind_on) for run in data.runs) >= _FEWEST
+        if issubclass(kind, BetweenRuns)
+        and sum(kind.acts(wind_on=run.wind_on) for run in data.runs) >= _FEWEST
     )
 
 
@@ -69,7 +70,7 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.per_run[:, kept])
 
 
-def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
+def chance(found: Fit, kind: type[BetweenRuns], width: float) -> Chance:
     """A chance difference beside the nominal model as fitted.
 
     Args:
@@ -79,7 +80,7 @@ def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 
 
-def usual(found: Fit, kind: type[Effect]) -> Chance:
+def usual(found: Fit, kind: type[BetweenRuns]) -> Chance:
     """A chance difference of usual width."""
     return chance(found, kind, kind.parameters()[0].scale)
 

@@ -32,7 +32,7 @@ from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
 from tunnel_reference.true_conditions import TrueConditions
-from tunnel_sim.effects import Effect, EffectChain, effect_class, effect_from, the_effect
+from tunnel_sim.effects import BetweenRuns, Effect, EffectChain, effect_class, effect_from, the_effect
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -133,7 +133,7 @@ def nominal_reading(run: Setting) -> np.ndarray:
 
 def drawn_by(name: str, effect: Effect, values: dict[str, float], found: np.ndarray, run: Setting) -> float:
     """What the run has drawn: the phase of shedding, from the run, and of hum, from the reading; a deviation."""
-    if effect.scatters:
+    if isinstance(effect, BetweenRuns):
         return effect.drawn_number(drawn_chain(effect, run).drawn[0])
     if name == "vortex_shedding":
         return drawn_chain(effect, run).physics().parameters["shedding_phase"]

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from tests.reference.effect_oracle import Setting
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 
@@ -23,7 +23,7 @@ VOCABULARY = {
 ON_DRIVEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if kind.driven)
 
 # The reference simulator draws the scatter between runs beside the causes, not among them.
-BETWEEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if kind.scatters)
+BETWEEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if issubclass(kind, BetweenRuns))
 
 # Values of the parameters at which the effect is seen.
 VALUES = {

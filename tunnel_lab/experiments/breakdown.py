@@ -39,7 +39,7 @@ from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 from tunnel_reference.true_conditions import TrueConditions
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 from tunnel_sim.vocabulary.plan import Truth
 
 if TYPE_CHECKING:
@@ -52,7 +52,9 @@ NOTHING_ADDED = "no effect"
 SEVERITIES = (1.0, 10.0)
 """Mean squared residual of the nominal refit over the noise variance, minus one."""
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
-EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
+EFFECTS: tuple[str, ...] = tuple(
+    kind.name for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, BetweenRuns))
+)
 REALISATIONS = 3
 TRUTH = Truth(cn_beta=0.49, cn_r=-0.11, yaw_inertia=0.1014, mechanical_damping=0.012)
 NOISE = 5e-4  # rad

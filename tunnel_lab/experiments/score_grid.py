@@ -21,7 +21,7 @@ from pydantic import Field, TypeAdapter
 from identification.estimators import free_decay_estimators
 from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound, in_phase
 from tunnel_lab.terminal.arguments import NO_EFFECT, parse_effect
-from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
+from tunnel_sim.effects import BetweenRuns, Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
@@ -299,7 +299,7 @@ def draw_trial(cell: Cell, seed: int, number: int) -> ScoreTrial:
         ]
         campaign = _campaign(cell, truth, runs, rig, rng)
         scatter = Repeatability(
-            **{one.scatters: one.severity for one in effects_of(cell.effect) if one.scatters}
+            **{one.scatters: one.severity for one in effects_of(cell.effect) if isinstance(one, BetweenRuns)}
         )
         density = rig.air.density
         truth = in_phase(truth, effects_of(cell.effect), [(k, v, density) for k, v, _ in runs], rig)

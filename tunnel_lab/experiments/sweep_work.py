@@ -24,7 +24,7 @@ from tunnel_lab.experiments.estimate_rows import (
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
 from tunnel_lab.experiments.sweep_cases import SweepCase, SweepCases
 from tunnel_lab.terminal.arguments import NO_EFFECT
-from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects import BetweenRuns, effect_class, effect_from
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.plan import CampaignPlan
@@ -128,7 +128,7 @@ def _widths(plan: CampaignPlan) -> dict[str, float]:
     widths = {name: getattr(plan.scatter, name) for name in SCATTERED}
     for setting in plan.effects:
         effect = effect_from(setting.name, setting.parameters)
-        if effect.scatters:
+        if isinstance(effect, BetweenRuns):
             widths[effect.scatters] = hypot(widths[effect.scatters], effect.severity)
     return widths
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.capabilities import BetweenRuns
 from tunnel_sim.effects.chain import EffectChain
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.effects.registry import (
@@ -16,6 +17,7 @@ from tunnel_sim.effects.registry import (
 
 __all__ = [
     "ALL_EFFECTS",
+    "BetweenRuns",
     "Effect",
     "EffectChain",
     "ParameterInfo",

@@ -9,11 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.capabilities import BetweenRuns
 from tunnel_sim.effects.parameters import parameter
-from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER, WIDEST_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
@@ -21,28 +18,6 @@ from tunnel_sim.vocabulary.record import Array
 def _spread(meaning: str, scale: float) -> Any:
     """The standard deviation between runs, relative."""
     return parameter("σ", "1", meaning, scale=scale, lower=0.0, upper=WIDEST_SCATTER, relative=True)
-
-
-@dataclass(frozen=True)
-class BetweenRuns(Effect):
-    """A number of the run that is (1 + σ e) times as great as stated, with e drawn from the unit normal."""
-
-    fitted = False
-    autonomous = False
-
-    def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
-        """Draw the run's deviation, in standard deviations."""
-        del stated
-        return float(rng.standard_normal())
-
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Scale the number by the run's own factor."""
-        del stated
-        return run if self.is_null else run.with_deviations({self.scatters: self.deviation(drawn)})
-
-    def deviation(self, drawn: Drawn) -> float:
-        """The run's own deviation, relative."""
-        return self.severity * self.drawn_number(drawn)
 
 
 @dataclass(frozen=True)

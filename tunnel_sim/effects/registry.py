@@ -13,6 +13,7 @@ from pkgutil import iter_modules
 from typing import Any, TypeVar, cast, get_args
 
 from tunnel_sim.effects.base import Effect, make_effect
+from tunnel_sim.effects.capabilities import BetweenRuns
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
@@ -144,13 +145,12 @@ def check_kind(kind: object) -> None:
     where = f"effect {kind.name}"
     if any(kind.name == one.name and kind is not one for one in ALL_EFFECTS):
         raise TunnelError("is the name of a built-in effect", where=where, remedy="choose another name")
-    for trait, of in (
-        ("lattice", "effect that is detected in the records"),
-        ("scatters", "effects between runs"),
-    ):
-        if getattr(kind, trait):
-            what = f"{trait} is for the built-in {of}"
-            raise TunnelError(what, where=where, remedy="leave it at its default")
+    if issubclass(kind, BetweenRuns):
+        what = "differs between runs by chance; effects that do so are built in"
+        raise TunnelError(what, where=where, remedy="derive it from another class")
+    if kind.lattice:
+        what = "lattice is for the built-in effect that is detected in the records"
+        raise TunnelError(what, where=where, remedy="leave it at its default")
 
 
 @functools.cache

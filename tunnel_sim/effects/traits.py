@@ -51,8 +51,6 @@ class Traits:
     - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
       neither is included where a base turns with a known acceleration.
     - ``lattice``: whether it changes the quantisation step.
-    - ``scatters``: the property of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
-      ``mechanical_damping``; empty: none.
     - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
       empty: none.
     - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
@@ -93,7 +91,6 @@ class Traits:
     of_moment: ClassVar[bool] = False
     by_angle_in_room: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
-    scatters: ClassVar[str] = ""
     frequency_by_wind: ClassVar[str] = ""
     jumps: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
@@ -231,25 +228,6 @@ class Traits:
         """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
-
-    @classmethod
-    def departure(
-        cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
-    ) -> tuple[Array | float, Array | float, float]:
-        """Change of the runs' linear motions by a relative deviation of 1 of the scattering property.
-
-        Args:
-            spring: Kr, N m/rad, shape (runs,).
-            damping: Cr, N m s/rad, shape (runs,).
-            air_stiffness: Ka of the run, N m/rad, shape (runs,).
-            air_damping: Ca of the run, N m s/rad, shape (runs,).
-
-        Returns:
-            Changes of the stiffness Kr − Ka, N m/rad, of the damping Cr − Ca, N m s/rad, and of the wind speed, a
-            share of it.
-        """
-        del spring, damping, air_stiffness, air_damping
-        return 0.0, 0.0, 0.0
 
     @classmethod
     def small_swings(

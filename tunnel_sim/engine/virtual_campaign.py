@@ -13,7 +13,7 @@ import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE
-from tunnel_sim.effects.between_runs import BetweenRuns
+from tunnel_sim.effects.capabilities import BetweenRuns
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
@@ -202,7 +202,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
     for effect in effects:
         where = f"effect {effect.name}"
-        if effect.scatters in plan.scatter.stated:
+        if isinstance(effect, BetweenRuns) and effect.scatters in plan.scatter.stated:
             what = f"{effect.scatters} scatters twice, by this effect and in [scatter]"
             raise TunnelError(what, where=where, remedy="give one of them")
         if names.count(effect.name) > 1:
@@ -240,8 +240,8 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
     Scatter between runs is listed beside the effects: its widths, and the deviations of every run.
     """
     effects = [effect for effect in plan_effects(plan) if not effect.is_null]
-    scattering = [effect for effect in effects if effect.scatters]
-    effects = [effect for effect in effects if not effect.scatters]
+    scattering = [effect for effect in effects if isinstance(effect, BetweenRuns)]
+    effects = [effect for effect in effects if not isinstance(effect, BetweenRuns)]
     return {
         "schema_version": 1,
         "cn_beta": plan.truth.cn_beta,
@@ -258,7 +258,7 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
     }
 
 
-def _scatter_truth(plan: CampaignPlan, scattering: Sequence[Effect]) -> dict[str, Any]:
+def _scatter_truth(plan: CampaignPlan, scattering: Sequence[BetweenRuns]) -> dict[str, Any]:
     """The widths of the scatter between the runs, and every run's own deviations; empty where the runs repeat."""
     widths = plan.scatter.stated | {effect.scatters: effect.severity for effect in scattering}
     if not widths:

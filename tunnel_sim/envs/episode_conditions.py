@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 from tunnel_sim.envs import EnvError, as_env_error, refuse_unknown
 from tunnel_sim.envs.information import Prior
@@ -309,7 +309,9 @@ def _effects(
         if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
             return []
         # for one run, which shows no scatter between runs
-        kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven or kind.scatters)]
+        kinds = [
+            kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven or issubclass(kind, BetweenRuns))
+        ]
         kind = kinds[int(rng.integers(len(kinds)))]
         severity = kind.parameters()[0]
         value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))

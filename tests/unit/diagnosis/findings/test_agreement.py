@@ -21,7 +21,7 @@ from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import campaign as gap_campaign
 from tests.support.gap_campaigns import nominal
 from tests.support.rendered import place_rows, where_words
-from tunnel_sim.effects import Effect, effect_class, effect_from, known_effects
+from tunnel_sim.effects import BetweenRuns, Effect, effect_class, effect_from, known_effects
 
 ROOT = Path(__file__).parents[4]
 FIGURES = {"from_s": 1.0, "to_s": 2.0, "frequency_hz": 2.0, "runs": 2, "run": "beta"}
@@ -53,7 +53,7 @@ def printed(one: dict[str, Any]) -> str:
 
 
 def sets() -> Iterator[tuple[type[Effect], ...]]:
-    kinds = [kind for kind in known_effects() if not kind.scatters]
+    kinds = [kind for kind in known_effects() if not issubclass(kind, BetweenRuns)]
     yield from ((kind,) for kind in kinds)
     yield from pairwise(kinds)
 
@@ -110,7 +110,9 @@ def test_a_gap_whose_rest_could_change_the_coefficients_is_not_immaterial() -> N
     assert not contradictions(one, printed(one))
 
 
-ALONE = [k for k in known_effects() if not (k.scatters or k.driven or k.delays or k.random == "broad_band")]
+ALONE = [
+    k for k in known_effects() if not (issubclass(k, BetweenRuns) or k.driven or k.random == "broad_band")
+]
 
 
 @pytest.mark.slow

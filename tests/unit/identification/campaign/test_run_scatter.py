@@ -15,7 +15,7 @@ from identification.printing import repeatability_lines
 from identification.statistics import student_factor
 from tests.reference.free_decays import Setting, Truth, campaign
 from tests.reference.scattering import THREE_SPRINGS, USUAL, scattering
-from tunnel_sim.effects import known_effects
+from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Repeatability
 
 SHAPE = {"noise": 5e-4, "duration": 6.0, "rate": 100.0}
@@ -33,7 +33,9 @@ def steady():
 
 
 def test_the_usual_widths_are_those_of_the_vocabulary():
-    scales = {kind.scatters: kind.parameters()[0].scale for kind in known_effects() if kind.scatters}
+    scales = {
+        kind.scatters: kind.parameters()[0].scale for kind in known_effects() if issubclass(kind, BetweenRuns)
+    }
     assert {name: getattr(UsualWidths(), name) for name in SCATTERED} == scales
     assert tuple(one.name for one in fields(Repeatability)) == SCATTERED
 

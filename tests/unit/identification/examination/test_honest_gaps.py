@@ -11,15 +11,15 @@ from tests.marks import slow
 from tests.support.gap_campaigns import campaign
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, simulate_set
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.plan import EffectSetting
 
 #: Their moments are drawn by the simulator; they are among the drawn campaigns.
 _RANDOM = {"ambient_vibration", "buffeting"}
-_EFFECTS = [kind for kind in ALL_EFFECTS if not (kind.name in _RANDOM or kind.scatters)]
-_SCATTERING = [kind for kind in ALL_EFFECTS if kind.scatters]
+_EFFECTS = [kind for kind in ALL_EFFECTS if not (kind.name in _RANDOM or issubclass(kind, BetweenRuns))]
+_SCATTERING = [kind for kind in ALL_EFFECTS if issubclass(kind, BetweenRuns)]
 
 
 @pytest.mark.parametrize("kind", _EFFECTS, ids=lambda kind: kind.name)

@@ -16,7 +16,7 @@ from tunnel_lab.experiments.breakdown import breakdown_figure, exceeding, packag
 from tunnel_lab.experiments.score import Results, packaged_baseline
 from tunnel_lab.experiments.score_drawing import cell_labels, score_figure
 from tunnel_lab.experiments.score_grid import Cell, Grid
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +62,7 @@ def test_only_what_exceeds_one_standard_deviation_is_printed() -> None:
 def test_the_packaged_breakdown_has_every_effect_and_estimator() -> None:
     frame = packaged_breakdown()
     # its runs are free decays, and repeat
-    free = [kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters)]
+    free = [kind.name for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, BetweenRuns))]
     assert set(frame["effect"]) == {"no effect", *free}
     assert set(frame["estimator"]) == set(ALL_ESTIMATORS)
     at_ten = frame.filter(pl.col("severity_noise_powers") == 10.0)

@@ -13,7 +13,7 @@ from tests.reference.rigs import rig
 from tunnel_lab.cli import main
 from tunnel_reference.catalogue import Group
 from tunnel_reference.forms import FORMS
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 
 WORDS = ["-e", "neural_posterior", "--shards", "1", "--steps", "4", "--jobs", "0"]
 
@@ -155,5 +155,5 @@ def test_effects_are_weighed_without_the_runs_that_cannot_be_read():
     found = NeuralPosterior().effects(replace(whole, runs=(*whole.runs[:-1], dead)))
     assert found == NeuralPosterior().effects(replace(whole, runs=whole.runs[:-1]))
     # it takes free decays, and was trained on campaigns that repeat, before the vocabulary had these two
-    known = {kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters)}
+    known = {kind.name for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, BetweenRuns))}
     assert set(found) == known - {"ambient_vibration", "reynolds_dependence"}

@@ -18,6 +18,7 @@ from tests.support.gap_campaigns import campaign
 from tests.support.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (
     ALL_EFFECTS,
+    BetweenRuns,
     Effect,
     effect_class,
     effect_from,
@@ -71,8 +72,8 @@ def test_a_registered_effect_is_known_by_name() -> None:
     assert known_effects() == (*ALL_EFFECTS, OwnCubic)
 
 
-def changed(**traits: object) -> type:
-    return dataclasses.dataclass(frozen=True)(type("Changed", (OwnCubic,), traits))
+def changed(bases: tuple[type, ...] = (OwnCubic,), **traits: object) -> type:
+    return dataclasses.dataclass(frozen=True)(type("Changed", bases, traits))
 
 
 OF_VOLTS = {
@@ -90,7 +91,7 @@ OF_VOLTS = {
         (changed(channel="gear"), "unknown channel 'gear'"),
         (changed(line="of the gear"), "does not state how they are found"),
         (changed(lattice=True), "detected in the records"),
-        (changed(scatters="wind_speed"), "for the built-in effects between runs"),
+        (changed((BetweenRuns, OwnCubic), scatters="wind_speed"), "are built in"),
         (changed(random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
         (int, "is not a dataclass derived from Effect"),
