@@ -23,6 +23,7 @@ from diagnosis.result import Diagnosis
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_sim.effects import BetweenRuns, known_effects
+from tunnel_sim.effects.sensor import MainsHum, SensorQuantisation
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
@@ -201,7 +202,7 @@ def _plan(rng: np.random.Generator, name: str, number: int) -> CampaignPlan:
     able = [
         kind
         for kind in known_effects()
-        if not (kind.driven or issubclass(kind, BetweenRuns) or kind.line == "mains" or kind.lattice)
+        if not (kind.driven or issubclass(kind, (BetweenRuns, MainsHum, SensorQuantisation)))
     ]
     kinds = [able[i] for i in rng.choice(len(able), number, replace=False)]
     effects = []

@@ -67,7 +67,8 @@ from identification import identify
 from identification.estimate import Estimate
 from identification.show.quantity import Quantity
 from identification.status import Remark, left_out_as_asked
-from tunnel_sim.effects import BetweenRuns, effect_class, known_effects
+from tunnel_sim.effects import BetweenRuns, effect_class, the_effect
+from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -466,8 +467,7 @@ def _closable(study: Study, named: _Named, say: Progress) -> tuple[Closable | No
 
 def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
     """Second modes of single runs, where a set with one was weighed: only then its share of the gap is known."""
-    modes = {kind.name for kind in known_effects() if kind.line == "ringing"}
-    tried = any(modes.intersection(answer.effects) for answer in study.answers)
+    tried = any(the_effect(SecondOscillation).name in answer.effects for answer in study.answers)
     return second_modes(chosen.campaign) if tried else ()
 
 

@@ -26,6 +26,8 @@ from identification.signal.known_gain import refuse_other_gain
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import SecondOscillation
+from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.vocabulary.campaign import Campaign, Run, speed_groups
 from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
@@ -124,7 +126,7 @@ def choose(
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
         # Their sizes and ranges are those of angles; a mode moves the body.
-        kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
+        kinds = [kind for kind in kinds if kind.channel != "sensor" or issubclass(kind, SecondOscillation)]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
     kinds, said_of_drive = kinds_for(compared, kinds, model)
@@ -316,7 +318,7 @@ def kinds_for(
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
     moments = any(run.drive is not None and run.drive.kind.by_actuator for run in campaign.runs)
-    kept = tuple(kind for kind in kinds if moments or not kind.of_moment)
+    kept = tuple(kind for kind in kinds if moments or not issubclass(kind, ActuatorEffect))
     gone = untried_by_inputs(campaign, kept)
     kept = tuple(kind for kind in kept if not any(kind in some for some in gone.values()))
     for why, some in model.untried(campaign, kept).items():

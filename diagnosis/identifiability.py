@@ -15,6 +15,7 @@ from diagnosis.likelihood.starting_points import unabsorbed
 from diagnosis.model.blocks import prepare
 from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
+from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.drive import DriveMoment
@@ -80,7 +81,7 @@ def identifiability(kind: type[Effect]) -> Identifiability:
     with answering_with([kind]):
         others = [other for other in known_effects() if other.name != kind.name]
     for other in others:
-        if other.fitted and not other.per_run_parameters(1):
+        if other.fitted and not issubclass(other, OwnNumbers):
             left = unabsorbed(base, other)
             if left is not None:
                 size = float(np.linalg.norm(own[0]) * np.linalg.norm(left[0]))

@@ -32,6 +32,7 @@ from identification.estimate import Estimate
 from identification.show.quantity import Quantity
 from identification.statistics import density_rounding
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import OutOfPhase
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -314,7 +315,7 @@ def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ..
         beta, rate = (float(common[place]) for place in own)
         found = beta, rate
         for effect in fit.problem.effects_at(common):
-            found = effect.in_phase(*found, runs)
+            found = effect.in_phase(*found, runs) if isinstance(effect, OutOfPhase) else found
         return np.array([beta, rate, *found])
 
     here = both(fit.point.common)

@@ -26,6 +26,7 @@ from identification.show.quantity import Quantity
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from tunnel_sim.effects import BetweenRuns, known_effects
+from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.vocabulary.record import Array
@@ -357,7 +358,7 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
             frequency_change=decay[0] / decay_without[0] - 1.0,
             zero_change=reading_unit * (decay[2] - decay_without[2]),
             reading_change=reading_unit * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
-            stands=effect.stands(linear_coefficients(fit, index)[2]),
+            stands=effect.stands(linear_coefficients(fit, index)[2]) if isinstance(effect, Friction) else 0.0,
         )
         sizes.append(size)
     return tuple(sizes)

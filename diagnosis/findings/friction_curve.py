@@ -21,6 +21,7 @@ from identification.show.quantity import INTERVAL
 from identification.show.style import figure, grid, log_axis, styled
 from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.quantities import Angles, Rates
@@ -100,7 +101,7 @@ def friction_curve(fit: Fit, own: Similarity) -> FrictionCurve | None:
         The curve; None where the fit has no friction, or no run moves from one reversal to another.
     """
     effects = fit.problem.effects_at(fit.point.common)
-    place = next((at for at, one in enumerate(effects) if one.sliding(np.ones(1)) is not None), None)
+    place = next((at for at, one in enumerate(effects) if isinstance(one, Friction)), None)
     if place is None or effects[place].is_null:
         return None
     passed = _strokes(fit)
@@ -160,9 +161,8 @@ def _law(fit: Fit, place: int, rates: Rates) -> tuple[Array, Array]:
 
 
 def _sliding(effect: Effect, rates: Array) -> Array:
-    found = effect.sliding(rates)
-    assert found is not None
-    return found
+    assert isinstance(effect, Friction)
+    return effect.sliding(rates)
 
 
 @dataclass(frozen=True, eq=False)

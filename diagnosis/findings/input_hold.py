@@ -15,6 +15,7 @@ from diagnosis.findings.next_step import NextStep
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
+from tunnel_sim.effects.capabilities import InputClock
 from tunnel_sim.effects.registry import the_effect
 from tunnel_sim.vocabulary.drive import Hold
 
@@ -37,7 +38,7 @@ class OtherHold:
     better: bool
 
 
-DELAY = the_effect(delays=True)
+DELAY = the_effect(InputClock)
 
 
 def other_hold(study: Study) -> OtherHold | None:

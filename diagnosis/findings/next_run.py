@@ -16,6 +16,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from identification.show.numbers import reading_shown
+from tunnel_sim.effects.capabilities import OwnNumbers, Periodic
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
@@ -192,7 +193,9 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     # one instant, whatever the number in existing runs, and no deviation: it may have either sign
     data = fit.problem.data.with_runs((run,))
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
-    turns = np.array([bool(kind.line) for kind in problem.effects if kind.per_run_parameters(1)], bool)
+    turns = np.array(
+        [issubclass(kind, Periodic) for kind in problem.effects if issubclass(kind, OwnNumbers)], bool
+    )
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
     first = len(problem.parameters.own) - problem.parameters.of_effects

@@ -41,6 +41,7 @@ from identification.show.numbers import (
 )
 from identification.show.quantity import INTERVAL
 from identification.show.style import figure, grid, styled
+from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
 
@@ -301,7 +302,7 @@ def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged
         return ""
     if not rest.significant:
         return f"{_LABEL}: nothing beyond chance (p = {rest.p_value:.2g})."
-    if any(kind.random for kind in known_effects() if kind.name in judged.causes):
+    if any(issubclass(kind, AtRandom) for kind in known_effects() if kind.name in judged.causes):
         return f"{_LABEL}: not stated, since any law would explain part of a random moment."
     return ""
 

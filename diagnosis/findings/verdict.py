@@ -33,6 +33,7 @@ from identification.show.numbers import (
     times_noise,
 )
 from tunnel_sim.effects import effect_class, known_effects, the_effect
+from tunnel_sim.effects.capabilities import InputClock
 
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
@@ -42,7 +43,7 @@ def headline(answer: Findings) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
     words, kind = _answer_in_words(answer)
     if answer.found.hold:
-        delay = plain(the_effect(delays=True).name)
+        delay = plain(the_effect(InputClock).name)
         words = words.replace(delay, f"{delay} or wrong hold")
     if kind == "found" and not without_scatter(answer.causes) and answer.repeated.systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"

@@ -15,6 +15,7 @@ from diagnosis.model.parameters import Parameter, ParameterSet, Point
 from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.capabilities import Clock
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.physics.run_settings import RunSettings
@@ -229,7 +230,7 @@ class Problem:
         columns: list[list[Drawn]] = []
         for kind in self.effects:
             place = self.parameters.own_places.get(kind.name)
-            if kind.skips:
+            if issubclass(kind, Clock):
                 columns.append([None] * len(own) if place is None else list(own[:, place]))
             else:
                 columns.append([None] * len(own) if place is None else own[:, place.start].tolist())

@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.likelihood.motions import Asked, CompiledRuns, block_means, end_weights, side_by_side
 from diagnosis.model.run_data import RunData
+from tunnel_sim.effects.capabilities import Clock
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.rod_modes import Ringing
 from tunnel_sim.physics.slopes import most_changes, slopes, terms
@@ -42,7 +43,8 @@ def changes(asked: Asked, count: int) -> list[Array]:
     """
     points = len(asked.runs) // count - 1
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
-    skip = any(effect.skips for effect in {type(effect) for effects in asked.effects for effect in effects})
+    kinds = {type(effect) for effects in asked.effects for effect in effects}
+    skip = any(issubclass(kind, Clock) for kind in kinds)
     if skip or any(asked.physics.program[:count]):  # a moment by expression has none
         return unknown
     motions = CompiledRuns.of(asked, like=count)

@@ -19,6 +19,7 @@ from diagnosis.model.chance import Scatter
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import Clock, OwnNumbers
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.campaign import speed_groups
@@ -88,7 +89,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if not _may_show(data, kind):
         return []
-    if kind.per_run_parameters(1):
+    if issubclass(kind, OwnNumbers):
         tried = (_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one)
     else:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
@@ -100,11 +101,11 @@ def _may_show(data: Data, kind: type[Effect]) -> bool:
     return kind.acts(wind_on=data.wind_on) and (not kind.driven or data.driven)
 
 
-def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint | None:
+def _with_own_numbers(base: Fit, kind: type[OwnNumbers], one: Sought) -> StartingPoint | None:
     """An effect with a phase or instants in every run, as found in the residuals; None where its size is zero."""
     of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
     fixed = (*base.problem.fixed, *(of_input if base.problem.data.driven else ()))
-    instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
+    instants = one.numbers.shape[-1] if issubclass(kind, Clock) else base.problem.instants
     effects = (*base.problem.effects, kind)
     problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, instants=instants)
     infos = zip(one.values, _own_parameters(problem, kind), strict=True)
@@ -165,7 +166,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
         Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
     """
     data = base.problem.data
-    if not _may_show(data, kind) or kind.per_run_parameters(1):
+    if not _may_show(data, kind) or issubclass(kind, OwnNumbers):
         return
     for trial in kind.trials(_circumstances(base)):
         tried = _moderate(base, kind, trial)

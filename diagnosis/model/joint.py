@@ -18,6 +18,7 @@ from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -101,10 +102,10 @@ class _OfLaw(NominalModel):
         """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
-            gone[OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
-            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not kind.has_backlash]
+            gone[OF_GEAR] = [kind for kind in kinds if issubclass(kind, Backlash)]
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring and not issubclass(kind, Backlash)]
         elif self.law.hangs:
-            gone[_OF_GEAR] = [kind for kind in kinds if kind.has_backlash]
+            gone[_OF_GEAR] = [kind for kind in kinds if issubclass(kind, Backlash)]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
         return gone | super().untried(campaign, left)
 

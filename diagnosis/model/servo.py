@@ -18,6 +18,7 @@ from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import Similarity
 from diagnosis.model.starts import responses
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -82,7 +83,7 @@ class _OfServo(NominalModel):
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
         """Effects of a spring, and play."""
-        play = [kind for kind in kinds if kind.has_backlash]
+        play: list[type[Effect]] = [kind for kind in kinds if issubclass(kind, Backlash)]
         of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
         left = [kind for kind in kinds if kind not in (*play, *of_spring)]
         return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)

@@ -24,6 +24,7 @@ from diagnosis.noise.rounding import repeated, repetitions, samples
 from diagnosis.noise.sensor_noise import NoiseTrend, trend_statistics
 from diagnosis.settings import GapSettings
 from tunnel_sim.effects import the_effect
+from tunnel_sim.effects.capabilities import SecondOscillation
 
 NOISE_TOLERANCE: Final = 0.03
 """Allowed excess of the noise below 60 Hz over the noise above 60 Hz, as a share. Judgement. Quantisation
@@ -271,7 +272,7 @@ def _follows_input(white: Fit) -> bool:
 
 def _beside_mode(nominal: Fit) -> Fit | None:
     """The fit with the oscillation that the input excites; None where it fails."""
-    starts = starting_points(nominal, the_effect(line="ringing"))
+    starts = starting_points(nominal, the_effect(SecondOscillation))
     driven = [start for start in starts if any(value != 0.0 for _, value in start.problem.fixed)]
     return try_fit(driven[0].problem, driven[0].point) if driven else None
 

@@ -33,6 +33,8 @@ from diagnosis.patch.native_actuator import controlled, native_actuator
 from diagnosis.patch.native_friction import Carried, native_friction, nearest_polynomial
 from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.search.study import Study
+from tunnel_sim.effects.capabilities import InputClock
+from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
     ActuatorPatch,
@@ -203,8 +205,8 @@ def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | 
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
     left_out = {
         "rod": physics.rod_twist is not None,
-        "delayed input": written is None and any(kind.delays for kind in problem.effects),
-        "actuator": written is None and any(kind.driven and not kind.delays for kind in problem.effects),
+        "delayed input": written is None and any(issubclass(kind, InputClock) for kind in problem.effects),
+        "actuator": written is None and any(issubclass(kind, ActuatorEffect) for kind in problem.effects),
         "air": problem.data.wind_on,
     }
     found = [Fact(kind) for kind, left in left_out.items() if left]

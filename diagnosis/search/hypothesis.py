@@ -18,6 +18,7 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coeff
 from diagnosis.model.parameters import Point
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
+from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
 NEEDLESS_SPRING: Final = 0.05
@@ -84,7 +85,11 @@ class Hypothesis:
         much as gravity does.
         """
         problem = self.fit.problem
-        numbers = self.forms + sum(kind.numbers_like_forms(problem.instants) for kind in problem.effects)
+        numbers = self.forms + sum(
+            kind.numbers_like_forms(problem.instants)
+            for kind in problem.effects
+            if issubclass(kind, OwnNumbers)
+        )
         spring = self.fit.fitted_spring
         if spring is not None:
             needless = NEEDLESS_SPRING * linear_coefficients(self.fit, 0)[2]
@@ -100,8 +105,8 @@ class Hypothesis:
         problem = self.fit.problem
         found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
         for kind in problem.effects:
-            count = len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
-            if count:
+            if issubclass(kind, OwnNumbers):
+                count = len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
                 found[CHANNELS.index(kind.gains_in())] += gain * count
         return found
 
@@ -226,8 +231,7 @@ def is_plausible(fitted: Fit) -> bool:
         (2.0 * np.pi * resonance(fitted, i), run.duration) for i, run in enumerate(fitted.problem.data.runs)
     ]
     return all(
-        np.mean([effect.plausible(omega) and effect.shown_in(duration) for omega, duration in motions])
-        >= PLAUSIBLE_RUNS
+        np.mean([effect.plausible(omega, duration) for omega, duration in motions]) >= PLAUSIBLE_RUNS
         for effect in effects
     )
 

@@ -23,6 +23,7 @@ from diagnosis.search.views.view import View
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.capabilities import InputClock
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -154,7 +155,7 @@ def likeliest_lead(study: Study) -> float:
     leads, totals = np.array(study.model.possible_leads()), []
     if not (leads.size and study.campaign.driven and study.gap.test.detected):
         return 0.0
-    effects = tuple(kind for kind in problem.effects if not kind.delays)
+    effects = tuple(kind for kind in problem.effects if not issubclass(kind, InputClock))
     whole = dict(zip(problem.names, point.common.tolist(), strict=True))
     for lead in leads:
         runs = tuple(

@@ -15,6 +15,7 @@ from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight
 from diagnosis.search.scatter import likelier, with_likeliest_widths
 from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import SecondOscillation
 
 ALWAYS_FITTED: Final = 7
 """Number of effects that are fitted in any case, ranked by linear theory. Judgement. Linear theory ranks
@@ -41,7 +42,7 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
     Returns:
         The fit with the mode added; None where it misses the motion too, or may not be tried.
     """
-    modes = [kind for kind in kinds if kind.line == "ringing"]
+    modes = [kind for kind in kinds if issubclass(kind, SecondOscillation)]
     found = sets_with_one_more([Hypothesis((), nominal)], modes)
     return found[0] if found and not misses_motion(found[0].fit) else None
 

@@ -40,6 +40,7 @@ from diagnosis.search.scatter import as_stated
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import Effect, the_effect
+from tunnel_sim.effects.capabilities import CoarseSteps, MainsPickup
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -51,7 +52,7 @@ COARSE_FROM: Final = 1.5
 """Minimum ratio of the step of the readings to the stated resolution for a coarse sensor. Judgement."""
 
 #: The effects detected in the records before any is fitted.
-HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
+HUM, COARSE_STEP = the_effect(MainsPickup), the_effect(CoarseSteps)
 
 
 @dataclass(frozen=True, eq=False)

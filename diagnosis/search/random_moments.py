@@ -40,6 +40,7 @@ from diagnosis.search.scatter import with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers, Periodic
 
 ALIKE_WITHIN: Final = 20.0
 """Difference of −2 ln L below which two kinds of random moment explain the residuals equally well, in χ².
@@ -179,7 +180,7 @@ class _Beside:
     def _answer(self, process: ProcessNoise, top: Hypothesis) -> RandomAnswer | None:
         view, first = self.view, self.sets[0]
         seen = self.seen if top is first else _seen_in(top, view.base.problem.data)
-        allowed = [kind for kind in view.prepared.kinds if kind.random]
+        allowed = [kind for kind in view.prepared.kinds if issubclass(kind, AtRandom)]
         of_parts = [[kind for kind in allowed if part.is_of(kind)] for part in process.spectrum]
         if not all(of_parts):
             return None
@@ -254,7 +255,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     """
     if len(top.effects) >= MOST_CAUSES:
         return []
-    able = {kind.name: kind for kind in kinds if not kind.line}
+    able = {kind.name: kind for kind in kinds if not issubclass(kind, Periodic)}
     larger = sets_with_one_more([top], list(able.values()))
     gains = []
     for h in larger:
@@ -472,7 +473,7 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
-        if not kind.per_run_parameters(1):
+        if not issubclass(kind, OwnNumbers):
             continue
         others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
         start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)

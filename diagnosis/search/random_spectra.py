@@ -17,6 +17,7 @@ from diagnosis.likelihood.paths import COMMON
 from diagnosis.model.data import Data
 from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.traits import Condition
 
 LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
@@ -47,7 +48,7 @@ class MomentSource(ABC):
 
     def may_be(self, kind: type[Effect]) -> bool:
         """Whether a kind of effect is such a moment."""
-        return bool(kind.random) and kind.condition == self.condition
+        return issubclass(kind, AtRandom) and kind.condition == self.condition
 
     @abstractmethod
     def acts(self, run: RunData) -> bool:
@@ -130,7 +131,10 @@ class SpectrumPart:
 
     def is_of(self, kind: type[Effect]) -> bool:
         """Whether it is a part of a kind of effect."""
-        return (self.band, self.source.condition) == (kind.random, kind.condition)
+        return issubclass(kind, AtRandom) and (self.band, self.source.condition) == (
+            kind.random,
+            kind.condition,
+        )
 
 
 #: The parts of a random moment's spectrum, whose moments are independent of each other.

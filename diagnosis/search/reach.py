@@ -16,6 +16,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import changes, misses_motion, starting_points
 from diagnosis.search.scatter import may_scatter, usual, with_deviations
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
 _NULL = 1e-9  # singular value, relative to the largest, that counts as zero
@@ -61,7 +62,7 @@ def unexplained_floor(
 
 def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:
     """χ² explained by an effect's phase or instants in every run; 0 for an effect without them."""
-    if not kind.per_run_parameters(1):
+    if not issubclass(kind, OwnNumbers):
         return 0.0
     return max((start.predicted_drop for start in starting_points(base, kind)), default=0.0)
 

@@ -12,6 +12,7 @@ from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.place import Place
 from diagnosis.where.survey import Survey
 from tunnel_sim.effects import Effect
+from tunnel_sim.effects.capabilities import AtRandom
 
 PLACE_OVERRULED: Final = 0.99
 """Minimum share of the gap on held-out readings that causes explain for the place of the gap not to
@@ -133,7 +134,7 @@ def described(
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
     shown = [b for b in maps.bands if b.band in beyond and b.excess > BAND_LISTED * whole]
     against = judged(where.channel, place.channel.reason.kind, compared, scattering=scattering)
-    predicted = explained >= PLACE_OVERRULED and not any(kind.random for kind in compared)
+    predicted = explained >= PLACE_OVERRULED and not any(issubclass(kind, AtRandom) for kind in compared)
     against = replace(against, elsewhere=against.elsewhere and not predicted)
     return PlaceFound(
         runs=len(maps.runs),
@@ -185,7 +186,7 @@ def judged(
     """
     acting = {kind.channel for kind in compared}
     agrees = channel in acting | {one for kind in compared for one in kind.resembles}
-    by_chance = any(kind.random for kind in compared) and reason.endswith("along the decay")
+    by_chance = any(issubclass(kind, AtRandom) for kind in compared) and reason.endswith("along the decay")
     between = scattering and reason in BETWEEN_RUNS
     open_to_any = channel is None or "calibration" in acting or by_chance or between
     elsewhere = bool(compared) and not agrees and not open_to_any

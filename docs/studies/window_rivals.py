@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from docs.studies.window_table import Columns, RigState, freedom, read_table, rig_state, simulate_windows
 from identification.datasets import WindowRow, paper_windows
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -181,7 +182,7 @@ def diagnose_windows(
 
 def has_trend(kind: type[Effect]) -> bool:
     """Whether an effect has a trend within one run: it is not random, periodic or a mere step."""
-    return kind.fitted and not kind.line and not kind.skips
+    return kind.fitted and not issubclass(kind, OwnNumbers)
 
 
 def _moves_zeta(e: Explanation, none: Explanation) -> bool:

@@ -79,14 +79,16 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     moments = None  # spectral intensity over the inertia at the natural frequency of each run, rad²/s³
     if plan.effects:
         from tunnel_sim.effects import effect_from  # only here: most plans have none
+        from tunnel_sim.effects.capabilities import AtRandom
 
         effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
-        if any(effect.random == "broad_band" for effect in effects):
+        at_random = [effect for effect in effects if isinstance(effect, AtRandom)]
+        if any(effect.random == "broad_band" for effect in at_random):
             moments = []
             for condition in plan.conditions:
                 reference = aerodynamic_stiffness(1.0, **_air(condition, rig))
                 rate = sqrt(_decay(plan, condition, rig)[1])
-                density = sum(effect.moment_density(rate, reference) for effect in effects)
+                density = sum(effect.moment_density(rate, reference) for effect in at_random)
                 moments.append(density / plan.truth.yaw_inertia**2)
     try:
         bound = campaign_bound(

@@ -32,8 +32,9 @@ from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
 from tunnel_reference.true_conditions import TrueConditions
-from tunnel_sim.effects import BetweenRuns, Effect, EffectChain, effect_class, effect_from, the_effect
+from tunnel_sim.effects import BetweenRuns, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.chain import read_motion
+from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
@@ -224,7 +225,7 @@ def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, he
     driven = replace(settings(run), drive=DriveMoment(time, values, held=held))
     found = []
     for late in (delay, 0.0):
-        chain = EffectChain(driven, (the_effect(delays=True)(late),), (None,))
+        chain = EffectChain(driven, (InputDelay(late),), (None,))
         found.append(forward_motion(RIG, chain.physics(), run.sample_rate).angle)
         expected = oracle.driven_reading(time, values, late, run, held=held)
         assert np.max(np.abs(found[-1] - expected)) < SMOOTH
@@ -237,7 +238,7 @@ def test_a_motion_is_continuous_in_the_delay_of_its_input() -> None:
     driven = replace(settings(replace(RUN, duration=1.5)), drive=DriveMoment(time, values, held=True))
 
     def moved(delay: float) -> np.ndarray:
-        chain = EffectChain(driven, (the_effect(delays=True)(delay),), (None,))
+        chain = EffectChain(driven, (InputDelay(delay),), (None,))
         return forward_motion(RIG, chain.physics(), RUN.sample_rate).angle
 
     # around one sample, where every jump passes from one step of the integrator to the next

@@ -141,7 +141,7 @@ def run(
     say(f"condition:  {kind.condition}")
     say(f"equation:   {kind.equation}")
     say(f"signature:  {kind.signature}")
-    if kind.random == "broad_band":
+    if _stochastic(kind):
         say("drawn:      a random moment, different in every run")
     for reference in kind.references:
         say(f"reference:  {reference}")
@@ -159,6 +159,12 @@ def run(
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 
 
+def _stochastic(kind: type[Effect]) -> bool:
+    from tunnel_sim.effects.capabilities import AtRandom
+
+    return issubclass(kind, AtRandom) and kind.random == "broad_band"
+
+
 def summary(kind: type[Effect]) -> str:
     """An effect in one sentence: the first line of its docstring."""
     return inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
@@ -173,7 +179,7 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
                 "name": kind.name,
                 "channel": kind.channel,
                 "condition": kind.condition,
-                "stochastic": kind.random == "broad_band",
+                "stochastic": _stochastic(kind),
                 "summary": summary(kind),
                 "equation": kind.equation,
                 "signature": kind.signature,

@@ -217,7 +217,8 @@ def plan_drive(
 
     from identification.uncertainty.drive_design import Limits, peak_response, plan_bound, propose_drive
     from tunnel_lab.envs.menu import Costs
-    from tunnel_sim.effects import the_effect
+    from tunnel_sim.effects import ALL_EFFECTS
+    from tunnel_sim.effects.random_moments import RandomMoment
     from tunnel_sim.engine.virtual_campaign import plan_effects
     from tunnel_sim.files.plan_file import EffectTable, check_size, plan_from, read_plan, run_count
     from tunnel_sim.files.rig_file import load_rig
@@ -239,7 +240,10 @@ def plan_drive(
     refuse_unwritable_files(out)
     document, rig, where = read_plan(plan), load_rig(), shown(plan)
     if buffeting is not None:  # with the bandwidth stated in the plan
-        kind = the_effect(random="broad_band", condition="wind_on")
+        of_stream = (
+            one for one in ALL_EFFECTS if issubclass(one, RandomMoment) and one.condition == "wind_on"
+        )
+        kind = next(of_stream)
         stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
         kept = [effect for effect in document.effects if effect.name != kind.name]
         if buffeting:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tunnel_sim.effects import Effect, effect_from
+from tunnel_sim.effects.capabilities import OutOfPhase
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
@@ -128,7 +129,7 @@ def in_phase(
             runs.append(WindOnRun(spring, omega, still, *loads))
     found = truth.cn_beta, truth.cn_r
     for effect in effects:
-        found = effect.in_phase(*found, runs)
+        found = effect.in_phase(*found, runs) if isinstance(effect, OutOfPhase) else found
     return replace(truth, cn_beta=found[0], cn_r=found[1])
 
 

@@ -10,6 +10,7 @@ from math import log, sqrt
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.capabilities import AtRandom, OutOfPhase, Periodic
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import (
     EQUATION,
@@ -78,7 +79,7 @@ _UNSEEN_SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class UnsteadyAeroLag(Effect):
+class UnsteadyAeroLag(OutOfPhase):
     """An aerodynamic moment that lags or leads the yaw angle."""
 
     name = "unsteady_aero_lag"
@@ -382,7 +383,7 @@ class WindSpeedDrift(Effect):
 
 
 @dataclass(frozen=True)
-class VortexShedding(Effect):
+class VortexShedding(Periodic, AtRandom):
     """A periodic moment from vortices shed by the body."""
 
     name = "vortex_shedding"
@@ -394,8 +395,6 @@ class VortexShedding(Effect):
     signature = "A spectral line whose frequency is proportional to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)
     example = (0.1, 0.02)
-    autonomous = False
-    line = "shedding"
     frequency_by_wind = "strouhal_number"
     random = "narrow_band"
 

@@ -16,7 +16,6 @@ from tunnel_sim.effects.traits import Traits
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 
 SPRING_TOLERANCE = 1e-6
@@ -62,8 +61,8 @@ class Effect(Traits):
         Returns:
             The value passed to the hooks as ``drawn``.
         """
-        del stated
-        return float(rng.uniform(0.0, 2.0 * np.pi)) if self.line else None
+        del stated, rng
+        return None
 
     def drawn_number(self, drawn: Drawn) -> float:
         """The phase or instant that a run drew; without it the effect would silently do nothing.
@@ -144,62 +143,6 @@ class Effect(Traits):
         """
         del stated
         return None
-
-    def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Change the times at which the motion is read.
-
-        Args:
-            time_s: times by the stamps, s, shape (n,).
-
-        Returns:
-            The true times, s, shape (n,).
-        """
-        del stated, drawn
-        return time_s
-
-    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Change the angle that the sensor measures, before zero and noise are added.
-
-        Args:
-            angle: of the rod's upper end, rad, shape (n,).
-            time_s: true times, s, shape (n,).
-
-        Returns:
-            The changed angle, rad, shape (n,).
-        """
-        del time_s, stated, drawn
-        return angle
-
-    def oscillation(
-        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
-    ) -> Array | None:
-        """An oscillation in the reading besides the body's.
-
-        Args:
-            time_s: true times since the release, s, shape (n,).
-            stated: the input of a driven run is the acting one.
-            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
-
-        Returns:
-            rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative; None: none.
-        """
-        del time_s, stated, drawn, derivative
-        return None
-
-    def on_sensor(self, sensor: SensorModel) -> SensorModel:
-        """Change the sensor itself."""
-        return sensor
-
-    def on_reading(self, reading: Array) -> Array:
-        """Change the reading after noise and before quantisation.
-
-        Args:
-            reading: rad, shape (n,).
-
-        Returns:
-            The changed reading, rad, shape (n,).
-        """
-        return reading
 
     def to_json_dict(self) -> dict[str, Any]:
         """Name and parameters as plain JSON values."""

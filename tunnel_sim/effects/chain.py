@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.capabilities import Clock, ReadingEffect
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
@@ -58,7 +59,7 @@ class EffectChain:
     @property
     def skips(self) -> bool:
         """Whether the motion is read at other times than stated."""
-        return any(effect.skips and not effect.is_null for effect in self.effects)
+        return any(isinstance(effect, Clock) and not effect.is_null for effect in self.effects)
 
     def true_times(self, time_s: Array) -> Array:
         """The true times of the readings.
@@ -70,7 +71,8 @@ class EffectChain:
             The true times since the release, s, shape (n,).
         """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            time_s = effect.on_time(time_s, self.stated, drawn)
+            if isinstance(effect, Clock):
+                time_s = effect.on_time(time_s, self.stated, drawn)
         return time_s
 
     def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
@@ -103,10 +105,15 @@ class EffectChain:
             The measured angle or its derivative, in the same unit, shape (n,).
         """
         stated = self.stated
-        swings = any(_overrides(effect, "oscillation") for effect in self.effects)
+        seen_by = [
+            (effect, drawn)
+            for effect, drawn in zip(self.effects, self.drawn, strict=True)
+            if isinstance(effect, ReadingEffect)
+        ]
+        swings = any(type(effect).oscillation is not ReadingEffect.oscillation for effect, _ in seen_by)
         if swings and stated.drive is not None:  # with its delay and its actuator
             stated = replace(stated, drive=self.physics().drive)
-        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+        for effect, drawn in seen_by:
             beside = effect.oscillation(time_s, stated, drawn, derivative)
             seen = angle if beside is None else angle + beside
             angle = effect.on_angle(seen, time_s, self.stated, drawn)
@@ -115,7 +122,7 @@ class EffectChain:
     def sensor(self, sensor: SensorModel) -> SensorModel:
         """The true sensor, given the stated one."""
         for effect in self.effects:
-            sensor = effect.on_sensor(sensor)
+            sensor = effect.on_sensor(sensor) if isinstance(effect, ReadingEffect) else sensor
         return sensor
 
     def reading(self, reading: Array) -> Array:
@@ -128,7 +135,7 @@ class EffectChain:
             The changed reading, rad, shape (n,).
         """
         for effect in self.effects:
-            reading = effect.on_reading(reading)
+            reading = effect.on_reading(reading) if isinstance(effect, ReadingEffect) else reading
         return reading
 
     @property
@@ -139,14 +146,20 @@ class EffectChain:
 
 def reads_plainly(effects: Sequence[Effect]) -> bool:
     """Whether none of some effects changes the measured angle or the reading."""
-    return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in effects)
+    return not any(
+        isinstance(effect, Clock) or _overrides(effect, *_SEEN, "on_reading") for effect in effects
+    )
 
 
 _SEEN = ("oscillation", "on_angle")
 
 
 def _overrides(effect: Effect, *hooks: str) -> bool:
-    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
+    """Whether an effect on the reading overrides one of some hooks."""
+    kind = type(effect)
+    return issubclass(kind, ReadingEffect) and any(
+        getattr(kind, hook) is not getattr(ReadingEffect, hook) for hook in hooks
+    )
 
 
 def read_motion(

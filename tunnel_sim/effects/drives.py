@@ -30,14 +30,13 @@ _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
 
 
 @dataclass(frozen=True)
-class _OfActuator(Effect):
-    """Common part of the effects of an actuator: each sets one of its properties, where it moves the body."""
+class ActuatorEffect(Effect):
+    """The actuator of a moment on the body, not the motion of a root or a base: each effect sets a property."""
 
     channel = "forcing"
     condition = "always"
     autonomous = False
     driven = True
-    of_moment = True
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the actuator; a free decay has none."""
@@ -60,7 +59,7 @@ class _OfActuator(Effect):
 
 
 @dataclass(frozen=True)
-class ActuatorSaturation(_OfActuator):
+class ActuatorSaturation(ActuatorEffect):
     """An actuator whose moment is limited: by its supply, sharply, or by a magnet that saturates, softly."""
 
     name = "actuator_saturation"
@@ -101,7 +100,7 @@ class ActuatorSaturation(_OfActuator):
 
 
 @dataclass(frozen=True)
-class ActuatorRateLimit(_OfActuator):
+class ActuatorRateLimit(ActuatorEffect):
     """An actuator whose moment changes at a limited rate."""
 
     name = "actuator_rate_limit"
@@ -128,7 +127,7 @@ class ActuatorRateLimit(_OfActuator):
 
 
 @dataclass(frozen=True)
-class ActuatorLag(_OfActuator):
+class ActuatorLag(ActuatorEffect):
     """An actuator whose moment follows the input with a lag of first order."""
 
     name = "actuator_lag"
@@ -148,6 +147,7 @@ class ActuatorLag(_OfActuator):
         scale=0.002, lower=0.0, upper=10.0, fit_upper=1.0,
     )  # fmt: skip
 
-    def plausible(self, omega: float) -> bool:
+    def plausible(self, omega: float, duration: float) -> bool:
         """Whether it is more than a delay of the input to the motion: at least as slow as `_SLOW`."""
+        del duration
         return self.lag * omega > _SLOW

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.capabilities import ReadingEffect
 from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
@@ -103,7 +104,7 @@ class _Moment(ExpressionEffect):
         return moment if self._acts(stated) else lambda *_: 0.0
 
 
-class _Reading(ExpressionEffect):
+class _Reading(ExpressionEffect, ReadingEffect):
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Apply the characteristic."""
         del drawn

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics import steps
@@ -32,7 +33,7 @@ AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 
 
 @dataclass(frozen=True)
-class CoulombFriction(Effect):
+class CoulombFriction(Friction):
     """Dry friction, as in bearings, seals and gears.
 
     With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,

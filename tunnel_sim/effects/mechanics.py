@@ -10,6 +10,7 @@ from math import ceil, cos, exp, isclose, log, pi, sqrt
 import numpy as np
 
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
+from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics import steps
@@ -72,7 +73,7 @@ class AsymmetricStiffness(Effect):
 
 
 @dataclass(frozen=True)
-class FreePlay(Effect):
+class FreePlay(Backlash):
     """Play between spring and rod: the spring acts through a dead zone."""
 
     name = "free_play"
@@ -82,7 +83,6 @@ class FreePlay(Effect):
     on_spring = True
     jumps = True
     size = "play of {half_width} to each side between spring and rod"
-    has_backlash = True
     advice = "Remove the play between spring and rod"
     advice_for_joint = "Remove the play in the gear of the joint, or add it to the model"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"

@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings, Series
 from tunnel_sim.vocabulary.record import Array
@@ -23,7 +24,7 @@ def _bandwidth() -> Any:
 
 
 @dataclass(frozen=True)
-class RandomMoment(Effect):
+class RandomMoment(AtRandom):
     """A random moment of first order: a standard deviation, and a bandwidth beyond which its spectrum falls.
 
     Traits of its own:
@@ -34,7 +35,6 @@ class RandomMoment(Effect):
 
     source: ClassVar[str]
     channel = "forcing"
-    autonomous = False
     fitted = False
     random = "broad_band"
 

@@ -10,10 +10,18 @@ from contextvars import ContextVar
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any, TypeVar, cast, get_args
+from typing import TypeVar, cast, get_args
 
 from tunnel_sim.effects.base import Effect, make_effect
-from tunnel_sim.effects.capabilities import BetweenRuns
+from tunnel_sim.effects.capabilities import (
+    AtRandom,
+    BetweenRuns,
+    Clock,
+    Friction,
+    OutOfPhase,
+    OwnNumbers,
+    ReadingEffect,
+)
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
@@ -32,6 +40,7 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
 )
 
 _OF_SPECTRUM = 2  # parameters of a random moment
+_CAPABILITIES = (BetweenRuns, OwnNumbers, Clock, ReadingEffect, AtRandom, Friction, OutOfPhase)
 
 
 def check_described(kind: object) -> None:
@@ -65,10 +74,18 @@ def check_described(kind: object) -> None:
         except TunnelError as error:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-    if kind.per_run_parameters(1) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
-        what = "has a phase or instants in every run, and does not state how they are found"
-        raise TunnelError(what, where=where, remedy="override sought")
-    if kind.random and len(kind.parameters()) != _OF_SPECTRUM:
+    for one in _CAPABILITIES:
+        asked = [hook for hook, of in vars(one).items() if callable(of) and not hasattr(Effect, hook)]
+        unasked = [hook for hook in asked if hasattr(kind, hook) and not issubclass(kind, one)]
+        if unasked:
+            what, remedy = f"has {unasked[0]}, which nothing asks it for", f"derive it from {one.__name__}"
+            raise TunnelError(what, where=where, remedy=remedy)
+    unstated = sorted(
+        name for name in dir(kind) if getattr(getattr(kind, name), "__isabstractmethod__", False)
+    )
+    if unstated:
+        raise TunnelError(f"does not state its {unstated[0]}", where=where, remedy=f"override {unstated[0]}")
+    if issubclass(kind, AtRandom) and len(kind.parameters()) != _OF_SPECTRUM:
         what = "is a random moment, whose parameters are an intensity and a bandwidth or Strouhal number"
         raise TunnelError(what, where=where, remedy="declare these two")
 
@@ -148,9 +165,6 @@ def check_kind(kind: object) -> None:
     if issubclass(kind, BetweenRuns):
         what = "differs between runs by chance; effects that do so are built in"
         raise TunnelError(what, where=where, remedy="derive it from another class")
-    if kind.lattice:
-        what = "lattice is for the built-in effect that is detected in the records"
-        raise TunnelError(what, where=where, remedy="leave it at its default")
 
 
 @functools.cache
@@ -167,8 +181,9 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
     own = [kind for kind in kinds if kind not in ALL_EFFECTS]
     for kind in own:
         check_kind(kind)
-    for spectrum in {(kind.random, kind.condition) for kind in own if kind.random}:
-        same = [kind.name for kind in kinds if (kind.random, kind.condition) == spectrum]
+    at_random = [kind for kind in kinds if issubclass(kind, AtRandom)]
+    for spectrum in {(kind.random, kind.condition) for kind in at_random if kind in own}:
+        same = [kind.name for kind in at_random if (kind.random, kind.condition) == spectrum]
         if len(same) > 1:
             what = f"has the spectrum of {same[0]}, so no run can distinguish them"
             raise TunnelError(what, where=f"effect {same[-1]}", remedy="leave one of them out")
@@ -199,18 +214,18 @@ def effect_class(name: str) -> type[Effect]:
     raise TunnelError(f"unknown effect {name!r}", remedy=remedy)
 
 
-def the_effect(**traits: object) -> type[Effect]:
-    """The class of the only built-in effect with given traits.
+def the_effect(capability: type) -> type[Effect]:
+    """The only built-in effect of a type.
 
     Args:
-        **traits: as listed in `Effect`.
+        capability: such as `tunnel_sim.effects.capabilities.MainsPickup`.
 
     Raises:
         LookupError: when there is none, or more than one.
     """
-    found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
+    found = [kind for kind in ALL_EFFECTS if issubclass(kind, capability)]
     if len(found) != 1:
-        raise LookupError(f"{len(found)} effects have the traits {traits}")
+        raise LookupError(f"{len(found)} effects are of type {capability.__name__}")
     return found[0]
 
 

@@ -10,6 +10,14 @@ from functools import lru_cache
 import numpy as np
 
 from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effect
+from tunnel_sim.effects.capabilities import (
+    Clock,
+    CoarseSteps,
+    InputClock,
+    MainsPickup,
+    ReadingEffect,
+    SecondOscillation,
+)
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.drive import DriveMoment, Same
@@ -23,7 +31,7 @@ _REFERENCE = 0.2  # rad: angle at which every exponent gives the same error
 
 
 @dataclass(frozen=True)
-class SensorNonlinearity(Effect):
+class SensorNonlinearity(ReadingEffect):
     """A sensor whose gain changes with the angle."""
 
     name = "sensor_nonlinearity"
@@ -70,7 +78,7 @@ class SensorNonlinearity(Effect):
 
 
 @dataclass(frozen=True)
-class SensorHysteresis(Effect):
+class SensorHysteresis(ReadingEffect):
     """Backlash between rod and sensor."""
 
     name = "sensor_hysteresis"
@@ -108,7 +116,7 @@ class SensorHysteresis(Effect):
 
 
 @dataclass(frozen=True)
-class SensorDrift(Effect):
+class SensorDrift(ReadingEffect):
     """A sensor zero that drifts during the run."""
 
     name = "sensor_drift"
@@ -140,7 +148,7 @@ _FAR = 2.0  # rad: the other limit, where only one side clips
 
 
 @dataclass(frozen=True)
-class SensorClipping(Effect):
+class SensorClipping(ReadingEffect):
     """A reading that saturates."""
 
     name = "sensor_clipping"
@@ -193,7 +201,7 @@ class SensorClipping(Effect):
 
 
 @dataclass(frozen=True)
-class SensorQuantisation(Effect):
+class SensorQuantisation(CoarseSteps):
     """A resolution that is coarser than stated."""
 
     name = "sensor_quantisation"
@@ -208,8 +216,6 @@ class SensorQuantisation(Effect):
     )
     references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
     example = (0.004,)
-    fitted = False
-    lattice = True
 
     step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
 
@@ -222,7 +228,7 @@ _MARGIN = 0.1  # s of motion beyond the readings: samples need not divide the lo
 
 
 @dataclass(frozen=True)
-class DroppedSamples(Effect):
+class DroppedSamples(Clock):
     """Samples missing without a gap in the time stamps."""
 
     name = "dropped_samples"
@@ -241,9 +247,7 @@ class DroppedSamples(Effect):
     )
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.02,)
-    autonomous = False
     tries = 2
-    skips = True
 
     lost_time: float = parameter(
         "τ", "s", "time that the missing samples would have taken", scale=0.005, lower=0.0, upper=1.0
@@ -313,7 +317,7 @@ def _after_losses(times: Same, delay: float, lost_time: float, instants: tuple[f
 
 
 @dataclass(frozen=True)
-class MainsHum(Effect):
+class MainsHum(MainsPickup):
     """Mains hum in the reading."""
 
     name = "mains_hum"
@@ -326,9 +330,6 @@ class MainsHum(Effect):
     signature = "A spectral line at the mains frequency in every run, independent of the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.002, 60.0)
-    autonomous = False
-    fitted = False
-    line = "mains"
 
     amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
     frequency: float = parameter(
@@ -357,7 +358,7 @@ _LEAST_SPRING = 1e-9  # N m/rad: a fit may try zero
 
 
 @dataclass(frozen=True)
-class SecondMode(Effect):
+class SecondMode(SecondOscillation):
     """A second oscillation, such as bending of the sting or a coupled degree of freedom."""
 
     name = "second_mode"
@@ -376,8 +377,6 @@ class SecondMode(Effect):
     )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.005, 60.0, 0.01)
-    autonomous = False
-    line = "ringing"
     resembles = (
         "stiffness",
         "damping",
@@ -409,19 +408,16 @@ class SecondMode(Effect):
         """The ringing from the release on, and the oscillation excited by the input."""
         return (residuals.ringing(), residuals.excited())
 
-    def plausible(self, omega: float) -> bool:
-        """Whether it is a separate oscillation.
+    def plausible(self, omega: float, duration: float) -> bool:
+        """Whether it is a separate oscillation, of three cycles in the record.
 
         It decays, but not within three cycles, is not the motion's, and not as slow as a drift.
         """
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
         lasts = 2.0 * np.pi * self.damping_ratio * _LEAST_CYCLES < 1.0
         apart = self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
-        return decays and lasts and apart
-
-    def shown_in(self, duration: float) -> bool:
-        """Whether a record contains three of its cycles."""
-        return self.frequency * duration >= 2.0 * np.pi * _LEAST_CYCLES
+        shown = self.frequency * duration >= 2.0 * np.pi * _LEAST_CYCLES
+        return decays and lasts and apart and shown
 
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
@@ -457,7 +453,7 @@ class SecondMode(Effect):
 
 
 @dataclass(frozen=True)
-class InputDelay(Effect):
+class InputDelay(InputClock):
     """An input that acts later than its time stamps.
 
     Both holds and any delay are exact in a single motion. In a fit, a step that contains a kink keeps the impulse
@@ -479,9 +475,6 @@ class InputDelay(Effect):
     )
     references = ("Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999",)
     example = (0.02,)
-    autonomous = False
-    driven = True
-    delays = True
 
     delay: float = parameter(
         "τ",

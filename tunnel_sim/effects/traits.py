@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, TypeAlias
 
-from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import (
     DESCRIPTION,
     Circumstances,
@@ -20,7 +19,6 @@ from tunnel_sim.effects.parameters import (
 )
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array
 
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
@@ -38,25 +36,16 @@ class Traits:
     Traits, with defaults that an effect overrides:
 
     - ``law_terms``: the moment law's parameters for the effect's own, in their order; empty: none.
-    - ``random``: kind of spectrum of a random moment. Vortex shedding also has a line: its phase may wander or not.
-    - ``line``: the cause of a periodic effect's frequency, in a word; its phase differs from run to run.
-    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
     - ``fitted``: whether a fit of the deterministic motion can find it; else records or spectra show it.
     - ``on_spring``: whether its moment is proportional to the spring's stiffness.
-    - ``has_backlash``: whether it separates the body from its support, as play does.
     - ``driven``: whether it acts on driven runs only.
-    - ``delays``: whether it shifts the input of driven runs in time.
-    - ``of_moment``: whether it changes an input that an actuator exerts, not the motion of a root or a base.
     - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
       neither is included where a base turns with a known acceleration.
-    - ``lattice``: whether it changes the quantisation step.
     - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
       empty: none.
     - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
       integration step across it is less accurate, and the tests allow for this.
-    - ``remembers``: whether a reading depends on earlier samples.
-    - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
     - ``resembles``: other channels that its residual may point to.
     - ``tries``: how many starting points of a fit are worth trying.
@@ -79,22 +68,13 @@ class Traits:
     example: ClassVar[tuple[float, ...]]
 
     law_terms: ClassVar[tuple[str, ...]] = ()
-    random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
-    line: ClassVar[str] = ""
-    skips: ClassVar[bool] = False
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     on_spring: ClassVar[bool] = False
-    has_backlash: ClassVar[bool] = False
     driven: ClassVar[bool] = False
-    delays: ClassVar[bool] = False
-    of_moment: ClassVar[bool] = False
     by_angle_in_room: ClassVar[bool] = False
-    lattice: ClassVar[bool] = False
     frequency_by_wind: ClassVar[str] = ""
     jumps: ClassVar[bool] = False
-    remembers: ClassVar[bool] = False
-    ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""
     resembles: ClassVar[tuple[Channel, ...]] = ()
     tries: ClassVar[int] = 1
@@ -154,40 +134,12 @@ class Traits:
 
     @classmethod
     def per_run_parameters(cls, instants: int) -> tuple[str, ...]:
-        """Names of the effect's unknowns of every run: the phase of a periodic effect, or instants.
+        """Names of the effect's unknowns of every run, for an effect that has some.
 
         Args:
-            instants: number of instants of an effect that skips samples.
+            instants: number of instants in a run.
         """
-        if cls.skips:
-            return tuple(f"instant_{number + 1}" for number in range(instants))
-        return ("phase",) if cls.line else ()
-
-    @classmethod
-    def numbers_like_forms(cls, instants: int) -> int:
-        """Number of its unknowns of every run that absorb any slow phase error, as a freed form does: its instants.
-
-        Args:
-            instants: number of instants of an effect that skips samples.
-        """
-        return len(cls.per_run_parameters(instants)) if cls.skips else 0
-
-    @classmethod
-    def gains_in(cls) -> Literal["frequency", "harmonics"]:
-        """The channel of the misfit that its unknowns of every run lower by chance."""
-        return "frequency" if cls.skips else "harmonics"
-
-    @classmethod
-    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
-        """Starting points of a fit, for an effect that has a phase or instants of its own in every run.
-
-        Args:
-            residuals: of a fit without it.
-
-        Returns:
-            The result of the search in the residuals, for each way in which the effect may act.
-        """
-        del residuals
+        del instants
         return ()
 
     @property
@@ -243,25 +195,17 @@ class Traits:
         del values
         return stiffness, damping
 
-    def plausible(self, omega: float) -> bool:
-        """Whether a fitted effect still deserves its name.
+    def plausible(self, omega: float, duration: float) -> bool:
+        """Whether a fitted effect still deserves its name, and a record is long enough to show it.
 
         Args:
             omega: angular frequency of the motion, rad/s.
+            duration: of the record, s.
 
         Returns:
             False where its parameters make it part of the motion itself.
         """
-        del omega
-        return True
-
-    def shown_in(self, duration: float) -> bool:
-        """Whether a record is long enough to show a fitted effect.
-
-        Args:
-            duration: of the record, s.
-        """
-        del duration
+        del omega, duration
         return True
 
     def alike(self) -> Sequence[Trial]:
@@ -273,46 +217,9 @@ class Traits:
         """
         return ()
 
-    def stands(self, stiffness: float) -> float:
-        """Greatest angle from rest at which the effect holds a body that has stopped.
-
-        Args:
-            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment.
-
-        Returns:
-            The angle, rad; 0 for an effect that cannot hold a body.
-        """
-        del stiffness
-        return 0.0
-
-    def sliding(self, rate: Array) -> Array | None:
-        """The effect's friction while the body moves at a steady rate, against the motion.
-
-        Args:
-            rate: above 0, rad/s, shape (n,).
-
-        Returns:
-            The moment, N m, shape (n,); None for an effect other than friction.
-        """
-        del rate
-        return None
-
     @property
     def stiffness_at_rest(self) -> float:
         """Stiffness that the effect adds to the rig at rest, N m/rad: 0 unless it acts as a spring."""
-        return 0.0
-
-    def moment_density(self, rate: float, reference_moment: float) -> float:
-        """Spectral intensity of the effect's random moment, as if it were white.
-
-        Args:
-            rate: angular frequency of the motion, rad/s.
-            reference_moment: ½ρV²Al of the run, N m; 0 with the wind off.
-
-        Returns:
-            q of the moment, ⟨M(t)M(t′)⟩ = q δ(t − t′), (N m)² s; 0 without a broad spectrum.
-        """
-        del rate, reference_moment
         return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
@@ -327,14 +234,3 @@ class Traits:
         """
         del cn_beta, runs
         return 0.0, 0.0
-
-    def in_phase(self, cn_beta: float, cn_r: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Cnβ and Cnr in phase with angle and rate, with the part of this effect, 1/rad.
-
-        Args:
-            cn_beta: Cnβ of the law beside the effect, 1/rad.
-            cn_r: Cnr of that law, 1/rad.
-            runs: the campaign's wind-on runs, whose frequencies count equally.
-        """
-        del runs
-        return cn_beta, cn_r

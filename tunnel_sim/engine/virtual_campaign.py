@@ -13,8 +13,9 @@ import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE
-from tunnel_sim.effects.capabilities import BetweenRuns
+from tunnel_sim.effects.capabilities import BetweenRuns, ReadingEffect
 from tunnel_sim.effects.chain import read_motion
+from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.drive import DriveMoment
@@ -219,7 +220,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         if effect.driven and not drives:
             what = "acts on driven runs only, and all runs of the plan are free decays"
             raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
-        if effect.of_moment and not any(drive.kind.by_actuator for drive in drives):
+        if isinstance(effect, ActuatorEffect) and not any(drive.kind.by_actuator for drive in drives):
             what = "changes the moment of a drive, but this drive moves the spring's root or the base"
             raise TunnelError(what, where=where, remedy="leave it out, or drive the body by amplitudes_nm")
         if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
@@ -231,7 +232,13 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             remedy = "leave out the effect, or drive the body by amplitudes_nm"
             raise TunnelError(what, where=where, remedy=remedy)
     known = known_effects()
-    return tuple(sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, known.index(type(effect)))))
+    return tuple(
+        sorted(effects, key=lambda effect: (not _ahead_of_sensor(effect), known.index(type(effect))))
+    )
+
+
+def _ahead_of_sensor(effect: Effect) -> bool:
+    return isinstance(effect, ReadingEffect) and effect.ahead_of_sensor
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.capabilities import BetweenRuns, Clock
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 from tunnel_sim.envs import EnvError, as_env_error, refuse_unknown
 from tunnel_sim.envs.information import Prior
@@ -268,7 +269,7 @@ def plan_run(
         effects = plan_effects(one_run)
         for effect in effects:
             # An episode reads the motion as it proceeds: none of it can be skipped.
-            if effect.skips and not effect.is_null:
+            if isinstance(effect, Clock) and not effect.is_null:
                 what = "an episode cannot drop samples"
                 remedy = "inject it with tunnel simulate, which makes whole records"
                 raise TunnelError(what, where=f"effect {effect.name}", remedy=remedy)
@@ -309,9 +310,7 @@ def _effects(
         if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
             return []
         # for one run, which shows no scatter between runs
-        kinds = [
-            kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven or issubclass(kind, BetweenRuns))
-        ]
+        kinds = [kind for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, (Clock, BetweenRuns)))]
         kind = kinds[int(rng.integers(len(kinds)))]
         severity = kind.parameters()[0]
         value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))

@@ -17,6 +17,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
+from tunnel_sim.effects.capabilities import ReadingEffect
 from tunnel_sim.effects.chain import quantise
 from tunnel_sim.engine.virtual_campaign import stated_run
 from tunnel_sim.envs import EnvError, as_env_error
@@ -222,7 +223,9 @@ class RunningSensor:
     def __init__(self, chain: EffectChain, sensor: SensorModel) -> None:
         self.chain = chain
         self.sensor = chain.sensor(sensor)
-        self._remembers = any(effect.remembers for effect in chain.effects)
+        self._remembers = any(
+            isinstance(effect, ReadingEffect) and effect.remembers for effect in chain.effects
+        )
         self._angles: list[Array] = []
         self._times: list[Array] = []
 

@@ -23,6 +23,7 @@ from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
+from tunnel_sim.effects.capabilities import Clock
 
 COMPARED_FROM: Final = 0.01
 """Minimum probability of a set of the beginnings of driven runs for comparison in whole runs. Judgement
@@ -104,7 +105,7 @@ class Beginnings(WholeRuns):
 
         An effect with instants of its own is sought there again, since it may act at later ones, too.
         """
-        sought = [kind for kind in hypothesis.fit.problem.effects if kind.skips]
+        sought = [kind for kind in hypothesis.fit.problem.effects if issubclass(kind, Clock)]
         kept = [name for name in hypothesis.effects if all(kind.name != name for kind in sought)]
         start = restricted(hypothesis.fit, kept) if sought else hypothesis.fit
         problem = replace(start.problem, data=self.prepared.nominal.problem.data)

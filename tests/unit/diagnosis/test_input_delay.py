@@ -13,7 +13,8 @@ from diagnosis.diagnosable import kinds_for
 from diagnosis.findings.verdict import headline
 from diagnosis.model.rig import SpringModel
 from tests.marks import slow
-from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
-DELAY = the_effect(delays=True)
+DELAY = InputDelay
 FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness", "rod_flexibility", "sensor_drift"])
 
 

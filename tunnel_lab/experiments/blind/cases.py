@@ -13,7 +13,8 @@ from diagnosis.findings.terms import SCATTERS
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from identification.statistics import Proportion
-from tunnel_sim.effects import Effect, known_effects
+from tunnel_sim.effects import known_effects
+from tunnel_sim.effects.capabilities import OutOfPhase
 from tunnel_sim.files.toml_input import NotNegative
 from tunnel_sim.vocabulary.between_runs import SCATTERED
 
@@ -308,7 +309,7 @@ def case(
     said = ScoredAnswer.model_validate(answer)
     effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
-    lagging = {kind.name for kind in known_effects() if kind.in_phase is not Effect.in_phase}
+    lagging = {kind.name for kind in known_effects() if issubclass(kind, OutOfPhase)}
     meant = truth if lagging & {*(said.causes or ())} else {**truth, **stated.in_phase}
     return Case(
         name=name,

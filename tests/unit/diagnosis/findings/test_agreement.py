@@ -22,6 +22,7 @@ from tests.support.gap_campaigns import campaign as gap_campaign
 from tests.support.gap_campaigns import nominal
 from tests.support.rendered import place_rows, where_words
 from tunnel_sim.effects import BetweenRuns, Effect, effect_class, effect_from, known_effects
+from tunnel_sim.effects.random_moments import RandomMoment
 
 ROOT = Path(__file__).parents[4]
 FIGURES = {"from_s": 1.0, "to_s": 2.0, "frequency_hz": 2.0, "runs": 2, "run": "beta"}
@@ -111,7 +112,7 @@ def test_a_gap_whose_rest_could_change_the_coefficients_is_not_immaterial() -> N
 
 
 ALONE = [
-    k for k in known_effects() if not (issubclass(k, BetweenRuns) or k.driven or k.random == "broad_band")
+    k for k in known_effects() if not (issubclass(k, BetweenRuns) or k.driven or issubclass(k, RandomMoment))
 ]
 
 

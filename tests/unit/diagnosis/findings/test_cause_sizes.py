@@ -49,11 +49,9 @@ def test_dry_friction_adds_to_the_damping_and_holds_the_body() -> None:
 
 def test_a_hardening_spring_raises_the_frequency() -> None:
     size, best = sized("cubic_stiffness", coefficient=0.05)
-    _, _, stiffness = softest(best, size)
     kind = effect_class("cubic_stiffness")
     value = best.value(f"cubic_stiffness.{kind.parameters()[0].name}")
-    effect = kind(**{kind.parameters()[0].name: value})
-    assert effect.stands(stiffness) == size.stands == 0.0
+    assert size.stands == 0.0
     assert size.frequency_change == pytest.approx(0.375 * value * size.amplitude**2, rel=0.2)
     assert size.damping_ratio == pytest.approx(size.damping_ratio_without, rel=0.05)
     assert size.reading_change > 0.0

@@ -96,4 +96,3 @@ def test_the_friction_at_a_steady_rate_is_that_of_each_form():
     for form, factor in forms.items():
         effect = effect_from("coulomb_friction", {"friction_moment": 0.02, **dict(form)})
         np.testing.assert_allclose(effect.sliding(rate), 0.02 * np.array(factor))
-    assert effect_class("quadratic_damping")(0.01).sliding(rate) is None

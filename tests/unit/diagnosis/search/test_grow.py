@@ -212,7 +212,7 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
 def test_a_second_mode_is_neither_a_drift_nor_the_motion_itself() -> None:
     rates = (0.6, 6.0, 12.0, 14.0, 36.0)
     modes = [effect_from("second_mode", {"amplitude": 0.002, "frequency": rate}) for rate in rates]
-    assert [mode.plausible(12.0) for mode in modes] == [False, True, False, False, True]
+    assert [mode.plausible(12.0, 60.0) for mode in modes] == [False, True, False, False, True]
 
 
 def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the_others() -> None:
@@ -304,4 +304,4 @@ def test_a_line_that_does_not_decay_is_no_mode() -> None:
         effect_from("second_mode", {"amplitude": 0.002, "frequency": 36.0, "damping_ratio": r})
         for r in ratios
     ]
-    assert [mode.plausible(12.0) for mode in modes] == [False, True, True]
+    assert [mode.plausible(12.0, 60.0) for mode in modes] == [False, True, True]

@@ -13,9 +13,10 @@ import pytest
 
 from diagnosis.identifiability import identifiability
 from tests.support.own_effects import DETENT, OwnCubic
-from tunnel_sim.effects import Effect, effect_class, the_effect
+from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.effect_laws import check
 from tunnel_sim.physics.run_settings import RunSettings
 
@@ -120,7 +121,7 @@ def test_an_effect_that_only_the_comparison_of_speeds_shows_is_identifiable(name
 
 
 def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
-    kind = the_effect(delays=True)
+    kind = InputDelay
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
     # of small ones, linear theory tells no delay from a lag

@@ -18,8 +18,6 @@ from tests.support.gap_campaigns import campaign
 from tests.support.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (
     ALL_EFFECTS,
-    BetweenRuns,
-    Effect,
     effect_class,
     effect_from,
     known_effects,
@@ -27,6 +25,8 @@ from tunnel_sim.effects import (
     registry,
 )
 from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.between_runs import WindSpeedScatter
+from tunnel_sim.effects.capabilities import AtRandom, Periodic
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.parameters import parameter
@@ -89,10 +89,10 @@ OF_VOLTS = {
         (changed(name="coulomb_friction"), "is the name of a built-in effect"),
         (changed(name="unknown"), "is not a name"),
         (changed(channel="gear"), "unknown channel 'gear'"),
-        (changed(line="of the gear"), "does not state how they are found"),
-        (changed(lattice=True), "detected in the records"),
-        (changed((BetweenRuns, OwnCubic), scatters="wind_speed"), "are built in"),
-        (changed(random="broad_band"), "is a random moment"),
+        (changed((Periodic, OwnCubic)), "does not state its sought"),
+        (changed(on_angle=lambda *_: None), "derive it from ReadingEffect"),
+        (changed((WindSpeedScatter,), name="own_scatter"), "are built in"),
+        (changed((AtRandom, OwnCubic), random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
         (int, "is not a dataclass derived from Effect"),
     ],
@@ -106,7 +106,7 @@ def test_what_cannot_be_an_effect_is_not_registered(kind: type, part: str) -> No
 
 
 @dataclasses.dataclass(frozen=True)
-class Wake(Effect):
+class Wake(Periodic):
     """The wake of a strut: a periodic moment whose frequency follows the wind."""
 
     name = "wake"
@@ -116,8 +116,6 @@ class Wake(Effect):
     signature = "A line whose frequency follows the wind."
     references = ("one's own",)
     example = (0.1, 0.2)
-    autonomous = False
-    line = "the strut's wake"
     amplitude: float = parameter(
         "c", "1", "of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
     )

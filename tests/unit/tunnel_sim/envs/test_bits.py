@@ -12,6 +12,7 @@ import pytest
 from tests.marks import slow
 from tests.support.env_episodes import NAME, episode, make, same
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.capabilities import Clock
 from tunnel_sim.effects.mechanics import SpringMiscalibration
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.envs import EnvError
@@ -39,7 +40,7 @@ def of(kind: type[Effect]) -> dict[str, dict[str, float]]:
 TOGETHER = of(ALL_EFFECTS[0]) | {"buffeting": {"intensity": 0.01}, "mains_hum": {"amplitude": 0.002}}
 TOGETHER |= {"sensor_hysteresis": {"half_width": 0.002}, "wind_speed_drift": {"drift": 0.1}}
 CASES: dict[str, dict[str, dict[str, float]]] = {"none": {}, "together": TOGETHER}
-CASES |= {kind.name: of(kind) for kind in ALL_EFFECTS if not (kind.skips or kind.driven)}
+CASES |= {kind.name: of(kind) for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, Clock))}
 
 
 @pytest.mark.parametrize("case", CASES)
