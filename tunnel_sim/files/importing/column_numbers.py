@@ -193,6 +193,9 @@ def in_radians(
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
     values = reading.values
+    if not np.isfinite(values).any():
+        what = f"'{one_line(reading.name, 40)}' holds no number where the file states a time"
+        raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
     if calibration is not None:
         volts = values * UNITS["voltage"].get(unit, 1.0)
         first, second = calibration

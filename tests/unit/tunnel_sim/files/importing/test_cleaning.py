@@ -309,3 +309,10 @@ def test_a_signalling_nan_of_a_damaged_file_does_not_hide_the_numbers_beside_it(
     quiet = Channel("angle", values).values
     assert (np.nanmin(quiet), np.nanmax(quiet)) == (-1.0, 2.0)
     assert set(quiet.view(np.uint64)[1::3].tolist()) == {int(np.array(np.nan).view(np.uint64))}
+
+
+def test_readings_that_all_have_the_same_stamp_are_refused(tmp_path: Path) -> None:
+    yaw = 0.3 * np.cos(np.linspace(0.0, 60.0, 400))
+    text = "time_s,yaw_rad\n" + "".join(f"1e+300,{value:.8f}\n" for value in yaw)
+    with pytest.raises(TunnelError, match="'yaw' holds no number where the file states a time"):
+        read_records([written(tmp_path, "stuck.csv", text)])
