@@ -24,6 +24,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
 from identification.show.blocks import TextTable
 from identification.show.numbers import p_text, part, plain, reading_shown, share, significant, unit_shown
+from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.effects.registry import effect_class
 
 RUNS_LISTED: Final = 12
@@ -165,7 +166,8 @@ def _agreement(where: Where, place: PlaceFound) -> str:
         return ""
     kinds = [effect_class(name) for name in place.compared]
     there = [kind for kind in kinds if where.channel == kind.channel]
-    alike = [kind for kind in kinds if kind not in there and where.channel in kind.resembles]
+    beside = [kind for kind in kinds if kind not in there and issubclass(kind, SecondOscillation)]
+    alike = [kind for kind in beside if where.channel in kind.resembles]
     elsewhere: dict[str, list[str]] = {}
     for kind in (kind for kind in kinds if kind not in there):
         elsewhere.setdefault(CHANNELS[kind.channel], []).append(kind.name)

@@ -11,6 +11,7 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Parameter, RunParameterPrior
 from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
 from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.capabilities import Periodic
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -83,7 +84,9 @@ class Chance:
         return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
-_KEEPING_TIME = tuple(kind.frequency_by_wind for kind in ALL_EFFECTS if kind.frequency_by_wind)
+_KEEPING_TIME = tuple(
+    kind.frequency_by_wind for kind in ALL_EFFECTS if issubclass(kind, Periodic) and kind.frequency_by_wind
+)
 
 
 class RunDeparture(Effect):

@@ -12,7 +12,7 @@ from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.place import Place
 from diagnosis.where.survey import Survey
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.capabilities import AtRandom
+from tunnel_sim.effects.capabilities import AtRandom, SecondOscillation
 
 PLACE_OVERRULED: Final = 0.99
 """Minimum share of the gap on held-out readings that causes explain for the place of the gap not to
@@ -185,7 +185,9 @@ def judged(
         scattering: whether the runs differ from each other by chance in the answer.
     """
     acting = {kind.channel for kind in compared}
-    agrees = channel in acting | {one for kind in compared for one in kind.resembles}
+    agrees = channel in acting | {
+        one for kind in compared if issubclass(kind, SecondOscillation) for one in kind.resembles
+    }
     by_chance = any(issubclass(kind, AtRandom) for kind in compared) and reason.endswith("along the decay")
     between = scattering and reason in BETWEEN_RUNS
     open_to_any = channel is None or "calibration" in acting or by_chance or between

@@ -11,9 +11,7 @@ from tunnel_sim.effects.traits import Traits
 OF_ONE = {
     "alike",  # other minima of χ²: a rod's own oscillation
     "forms",  # by default one form of all form parameters
-    "frequency_by_wind",
     "is_null",  # by default a severity of zero
-    "resembles",
     "small_swings",
     "stiffness_at_rest",
     "turns",

@@ -15,6 +15,7 @@ import numpy as np
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import WindOnRun
+from tunnel_sim.effects.traits import Channel
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
@@ -102,7 +103,15 @@ class OwnNumbers(Effect):
 
 @dataclass(frozen=True)
 class Periodic(OwnNumbers):
-    """An oscillation whose phase differs from run to run."""
+    """An oscillation whose phase differs from run to run.
+
+    Traits of its own:
+
+    - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
+      empty: none.
+    """
+
+    frequency_by_wind: ClassVar[str] = ""
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
         """Draw the run's phase, rad."""
@@ -210,7 +219,14 @@ class ReadingEffect(Effect):
 
 @dataclass(frozen=True)
 class SecondOscillation(Periodic, ReadingEffect):
-    """An oscillation beside the body's, of a structure or another degree of freedom."""
+    """An oscillation beside the body's, of a structure or another degree of freedom.
+
+    Traits of its own:
+
+    - ``resembles``: other channels that its residual may point to.
+    """
+
+    resembles: ClassVar[tuple[Channel, ...]] = ()
 
 
 @dataclass(frozen=True)

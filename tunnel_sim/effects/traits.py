@@ -42,12 +42,9 @@ class Traits:
     - ``driven``: whether it acts on driven runs only.
     - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
       neither is included where a base turns with a known acceleration.
-    - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
-      empty: none.
     - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
       integration step across it is less accurate, and the tests allow for this.
     - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
-    - ``resembles``: other channels that its residual may point to.
     - ``tries``: how many starting points of a fit are worth trying.
     - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
     - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
@@ -73,10 +70,8 @@ class Traits:
     on_spring: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     by_angle_in_room: ClassVar[bool] = False
-    frequency_by_wind: ClassVar[str] = ""
     jumps: ClassVar[bool] = False
     turns: ClassVar[str] = ""
-    resembles: ClassVar[tuple[Channel, ...]] = ()
     tries: ClassVar[int] = 1
     size: ClassVar[str] = ""
     advice: ClassVar[str] = ""
