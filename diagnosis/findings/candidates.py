@@ -206,7 +206,7 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
         if answer.effects == UNKNOWN:
             answers.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
-        name = " + ".join(sorted({*study.beside, *answer.effects} or _scatter(study)))
+        name = " + ".join(sorted({*study.named_beside(answer), *answer.effects} or _scatter(study)))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
         answers.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer, errors)))
     if not study.answers:

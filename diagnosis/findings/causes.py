@@ -115,13 +115,14 @@ class NamedCauses:
         causes = without_scatter(self.causes)
         named = {*self.causes, *self.ambiguous_with}
         read_off = [name for name in causes if name not in first.effect.split(" + ")]
-        likely = [one for one in others if one.probability >= least and _effects(one) <= named]
-        sets = [(first, causes)]
-        sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
+        proper = {one.effect: without_scatter(sorted(_effects(one))) for one in others}
+        likely = [one for one in others if one.probability >= least and named.issuperset(proper[one.effect])]
+        sets = [(first, causes), *((one, [*read_off, *proper[one.effect]]) for one in likely)]
         certain = [name for name in causes if all(name in names for _, names in sets)]
         alternatives = []
         for one, names in sets:
             own = [self._called(one, name, sized) for name in names if name not in certain]
+            own += [BETWEEN_RUNS] if scattering(_effects(one)) and not scattering(self.causes) else []
             alternatives.append((listed(own) if own else "nothing else", one.probability))
         return certain, alternatives
 

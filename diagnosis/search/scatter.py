@@ -125,20 +125,29 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
 
 def evident(fitted: Fit) -> Fit:
     """A fit with chance differences where its runs show them beyond those stated; else as stated."""
-    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
-    if not scatter:
-        return fitted
-    columns, prior, known = fitted.columns, width_prior(fitted.problem), fitted.problem.data.repeatability
-    if _evident(columns, prior, np.ones(len(scatter), bool), chosen):
-        shown, widths = _shown(columns, prior, chosen), columns.likeliest(prior).widths
+    scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
+    if shown := shown_by(fitted):
+        widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
         found = [
-            replace(one, width=float(width), shown=bool(seen))
-            for one, width, seen in zip(scatter, widths, shown, strict=True)
+            replace(one, width=float(width), shown=one.name in shown)
+            for one, width in zip(scatter, widths, strict=True)
         ]
     else:
         stated = [(one, known.get(one.kind.scatters, 0.0)) for one in scatter]
         found = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
     return with_scatter(fitted, tuple(found))
+
+
+def shown_by(fitted: Fit) -> tuple[str, ...]:
+    """The chance differences that the runs of a fit show beyond those stated, by name; none where they repeat."""
+    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
+    if not scatter:
+        return ()
+    columns, prior = fitted.columns, width_prior(fitted.problem)
+    if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
+        return ()
+    shown = _shown(columns, prior, chosen)
+    return tuple(one.name for one, seen in zip(scatter, shown, strict=True) if seen)
 
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
@@ -200,7 +209,7 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
 
 
 def named(fitted: Fit) -> tuple[str, ...]:
-    """The chance differences of a fit that its runs show beyond those stated."""
+    """The chance differences of a fit that its runs show beyond those stated, as `evident` found them."""
     return tuple(one.name for one in fitted.problem.scatter if one.shown)
 
 

@@ -19,7 +19,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
-from diagnosis.search.scatter import evident, named
+from diagnosis.search.scatter import evident, named, shown_by
 from diagnosis.search.sets import Names, Sets
 from diagnosis.search.surviving import shown_by_one
 from diagnosis.search.weigh import UNKNOWN, Weighed
@@ -166,6 +166,16 @@ class Study:
     def scattering(self) -> Names:
         """The chance differences between the runs beyond those stated."""
         return () if self.fitted == UNKNOWN else named(self.chosen)
+
+    def named_beside(self, answer: Answer) -> Names:
+        """Causes other than the fitted effects of an answer: detected in the records, or differences between runs.
+
+        The differences are its own. An answer that was fitted to runs that repeat has those of the first answer.
+        """
+        fit = None if answer is self.answer else answer.fit(self.nominal)
+        if fit is None or not fit.problem.scatter:
+            return self.beside
+        return (*self.read_off, *shown_by(fit))
 
     @property
     def beside(self) -> Names:

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 from diagnosis.answer.held_out import excess_base
 from diagnosis.findings.candidates import candidates
+from diagnosis.search.scatter import scattered as beside_scatter
 from tests.support.gap_campaigns import answer, campaign, nominal, studied
-from tunnel_sim.effects import effect_from
+from tests.support.scattered_runs import SCATTERED, scattered
+from tunnel_sim.effects import effect_class, effect_from
 
 
 def test_scatter_alone_has_a_name_beside_an_answer_of_runs_that_repeat():
@@ -18,3 +20,20 @@ def test_scatter_alone_has_a_name_beside_an_answer_of_runs_that_repeat():
     found = candidates(replace(study, answers=both), excess_base(study), {})
     scatter = "damping_scatter + stiffness_scatter + wind_speed_scatter"
     assert [one.effect for one in found] == ["gravity_stiffness", scatter, "none"]
+
+
+def test_a_rival_has_the_names_of_its_own_scatter():
+    data = scattered()
+    base = nominal(data)
+    layered = beside_scatter(base, [effect_class(name) for name in SCATTERED])
+    assert layered is not None
+    study = studied(data, base, ("gravity_stiffness",), base)
+    rival = answer(("coulomb_friction",), 0.0, 0.1, layered)
+    repeating = answer(("quadratic_damping",), 0.0, 0.1, base)
+    found = candidates(replace(study, answers=(*study.answers, rival, repeating)), excess_base(study), {})
+    first, *others = (set(one.effect.split(" + ")) for one in found)
+    assert first == {"gravity_stiffness"}
+    assert {"quadratic_damping"} in others
+    (whole,) = [names for names in others if "coulomb_friction" in names]
+    assert len(whole) > 1
+    assert whole <= {"coulomb_friction", *SCATTERED}
