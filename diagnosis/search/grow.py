@@ -35,23 +35,30 @@ def grow(
         Fitted hypotheses of all sizes, best first. Growth ends where the evidence for a larger set falls or cannot
         rise, and at the greatest number of causes.
     """
-    level, gap = [view.smallest], view.gap
+    first, gap = view.smallest, view.gap
+    level = [first]
     # that the runs differ by chance alone is an answer too
-    found = {first.names: first for first in level if first.effects or first.fit.problem.scatter}
+    found = {first.names: first} if first.effects or first.fit.problem.scatter else {}
     while level and not (enough is not None and enough(level)):
         children = _likeliest(view.with_forms(view.larger(level, progress), level), gap, view)
         found |= {child.names: child for child in children}
-        level = view.to_grow(level, going_on(children, level, gap))
+        level = view.to_grow(level, going_on(children, level, gap, in_pairs=level[0] is first))
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
 def going_on(
-    children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
+    children: Sequence[Hypothesis],
+    parents: Sequence[Hypothesis],
+    gap: ChannelMisfit,
+    *,
+    in_pairs: bool = False,
 ) -> list[Hypothesis]:
     """The sets to grow further from their parents, best first; empty where the best could gain nothing.
 
     Args:
         gap: misfit of the nominal model.
+        in_pairs: whether all effects that only the comparison of runs shows go on: beside the differences that one
+            of two patterns leaves, the other looks like chance as well.
     """
     settings = parents[0].fit.settings
     scale = Scale.of((*children, *parents), gap, settings.weighing)
@@ -59,10 +66,13 @@ def going_on(
     if not ranked or not _may_gain(ranked[0], scale):
         return []
     best = max((*ranked, *parents), key=scale.weight)
-    if (
-        best.explains_runs
-    ):  # differences between runs remain: another effect may explain them, beside this set
-        return [best] if best in ranked else []
+    if best.explains_runs:  # only differences between runs remain, which further effects may explain
+        known = max(parent.fit.shown_between_runs for parent in parents)
+        patterns = [child for child in ranked if in_pairs and child.fit.shown_between_runs > known]
+        patterns.sort(
+            key=lambda child: child.fit.unlikelihood
+        )  # a width that is no smaller hides their weight
+        return patterns or [child for child in ranked if child is best]
     going = []
     for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]

@@ -229,7 +229,7 @@ class WholeRuns(View):
         view = replace(self, base=self.scattering, unscattered=self.base, first=explained or none)
 
         def unexplained(level: Sequence[Hypothesis]) -> bool:
-            if not any(one.effects for one in level):
+            if explained is not None or not any(one.effects for one in level):
                 return False
             return not any(self._leaves_less(one, GROWN_BESIDE) for one in level)
 

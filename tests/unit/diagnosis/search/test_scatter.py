@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from diagnosis.search.study import Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.marks import slow
 from tests.reference.free_decays import damped_cosine
+from tests.support.scattered_runs import SCATTERED
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
@@ -37,6 +39,10 @@ FEW = vocabulary(
     ["cubic_stiffness", "coulomb_friction", "spring_miscalibration", "stiffness_scatter", "damping_scatter"]
 )
 """What could be taken for scatter, where the whole vocabulary adds nothing but time."""
+PATTERNS = vocabulary(
+    ["reynolds_dependence", "spring_miscalibration", "nonlinear_yaw_moment", "cubic_stiffness", *SCATTERED]
+)
+"""What could be taken for scatter with the speed and the spring, and for no scatter."""
 SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
 STIFFNESS, DAMPED = "stiffness_scatter", "damping_scatter"
 
@@ -112,6 +118,29 @@ def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
     assert beside is not None
     assert beside.effects == ("cubic_stiffness", "spring_miscalibration")
     assert view.likeliest_part([beside]).effects == ("cubic_stiffness",)
+
+
+def test_two_patterns_in_one_number_are_not_chance() -> None:
+    """Beside what a dependence on the speed leaves, a wrong spring looks like chance, and the reverse."""
+    rng, time, runs = np.random.default_rng(8), np.arange(0.0, 10.0, 1.0 / RATE), []
+    speeds, springs = (0.0, 12.0, 17.0, 25.0), (16.0, 30.0, 44.0)
+    mean, air = float(np.mean(speeds[1:])), 0.5 * 1.2 * 0.036 * 0.625
+    for spring, speed in product(springs, speeds):
+        cn_beta = 0.5 * (1.0 + 0.02 * np.log(max(speed, 1.0) / mean))
+        stiffness = spring * (1.0 - 0.001 * (spring == 30.0)) - air * speed**2 * cn_beta
+        swing = damped_cosine(
+            time, (DAMPING + air * 0.625 * speed * 0.15) / INERTIA, stiffness / INERTIA, 0.3, 0.0
+        )
+        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        runs.append(Run(f"s{spring:g}-v{speed:g}", record, speed, spring, 1.2))
+    rig = RigProperties(INERTIA, 0.036, 0.625, 0.225)
+    found = diagnose(Campaign("patterns", rig, SensorProperties(RATE), tuple(runs)), kinds=PATTERNS)
+    assert found.causes == ("reynolds_dependence", "spring_miscalibration")
+    assert found.decision.decided
+    assert (
+        abs(found.coefficients.after["cn_beta"].value - 0.5)
+        < 4.0 * found.coefficients.after["cn_beta"].known_std
+    )
 
 
 def test_runs_that_repeat_show_none() -> None:
