@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from diagnosis.answer.held_out import excess_base
-from diagnosis.findings.candidates import candidates
+from diagnosis.findings.candidates import Candidate, candidates
+from diagnosis.findings.causes import NamedCauses
 from diagnosis.search.scatter import scattered as beside_scatter
 from tests.support.gap_campaigns import answer, campaign, nominal, studied
 from tests.support.scattered_runs import SCATTERED, scattered
@@ -37,3 +38,15 @@ def test_a_rival_has_the_names_of_its_own_scatter():
     (whole,) = [names for names in others if "coulomb_friction" in names]
     assert len(whole) > 1
     assert whole <= {"coulomb_friction", *SCATTERED}
+
+
+def test_scatter_of_a_rival_alone_is_part_of_the_alternative():
+    answers = (
+        Candidate("spring_miscalibration", 0.6, 0.0, 1.0),
+        Candidate("gravity_stiffness + stiffness_scatter", 0.35, 0.0, 1.0),
+    )
+    named = NamedCauses(("spring_miscalibration",), ("gravity_stiffness",), answers, {}, (), False, 0.1)
+    assert named.certain_and_open() == (
+        [],
+        [("spring miscalibration", 0.6), ("gravity stiffness and scatter between runs", 0.35)],
+    )
