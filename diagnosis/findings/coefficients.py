@@ -22,6 +22,7 @@ from identification.show.numbers import (
     listed,
     percent_of,
     plain,
+    relative_change,
     significant,
     size_change,
     unit_mark,
@@ -266,7 +267,7 @@ def consequence(given: Coefficients, judged: Judged) -> str:
             )
             continue
         label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
-        share = 100.0 * (abs(two.value) / abs(one.value) - 1.0)
+        share = 100.0 * relative_change(one.value, two.value)
         values = _apart(one.value, two.value)
         if one.value * two.value < 0.0:
             clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")

@@ -17,7 +17,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
-from identification.show.numbers import plain, probability, share
+from identification.show.numbers import plain, probability, relative_change, share
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -198,4 +198,4 @@ def immaterial(before: Estimates, after: Estimates) -> dict[str, float]:
     limits = {name: min(IMMATERIAL * abs(given.value), given.std or 0.0) for name, given in known.items()}
     if any(moves[name] > limit for name, limit in limits.items()):
         return {}
-    return {name: moves[name] / abs(given.value) for name, given in known.items()}
+    return {name: abs(relative_change(before[name].value, given.value)) for name, given in known.items()}

@@ -19,7 +19,7 @@ from diagnosis.findings.verdict import in_doubt_of_place, runs_of_the_gap
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
-from identification.show.numbers import listed, plain, share, within
+from identification.show.numbers import listed, plain, relative_change, share, within
 from identification.show.quantity import Quantity
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import known_effects
@@ -111,25 +111,26 @@ def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> s
     whole = part > 0.9995 and not answer.rest_is_significant
     gap = f"{'the whole gap' if whole else f'{share(max(part, 1e-9))} of the gap'}{beside}"
     alone = len(without_scatter(answer.causes)) == 1
-    return f"removes {listed([gap, *(_errors(answer) if alone else [])])}"
+    return f"removes {gap}{_corrects(answer) if alone else ''}"
 
 
 _REPEATED = {"wind_speed": "wind speed", "spring_stiffness": "stiffness", "mechanical_damping": "damping"}
 
 
-def _errors(answer: Findings) -> Iterator[str]:
-    """The errors of the coefficients that go with the only cause, where they are of a per cent or more."""
-    given = answer.coefficients
+def _corrects(answer: Findings) -> str:
+    """The changes of the coefficients by the only cause, where they are of a per cent or more, after a blank."""
+    given, found = answer.coefficients, []
     for name, one in given.before.items():
         two = {**given.after, **given.in_phase}.get(name)
-        if two is None or not (one.determined and two.determined and two.value):
+        if two is None or not (one.determined and two.determined) or one.value * two.value <= 0.0:
             continue
-        error = abs(one.value / two.value - 1.0)
-        if _VISIBLE <= error < 1.0 and abs(one.value - two.value) > reach_of(two):
-            yield f"the {100.0 * error:.0f} % error of {COEFFICIENTS.get(name, name)}"
+        change = abs(relative_change(one.value, two.value))
+        if _VISIBLE <= change < 1.0 and abs(one.value - two.value) > reach_of(two):
+            found.append(f"{COEFFICIENTS.get(name, name)} by {100.0 * change:.0f} %")
+    return f" and corrects {listed(found)}" if found else ""
 
 
-_VISIBLE = 0.01  # of a coefficient: a smaller error is not worth a word
+_VISIBLE = 0.01  # of a coefficient: a smaller change is not worth a word
 
 
 def shares_of_gap(answer: Findings) -> dict[str, tuple[float, str]]:

@@ -11,7 +11,7 @@ from diagnosis.findings.finding import Answered, Finding, Picture
 from diagnosis.findings.judged import Judged
 from identification.show.blocks import Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
-from identification.show.numbers import estimated, listed, significant, with_std
+from identification.show.numbers import estimated, listed, relative_change, size_change, with_std
 from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import figure, grid, styled
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -37,7 +37,7 @@ class AirMoment:
 
 @dataclass(frozen=True)
 class WhatItCosts(Finding):
-    """The moments of the air at the top wind speed of a campaign, and their error without the causes.
+    """The moments of the air at the top wind speed of a campaign, and their change by the causes.
 
     A positive moment turns the body further in the direction of the yaw or of the yaw rate.
 
@@ -68,9 +68,9 @@ class WhatItCosts(Finding):
     def section(self, judged: Judged) -> Section:
         """The moments in a sentence, a table and a figure."""
         rows = tuple(
-            (one.motion, *map(_shown, (one.before, one.after)), _error(one) or "–") for one in self.moments
+            (one.motion, *map(_shown, (one.before, one.after)), _change(one) or "–") for one in self.moments
         )
-        heads = ("moment of the air at", "nominal model [N m]", "with the causes [N m]", "error without them")
+        heads = ("moment of the air at", "nominal model [N m]", "with the causes [N m]", "change of size")
         title = f"Moments of the air at {self.wind_speed:g} m/s, with 95 % intervals"
         said = listed([_said(one) for one in self.moments])
         words = f"At {self.wind_speed:g} m/s the moment of the air is {said}. Here ± spans the 95 % interval."
@@ -121,29 +121,29 @@ def _shown(given: Quantity) -> str:
 
 def _said(one: AirMoment) -> str:
     """The moment with the causes as a part of a sentence."""
-    error = _error(one)
-    return f"{_shown(one.after)} N m at {one.motion}" + (f" ({error} without the causes)" if error else "")
+    change = _change(one)
+    return f"{_shown(one.after)} N m at {one.motion}" + (f" ({change} by the causes)" if change else "")
 
 
-def _error(one: AirMoment) -> str:
-    """The error of the nominal model in per cent of the moment with the causes; empty where one is at a bound.
+def _change(one: AirMoment) -> str:
+    """The change of a moment's size by the causes, in per cent of the nominal one; empty where one is at a bound.
 
     ± spans the 95 % interval, as if the two estimates were independent.
     """
     before, after = one.before, one.after
-    if before.bound or after.bound or not after.value:
+    if before.bound or after.bound or not before.value:
         return ""
-    ratio, std = before.value / after.value, None
-    if before.std is not None and after.std is not None:
-        std = 100.0 * INTERVAL * math.hypot(before.std / after.value, ratio * after.std / after.value)
-    error = 100.0 * (ratio - 1.0)
-    if max(abs(error), std or 0.0) < _NO_ERROR:
-        return f"less than {_NO_ERROR:g} %"
-    shown = significant(error, 2) if std is None else with_std(error, std)
-    return f"{'+' if error > 0.0 else ''}{shown} %"
+    if before.value * after.value < 0.0 or before.std is None or after.std is None:
+        return size_change(before.value, after.value)
+    change = 100.0 * relative_change(before.value, after.value)
+    ratio = after.value / before.value
+    std = 100.0 * INTERVAL * math.hypot(after.std / before.value, ratio * before.std / before.value)
+    if max(abs(change), std) < _NO_CHANGE:
+        return f"less than {_NO_CHANGE:g} %"
+    return f"{'+' if change > 0.0 else ''}{with_std(change, std)} %"
 
 
-_NO_ERROR = 0.01  # %: a smaller one is stated as this
+_NO_CHANGE = 0.01  # %: a smaller one is stated as this
 
 
 @styled

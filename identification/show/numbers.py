@@ -245,6 +245,16 @@ def rounded_up(value: float) -> str:
     return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
 
 
+def relative_change(before: float, after: float) -> Share:
+    """The change of a coefficient's size by the causes, of its size without them: the base of every such change.
+
+    Args:
+        before: the value without the causes, not 0, in its unit.
+        after: the value with the causes, in the same unit and of the same sign.
+    """
+    return abs(after) / abs(before) - 1.0
+
+
 def size_change(before: float, after: float) -> str:
     """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
 
@@ -254,7 +264,7 @@ def size_change(before: float, after: float) -> str:
     """
     if before * after < 0.0:
         return "other sign"
-    return changed_by(abs(after) / abs(before) - 1.0)
+    return changed_by(relative_change(before, after))
 
 
 def changed_by(change: Share) -> str:

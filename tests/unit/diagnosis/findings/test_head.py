@@ -5,6 +5,7 @@ Truth: documents written by hand. A line may state nothing that the verdict does
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from identification.show.blocks import as_text
 from identification.show.numbers import changed_by, to_interval
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import document, findings_of
+from tests.support.rendered import consequence
 from tests.support.shown_numbers import assert_shows
 
 DRY, SPRING = "coulomb_friction", "spring_miscalibration"
@@ -137,15 +139,17 @@ def test_a_wide_interval_has_a_step_that_narrows_it(source: str, step: str, left
     assert not any(one.startswith(step) for one in next_steps(findings_of(given)))
 
 
-def test_the_only_cause_names_the_errors_that_go_with_it() -> None:
+def test_the_only_cause_names_the_changes_of_the_coefficients_as_the_verdict_does() -> None:
     given = two_causes(causes=[DRY])
     given["candidates"][0] |= {"effect": DRY}
     given["waterfall"] = [{"effect": None, "excess": 10.0}, {"effect": DRY, "excess": 0.0}]
     first = next_steps(findings_of(given))[0]
     assert first == (
-        "Reduce the dry friction of the bearing and the potentiometer: removes the whole gap, the 11 % error of "
-        "Cnβ and the 25 % error of Cnr."
+        "Reduce the dry friction of the bearing and the potentiometer: removes the whole gap and corrects Cnβ by "
+        "10 % and Cnr by 20 %."
     )
+    verdict = consequence(findings_of(given))
+    assert re.findall(r"by (\d+) %", verdict) == re.findall(r"by (\d+) %", first) == ["10", "20"]
 
 
 def test_a_caveat_that_changes_the_answer_stands_in_the_head_and_no_other() -> None:

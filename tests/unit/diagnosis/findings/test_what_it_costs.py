@@ -65,7 +65,7 @@ def test_nothing_is_said_without_causes_wind_or_coefficients() -> None:
     assert found(data=type(still)(still.name, still.rig, still.sensor, still.runs[:1])) is None
 
 
-def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_error() -> None:
+def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_change() -> None:
     costs = found()
     assert costs is not None
     section = costs.section(findings_of(document()))
@@ -73,8 +73,8 @@ def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_error() -> None:
     assert isinstance(words, Paragraph)
     assert isinstance(table, TextTable)
     assert "yaw rate. Here ± spans the 95 % interval." in words.text
-    error = 196.0 * math.hypot(0.01 / 0.4, 0.5 * 0.002 / 0.4**2)  # of a ratio, by its two parts
-    assert table.rows[0][-1] == f"+25.0 ± {error:.1f} %"
+    reach = 196.0 * math.hypot(0.002 / 0.5, 0.4 * 0.01 / 0.5**2)  # of a ratio, by its two parts
+    assert table.rows[0][-1] == f"-20.0 ± {reach:.1f} %"
     assert table.rows[1][-1] == "–"
     assert "(at its lower bound)" in table.rows[1][1]
 
